@@ -1,0 +1,320 @@
+"""The skill model: plain, typed values that both notations read into and everything else is made from.
+
+Resources are state machines (paper, section 4.1.1), skills have preconditions, a start effect, invariants and results
+(section 4.1.2). Nothing here knows of files, ROS or execution. Every named element carries the place in the source that
+it came from, so that whoever finds something wrong with it can show where.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+@dataclass(frozen=True)
+class Span:
+    """A place in a source file: 1-based line and column, ``end_column`` exclusive on the same line."""
+
+    file: str
+    line: int
+    column: int
+    end_column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+NOWHERE = Span(file="", line=0, column=0, end_column=0)
+
+
+# --- expressions -----------------------------------------------------------------------------------------------------
+# Conditions are over resource states (`axes == USED`) and, in preconditions, over data (`battery.level > 0.2`).
+
+
+class Comparison(Enum):
+    """How the two sides of an atom are compared."""
+
+    EQ = "=="
+    NE = "!="
+    LT = "<"
+    LE = "<="
+    GT = ">"
+    GE = ">="
+
+
+@dataclass(frozen=True)
+class ResourceIs:
+    """``resource == STATE`` or ``resource != STATE``."""
+
+    resource: str
+    state: str
+    negated: bool = False
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class DataIs:
+    """``data.field < number [unit]``; ``path`` is empty for a plain value."""
+
+    data: str
+    path: tuple[str, ...]
+    comparison: Comparison
+    value: float | str | bool
+    unit: str = ""
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Constant:
+    """``true`` or ``false``."""
+
+    value: bool
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Not:
+    """Negation."""
+
+    operand: Expression
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class And:
+    """Conjunction of two or more operands."""
+
+    operands: tuple[Expression, ...]
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Or:
+    """Disjunction of two or more operands."""
+
+    operands: tuple[Expression, ...]
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Implies:
+    """Implication, ``premise => conclusion``."""
+
+    premise: Expression
+    conclusion: Expression
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+Expression = ResourceIs | DataIs | Constant | Not | And | Or | Implies
+TRUE = Constant(value=True)
+
+
+def atoms(expression: Expression) -> Iterator[ResourceIs | DataIs | Constant]:
+    """Yield the leaves of an expression from left to right."""
+    match expression:
+        case Not(operand=operand):
+            yield from atoms(operand)
+        case And(operands=operands) | Or(operands=operands):
+            for operand in operands:
+                yield from atoms(operand)
+        case Implies(premise=premise, conclusion=conclusion):
+            yield from atoms(premise)
+            yield from atoms(conclusion)
+        case _:
+            yield expression
+
+
+# --- elements --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A typed name: an input, an output or a parameter (``default`` is its source text, or empty)."""
+
+    name: str
+    type: str
+    default: str = ""
+    comment: str = ""
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Data:
+    """A value that the functional layer publishes. ``period_s`` is None where no period is promised."""
+
+    name: str
+    type: str
+    period_s: float | None = None
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Transition:
+    """An arrow of a resource; an extern one is taken by the functional layer only, others by skills only."""
+
+    source: str
+    target: str
+    extern: bool = False
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Resource:
+    """A state machine. ``states`` keeps the order of the source; ``all_transitions`` tells that they were written ``all``."""
+
+    name: str
+    states: tuple[str, ...]
+    initial: str
+    transitions: tuple[Transition, ...]
+    all_transitions: bool = False
+    span: Span = field(default=NOWHERE, compare=False)
+
+    def has_arrow(self, source: str, target: str, *, extern: bool) -> bool:
+        """Tell whether the functional layer (extern) or a skill (not extern) may go from source to target."""
+        return any(t.source == source and t.target == target and t.extern == extern for t in self.transitions)
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """One step of an effect: ``resource -> target``."""
+
+    resource: str
+    target: str
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A set of resource changes applied as one; an empty one changes nothing (paper, Listing 3: ``reset {}``).
+
+    ``name`` is empty where the notation writes the changes in place.
+    """
+
+    name: str = ""
+    assignments: tuple[Assignment, ...] = ()
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+NO_EFFECT = Effect()
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens in the skillset by itself: when ``guard`` holds, ``effect`` may be applied."""
+
+    name: str
+    guard: Expression = TRUE
+    effect: Effect = NO_EFFECT
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Precondition:
+    """A named condition that must hold when the skill starts."""
+
+    name: str
+    condition: Expression
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Invariant:
+    """A named condition that must hold while the skill runs; ``effect`` is applied when it is broken."""
+
+    name: str
+    condition: Expression
+    effect: Effect = NO_EFFECT
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Every ``period_s`` seconds a running skill reports; ``message`` names the type of the report, or is empty."""
+
+    period_s: float
+    message: str = ""
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Interrupt:
+    """What an interruption does: whether it takes time, its effect, and what must hold after it."""
+
+    interrupting: bool = False
+    effect: Effect = NO_EFFECT
+    postcondition: Expression = TRUE
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+class ResultKind(Enum):
+    """A plain result says nothing about success: the mission decides (the paper's notation)."""
+
+    PLAIN = "result"
+    SUCCESS = "success"
+    FAILURE = "failure"
+
+
+@dataclass(frozen=True)
+class Result:
+    """A way in which the skill can end by itself, its effect, and what must hold after the effect."""
+
+    name: str
+    kind: ResultKind = ResultKind.PLAIN
+    effect: Effect = NO_EFFECT
+    postcondition: Expression = TRUE
+    comment: str = ""
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
+class Skill:
+    """A capability. ``effects`` are the named ones of the paper's notation; start, invariants and results refer to them."""
+
+    name: str
+    parameters: tuple[Parameter, ...] = ()
+    inputs: tuple[Parameter, ...] = ()
+    outputs: tuple[Parameter, ...] = ()
+    effects: tuple[Effect, ...] = ()
+    preconditions: tuple[Precondition, ...] = ()
+    start: Effect = NO_EFFECT
+    invariants: tuple[Invariant, ...] = ()
+    progress: Progress | None = None
+    interrupt: Interrupt = Interrupt()
+    results: tuple[Result, ...] = ()
+    span: Span = field(default=NOWHERE, compare=False)
+
+    def result(self, name: str) -> Result:
+        """Return the result of this name; raise KeyError with the names there are."""
+        for result in self.results:
+            if result.name == name:
+                return result
+        raise KeyError(f"skill {self.name} has no result {name}; it has {', '.join(r.name for r in self.results)}")
+
+
+@dataclass(frozen=True)
+class Skillset:
+    """Skills of one subsystem with the data and resources that they share (paper, section 4.1)."""
+
+    name: str
+    types: tuple[str, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    data: tuple[Data, ...] = ()
+    resources: tuple[Resource, ...] = ()
+    events: tuple[Event, ...] = ()
+    skills: tuple[Skill, ...] = ()
+    span: Span = field(default=NOWHERE, compare=False)
+
+    def resource(self, name: str) -> Resource:
+        """Return the resource of this name; raise KeyError."""
+        for resource in self.resources:
+            if resource.name == name:
+                return resource
+        raise KeyError(f"skillset {self.name} has no resource {name}; it has {', '.join(r.name for r in self.resources)}")
+
+    def skill(self, name: str) -> Skill:
+        """Return the skill of this name; raise KeyError."""
+        for skill in self.skills:
+            if skill.name == name:
+                return skill
+        raise KeyError(f"skillset {self.name} has no skill {name}; it has {', '.join(s.name for s in self.skills)}")

@@ -1,0 +1,134 @@
+#!/usr/bin/env bash
+# Installs and builds Alula, from a bare Debian 12 to a tree that flies. Idempotent: a step whose inputs have not changed is skipped.
+# Everything it makes lies in $ALULA_STATE (default: .alula in the checkout); the log is setup.log there.
+set -u
+ALULA_ROOT="$(cd "$(dirname "$(readlink -f "$0")")/.." && pwd)"
+ALULA_STATE="${ALULA_STATE:-$ALULA_ROOT/.alula}"
+export ALULA_ROOT ALULA_STATE
+log="$ALULA_STATE/setup.log"
+disk_needed_mb=5000
+started=$SECONDS
+quiet=0; [ "${1:-}" = --quiet ] && quiet=1     # says nothing where nothing is to be done
+
+fail() { printf '\nalula setup: %s\n' "$1" >&2; [ -n "${2:-}" ] && printf '  to mend it: %s\n' "$2" >&2; exit 2; }
+
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
+
+# step NAME KEY FUNCTION TITLE: runs FUNCTION if KEY differs from the one it last succeeded with.
+step() {
+  local name=$1 key=$2 function=$3 title=$4 stamp="$ALULA_STATE/stamps/$1" begun=$SECONDS
+  [ "$(cat "$stamp" 2>/dev/null)" = "$key" ] && return 0
+  printf '  %-58s' "$title"
+  [ -t 1 ] || printf '\n'
+  printf '\n===== %s =====\n' "$title" >>"$log"
+  rm -f "$stamp"
+  "$function" >>"$log" 2>&1 &
+  local worker=$! width=0
+  while kill -0 $worker 2>/dev/null; do
+    [ -t 1 ] && printf '\r  %-58s %3d s' "$title" $((SECONDS - begun))
+    sleep 0.3
+  done
+  if wait $worker; then
+    [ -t 1 ] && printf '\r'
+    printf '  %-58s %3d s  done\n' "$title" $((SECONDS - begun))
+    printf '%s' "$key" >"$stamp"
+  else
+    printf '\n'
+    local reason; reason=$(grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |alula: )' "$log" | tail -n 1)
+    fail "'$title' failed: ${reason:-see the log}" "the last lines of $log tell more; './alula setup' goes on where it stopped"
+  fi
+}
+
+digest() { cat "$@" 2>/dev/null | sha256sum | cut -c1-16; }
+tree_digest() { # of all files below the given folders that decide what is built
+  find -L "$@" -type f \( -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name CMakeLists.txt -o -name package.xml -o -name 'setup.*' \
+    -o -path '*/scripts/*' \) -not -path '*/__pycache__/*' -print0 2>/dev/null | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
+}
+
+check_machine() {
+  command -v apt-get >/dev/null && command -v dpkg-query >/dev/null ||
+    fail "this is not a Debian-like system: there is no apt-get" "use Debian 12, or the container in docker/"
+  [ "$(uname -m)" = x86_64 ] || fail "the ROS 2 wheels exist for x86_64 only, this is $(uname -m)" "use an x86_64 machine"
+  local free_mb; free_mb=$(df -Pm "$ALULA_STATE" | awk 'NR==2{print $4}')
+  [ -x "$ALULA_STATE/venv2/bin/python" ] || [ "$free_mb" -ge $disk_needed_mb ] ||
+    fail "$free_mb MB free at $ALULA_STATE, $disk_needed_mb MB are needed" "free some space, or set ALULA_STATE to a folder on a larger disk"
+}
+
+missing_packages() { # names of setup/apt.txt that dpkg does not have installed
+  local wanted; wanted=$(grep -v '^#' "$ALULA_ROOT/setup/apt.txt")
+  comm -23 <(printf '%s\n' $wanted | sort) \
+    <(dpkg-query -W -f '${db:Status-Status} ${binary:Package}\n' 2>/dev/null | awk '$1=="installed"{sub(/:.*/,"",$2);print $2}' | sort)
+}
+
+install_packages() {
+  local missing; missing=$(missing_packages)
+  [ -z "$missing" ] && return 0
+  as_root apt-get update -q || return 1
+  for name in $missing; do
+    apt-cache show "$name" >/dev/null 2>&1 || { echo "alula: Debian has no package '$name' here; is this Debian 12 (bookworm)?"; return 1; }
+  done
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing
+}
+
+make_venv() { # WORLD OPTIONS...
+  local world=$1; shift
+  rm -rf "$ALULA_STATE/venv$world"
+  # A virtual environment of the user's own must not leak into these two.
+  env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME /usr/bin/python3 -m venv "$@" "$ALULA_STATE/venv$world" &&
+    env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME "$ALULA_STATE/venv$world/bin/pip" install --no-input --disable-pip-version-check \
+      --progress-bar off --no-deps -r "$ALULA_ROOT/setup/ros$world.txt"
+}
+make_venv1() { make_venv 1 --system-site-packages; }
+make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup/repair_wheels.py"; }
+
+generate() {
+  ( . "$ALULA_ROOT/setup/env.sh" 2
+    export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/skill_language"
+    rm -rf "$ALULA_STATE/generated.new"
+    python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated.new" &&
+      rm -rf "$ALULA_STATE/generated" && mv "$ALULA_STATE/generated.new" "$ALULA_STATE/generated" )
+}
+
+build_ros1() {
+  ( . "$ALULA_ROOT/setup/env.sh" 1
+    export CMAKE_PREFIX_PATH=/usr
+    # catkin wants a CMakeLists.txt beside the packages; the workspace is linked so that the checkout stays clean.
+    mkdir -p "$ALULA_STATE/ros1" && ln -sfn "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE/ros1/linked_src" || exit 1
+    catkin_make -C "$ALULA_STATE/ros1" --source "$ALULA_STATE/ros1/src" -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCATKIN_ENABLE_TESTING=OFF )
+}
+
+prepare_ros1_sources() { # $ALULA_STATE/ros1/src holds links to the packages: catkin_make writes its toplevel file beside them
+  rm -rf "$ALULA_STATE/ros1/src"; mkdir -p "$ALULA_STATE/ros1/src"
+  for package in "$ALULA_ROOT"/ros1_ws/src/*/; do ln -sfn "$(readlink -f "$package")" "$ALULA_STATE/ros1/src/$(basename "$package")"; done
+}
+make_ros1() { prepare_ros1_sources && build_ros1; }
+
+make_ros2() {
+  ( . "$ALULA_ROOT/setup/env.sh" 2
+    unset PYTHONPATH LD_LIBRARY_PATH
+    export AMENT_PREFIX_PATH="$ALULA_STATE/venv2" CMAKE_PREFIX_PATH="$ALULA_STATE/venv2"
+    cd "$ALULA_STATE/ros2" &&
+      colcon --log-base "$ALULA_STATE/ros2/log" build --merge-install --symlink-install --base-paths "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge/ros_bridge" "$ALULA_STATE/generated" \
+        --build-base "$ALULA_STATE/ros2/build" --install-base "$ALULA_STATE/ros2/install" \
+        --event-handlers console_cohesion+ --cmake-args -DCMAKE_BUILD_TYPE=Release \
+        -DPython3_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DPYTHON_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DBUILD_TESTING=OFF )
+}
+
+mkdir -p "$ALULA_STATE/stamps" "$ALULA_STATE/ros2" 2>/dev/null || fail "can't write to $ALULA_STATE" "check its owner, or set ALULA_STATE to a folder of yours"
+exec 9>"$ALULA_STATE/lock"
+command -v flock >/dev/null && { flock -n 9 || { echo "another setup of this checkout is running, waiting for it"; flock 9; }; }
+check_machine
+[ $quiet = 1 ] || echo "Alula setup (log: $log)"
+if [ -n "$(missing_packages)" ]; then
+  [ "$(id -u)" = 0 ] || command -v sudo >/dev/null ||
+    fail "Debian packages are missing ($(missing_packages | head -n 3 | paste -sd' ')...), and this is neither root nor is there sudo" "run './alula setup' once as root"
+  rm -f "$ALULA_STATE/stamps/apt"
+fi
+step apt "$(digest "$ALULA_ROOT/setup/apt.txt")" install_packages "Debian packages (ROS 1, build tools)"
+step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt")-$ALULA_STATE" make_venv1 "Python packages of the ROS 1 world"
+step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
+step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src")-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
+step generated "$(find "$ALULA_ROOT/skillsets" "$ALULA_ROOT/ros2_ws/src/skill_language" -type f -not -path '*/__pycache__/*' -not -path '*/test/*' -print0 | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16)" \
+  generate "skillsets: interfaces, managers, bridge configuration"
+step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(cat "$ALULA_STATE/stamps/venv2")" make_ros2 "ROS 2 workspace (colcon build)"
+[ $quiet = 1 ] || echo "Alula is ready ($((SECONDS - started)) s)"
