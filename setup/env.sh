@@ -13,7 +13,7 @@ case "$1" in
     export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR=/etc/ros
     export ROS_PACKAGE_PATH="$ALULA_ROOT/ros1_ws/src:/usr/share"
     export CMAKE_PREFIX_PATH="$ALULA_STATE/ros1/devel:/usr"
-    export PYTHONPATH="$ALULA_STATE/ros1/devel/lib/python3/dist-packages:$ALULA_ROOT/flight"
+    export PYTHONPATH="$ALULA_STATE/ros1/devel/lib/python3/dist-packages:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support"
     export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}" ROS_IP="${ROS_IP:-127.0.0.1}"
     ;;
   2)
@@ -24,7 +24,7 @@ case "$1" in
     export AMENT_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export CMAKE_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export LD_LIBRARY_PATH="$_alula_install/lib"
-    export PYTHONPATH="$_alula_install/$_alula_site"
+    export PYTHONPATH="$_alula_install/$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support"
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
     export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
     # 64 MB shared-memory segments: the default of 512 kB loses images and makes them slow.

@@ -1,0 +1,76 @@
+"""A pytest plugin for the ROS 1 world: ``ros_master`` and ``start_node``."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from xmlrpc.client import ServerProxy
+
+import pytest
+from alula_flight.claims import free_port
+
+StartNode = Callable[..., "subprocess.Popen[bytes]"]
+MASTER_START_S = 20.0
+
+
+def wait_until(condition: Callable[[], bool], *, timeout_s: float, what: str) -> None:
+    """Return as soon as the condition holds; fail, naming ``what``, when it does not within the time (wall clock)."""
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail(f"not within {timeout_s} s: {what}")
+        time.sleep(0.01)
+
+
+def end_process(process: subprocess.Popen[bytes], *, patience_s: float = 5.0) -> None:
+    """End a process group that the test started: first politely, then for good."""
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGINT)
+        try:
+            process.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+@pytest.fixture(scope="session")
+def ros_master() -> Iterator[str]:
+    """Start a ROS master on a port of its own; this process becomes node /tester, on wall time unless a test sets /use_sim_time before."""
+    import rospy
+
+    port = free_port()
+    uri = f"http://127.0.0.1:{port}"
+    os.environ["ROS_MASTER_URI"] = uri
+    os.environ["ROS_IP"] = "127.0.0.1"
+    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], start_new_session=True, stdout=subprocess.DEVNULL)  # noqa: S607
+
+    def answers() -> bool:
+        try:
+            ServerProxy(uri).getPid("/tester")
+        except OSError:
+            return False
+        return True
+
+    wait_until(answers, timeout_s=MASTER_START_S, what="the ROS master answers")
+    rospy.init_node("tester", disable_signals=True)
+    yield uri
+    rospy.signal_shutdown("tests are over")
+    end_process(master)
+
+
+@pytest.fixture
+def start_node(ros_master: str) -> Iterator[StartNode]:
+    """Return a function that starts a node's executable (a list of words, remappings and ``_private:=`` parameters included)."""
+    running: list[subprocess.Popen[bytes]] = []
+
+    def start(command: list[str]) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen(command, start_new_session=True, env={**os.environ, "ROS_MASTER_URI": ros_master})
+        running.append(process)
+        return process
+
+    yield start
+    for process in running:
+        end_process(process)
