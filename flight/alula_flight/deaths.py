@@ -1,0 +1,84 @@
+"""Which process of a run died, how, and what that means for the run."""
+
+from __future__ import annotations
+
+import json
+import signal
+import threading
+from dataclasses import asdict, dataclass
+from enum import Enum
+from pathlib import Path
+
+
+class Consequence(Enum):
+    """What the supervisor does when a process has died by itself."""
+
+    GO_ON = "go on"  # roslaunch starts it again, or the run can do without
+    ABORT = "abort the mission"  # the mission can still land the vehicle
+    LAND = "land the vehicle"  # nobody decides any more
+    END = "end the run"  # there is nothing left to fly
+
+
+# A name that is not here: the run goes on.
+CONSEQUENCES = {
+    "mission": Consequence.LAND,
+    "uav_simulator": Consequence.END,
+    "master": Consequence.ABORT,
+}
+RESPAWNED = ("uav_guidance", "zed_depth", "lidar_obstacles", "lidar_mapping", "ros_bridge", "navigation", "perception", "mapping")
+
+
+@dataclass(frozen=True)
+class Death:
+    """A process that ended although nobody had told it to. ``when_s``: absolute mission clock, None before it runs."""
+
+    name: str
+    how: str
+    when_s: float | None
+
+    def sentence(self) -> str:
+        """Return what a person wants to read."""
+        when = "" if self.when_s is None else f" at {self.when_s:.1f} s of mission clock"
+        again = "; it was started again" if self.name in RESPAWNED else ""
+        return f"{self.name} died ({self.how}){when}{again}"
+
+
+def describe_exit(code: int | None) -> str:
+    """Return ``signal SIGKILL`` or ``exit code 1``."""
+    if code is not None and code < 0:
+        return f"signal {signal.Signals(-code).name}"
+    return f"exit code {code}"
+
+
+class DeathRecord:
+    """Collects deaths from roslaunch's process monitor (any thread) and writes each at once to a file, a line each."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._deaths: list[Death] = []
+        path.touch()
+
+    def add(self, death: Death) -> None:
+        """Keep a death and write it down."""
+        with self._lock:
+            self._deaths.append(death)
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(death)) + "\n")
+
+    @property
+    def all(self) -> tuple[Death, ...]:
+        """All deaths so far."""
+        with self._lock:
+            return tuple(self._deaths)
+
+
+def read_deaths(path: Path) -> list[Death]:
+    """Read what a `DeathRecord` wrote; a line cut off by a crash is left out."""
+    deaths = []
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        try:
+            deaths.append(Death(**json.loads(line)))
+        except (json.JSONDecodeError, TypeError):
+            continue
+    return deaths

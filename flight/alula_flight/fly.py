@@ -1,0 +1,234 @@
+"""The front of ``./alula fly``: checks the request, starts the supervisor, shows what happens, and never leaves anything running.
+
+    1. read the command line                  4. when it is over, end whatever is left of the run
+    2. claim folder, ports and DDS domain     5. make the report from what was recorded
+    3. start the supervisor and watch         6. say how it went
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from alula_flight.claims import claim_domain, free_port
+from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
+from alula_flight.live import LiveEvents
+from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run, sweep_shared_memory
+from alula_flight.spec import SCENARIOS, RequestError, RunSpec, parse_fault
+
+CANNOT_START = 2
+GIVEN_UP = 1
+PR_SET_PDEATHSIG = 1  # prctl(2)
+MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
+MISSION_MODULE = b"uav_missions"
+
+
+class Arguments(argparse.Namespace):
+    """The command line of ``fly``."""
+
+    scenario: str
+    fail: list[str]
+    out: Path | None
+    seed: int
+    rate: float
+    autopilot: str | None
+
+
+def parse(arguments: list[str]) -> RunSpec:
+    """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
+    parser = argparse.ArgumentParser(prog="alula fly", description="Fly a scenario through the whole stack.", add_help=True)
+    parser.add_argument("scenario", help="; ".join(f"{name}: {meaning}" for name, meaning in SCENARIOS.items()))
+    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[@SECONDS]", help="break a sensor, seconds after lift-off")
+    parser.add_argument("--out", type=Path, help="folder for the results (default: runs/<time>-<scenario>)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of world details, wind and noise (default 0)")
+    parser.add_argument("--rate", type=float, default=1.0, help="simulated seconds per second at most, 0: no limit (default 1)")
+    parser.add_argument("--autopilot", metavar="URL", help="fly a real autopilot (pymavlink connection) instead of the simulator")
+    given = parser.parse_args(arguments, namespace=Arguments())
+    if given.scenario not in SCENARIOS:
+        raise RequestError(f"there is no scenario '{given.scenario}'; choose one of {', '.join(SCENARIOS)}")
+    if not 0 <= given.seed < 2**31:
+        raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")
+    if not 0 <= given.rate <= 1000:  # also refuses nan
+        raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to 1000")
+    if given.autopilot is not None and given.fail:
+        raise RequestError("--fail breaks simulated sensors; with --autopilot there are none")
+    return RunSpec(
+        scenario=given.scenario,
+        out_dir=str(run_folder(given.out, given.scenario)),
+        run_id=uuid.uuid4().hex,
+        seed=given.seed,
+        rate=given.rate,
+        faults=tuple(str(parse_fault(text)) for text in given.fail),
+        autopilot=given.autopilot,
+        master_port=free_port(),
+        mavlink_port=free_port(),
+        domain=0,
+    )
+
+
+def run_folder(wanted: Path | None, scenario: str) -> Path:
+    """Return an absolute path that holds no run yet; raise RequestError if the wanted one does."""
+    if wanted is not None:
+        folder = wanted.expanduser().absolute()
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise RequestError(f"--out {wanted}: exists and is not an empty folder; choose another, a run never overwrites")
+        return folder
+    base = Path(os.environ["ALULA_ROOT"]) / "runs" / f"{datetime.now(tz=UTC).astimezone():%Y%m%d-%H%M%S}-{scenario}"
+    candidates = (base, *(base.with_name(f"{base.name}-{n}") for n in range(2, 1000)))
+    return next(folder for folder in candidates if not folder.exists())
+
+
+def _die_with_parent() -> None:
+    """Ask the kernel for SIGTERM when the front dies; runs in the supervisor between fork and exec."""
+    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def start_supervisor(spec: RunSpec, spec_path: Path) -> subprocess.Popen[bytes]:
+    """Start the supervisor in a session of its own, so that a Ctrl-C reaches the front only."""
+    out = Path(spec.out_dir)
+    environment = {
+        **os.environ,
+        RUN_ID_VARIABLE: spec.run_id,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{spec.master_port}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(out / "logs"),
+        "ROS_LOG_DIR": str(out / "logs"),
+        "ROS_DOMAIN_ID": str(spec.domain),
+    }
+    with (out / "logs" / "supervisor.log").open("wb") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", "alula_flight.supervisor", str(spec_path)],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=_die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
+        )
+
+
+class Front:
+    """Watches the supervisor; the first Ctrl-C lands the vehicle, the second ends everything at once."""
+
+    def __init__(self, spec: RunSpec, say: Callable[[str], None]) -> None:
+        self._spec = spec
+        self._say = say
+        self._interrupts = 0
+        self._supervisor: subprocess.Popen[bytes] | None = None
+
+    def fly(self, spec_path: Path) -> int:
+        """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, lambda *_: self._interrupted())
+        supervisor = self._supervisor = start_supervisor(self._spec, spec_path)
+        live = LiveEvents(Path(self._spec.out_dir), self._say)
+        try:
+            while supervisor.poll() is None and self._interrupts < 2:
+                live.show_new()
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    supervisor.wait(0.2)
+            if supervisor.poll() is not None and supervisor.returncode < 0:
+                self._supervisor_died(supervisor.returncode, live)
+            live.show_new()
+        finally:
+            end_run(self._spec.run_id)
+            supervisor.wait()
+            sweep_shared_memory()
+        return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
+
+    def _interrupted(self) -> None:
+        self._interrupts += 1
+        if self._interrupts == 1:
+            self._say("stopping: the vehicle lands first; Ctrl-C again ends everything at once")
+            if self._supervisor is not None and self._supervisor.poll() is None:
+                self._supervisor.send_signal(signal.SIGINT)
+        else:
+            self._say("ending everything at once")
+
+    def _supervisor_died(self, code: int, live: LiveEvents) -> None:
+        """Let the mission land the vehicle; it lives in a session of its own and knows nothing of its parents."""
+        record = DeathRecord(Path(self._spec.out_dir) / "deaths.jsonl")
+        record.add(Death("supervisor", describe_exit(code), None))
+        self._say("the supervisor died; the mission lands the vehicle")
+        missions = [pid for pid in processes_of_run(self._spec.run_id) if _is_mission(pid)]
+        for pid in missions:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGINT)
+        end = time.monotonic() + MISSION_PATIENCE_S
+        while any(map(_is_mission, missions)) and time.monotonic() < end and self._interrupts < 2:
+            live.show_new()
+            time.sleep(0.2)
+
+
+def _is_mission(pid: int) -> bool:
+    try:
+        return MISSION_MODULE in Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
+
+
+def finish(spec: RunSpec, mission_exit: int | None) -> int:
+    """Make the report from the run's folder, say how it went, and return the exit code."""
+    # Late, because a wrong command line should not have to wait for matplotlib and Open3D.
+    from alula_flight.report import RunFacts, make_report
+    from alula_flight.verdict import verdict_lines
+
+    out = Path(spec.out_dir)
+    died = read_deaths(out / "deaths.jsonl")
+    summary = make_report(
+        RunFacts(
+            scenario=spec.scenario,
+            seed=spec.seed,
+            out_dir=out,
+            faults=list(spec.faults),
+            died=[{"name": d.name, "when_s": d.when_s, "how": d.how} for d in died],
+            mission_exit=mission_exit,
+        )
+    )
+    for line in verdict_lines(summary, died, out):
+        sys.stdout.write(line + "\n")
+    return mission_exit if mission_exit is not None else GIVEN_UP
+
+
+def main(arguments: list[str]) -> int:
+    """Fly; return 0 accomplished, 1 given up, 2 could not start."""
+    try:
+        request = parse(arguments)
+    except RequestError as error:
+        sys.stderr.write(f"alula fly: {error}\n")
+        return CANNOT_START
+    claim = claim_domain()
+    spec = RunSpec(**{**request.__dict__, "domain": claim.domain})
+    out = Path(spec.out_dir)
+    try:
+        (out / "logs").mkdir(parents=True)
+    except OSError as error:
+        sys.stderr.write(f"alula fly: can't make the folder {out}: {error.strerror}; choose another with --out\n")
+        return CANNOT_START
+    spec_path = out / "run.json"
+    spec.save(spec_path)
+    started = time.monotonic()
+
+    def say(line: str) -> None:
+        sys.stdout.write(f"[{time.monotonic() - started:5.1f} s] {line}\n")
+        sys.stdout.flush()
+
+    failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
+    say(f"flying '{spec.scenario}', seed {spec.seed}{failing}; results in {out}")
+    code = Front(spec, say).fly(spec_path)
+    say("making the report")
+    return finish(spec, code)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

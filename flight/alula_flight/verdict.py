@@ -1,0 +1,52 @@
+"""The last lines of a flight: how it went, in words and numbers, and where the pictures are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from alula_flight.deaths import Death
+
+MEANING = {
+    "accomplished": "mission accomplished",
+    "degraded": "mission accomplished in degraded mode",
+    "given_up": "mission given up",
+    "aborted": "mission aborted by the operator",
+    "not_started": "the mission could not start",
+    "running": "the mission's process ended before the mission did",
+}
+PICTURES = ("timeline.svg", "tree.svg", "map.png", "summary.json")
+
+
+def number(value: float | None, unit: str, digits: int = 2) -> str:
+    """Return ``1.23 m``, or ``unknown``."""
+    return "unknown" if value is None else f"{value:.{digits}f} {unit}".rstrip()
+
+
+def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
+    """Return the verdict, a line each."""
+    outcome = summary.get("outcome")
+    reason = summary.get("reason")
+    lines = ["", MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")]
+    lines += [f"  {death.sentence()}" for death in died]
+    chart = summary.get("map") or {}
+    coverage = chart.get("coverage")
+    lines += [
+        f"  landed: {'yes' if summary.get('landed') else 'no'}, duration {number(summary.get('duration_s'), 's', 1)}, "
+        f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {summary.get('collisions')}, "
+        f"nearest surface {number(summary.get('min_clearance_m'), 'm')}",
+        f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
+        f"coverage {number(None if coverage is None else 100 * coverage, '%', 1)}",
+    ]
+    recovery = summary.get("recovery") or {}
+    if recovery.get("failure_s") is not None:
+        failure = recovery["failure_s"]
+        steps = [f"sensor failed at {failure:.2f} s"]
+        for key, words in (("detected_s", "detected"), ("fallback_running_s", "fallback running"), ("moving_again_s", "moving again")):
+            if recovery.get(key) is not None:
+                steps.append(f"{words} {recovery[key] - failure:.2f} s later")
+        lines.append("  recovery: " + ", ".join(steps))
+    lines += [f"  problem: {problem}" for problem in summary.get("problems") or ()]
+    lines += [f"  {out / name}" for name in PICTURES if (out / name).exists()]
+    return lines
