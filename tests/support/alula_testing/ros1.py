@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from xmlrpc.client import ServerProxy
 
 import pytest
+
 from alula_flight.claims import free_port
 
 StartNode = Callable[..., "subprocess.Popen[bytes]"]
@@ -45,7 +46,7 @@ def ros_master() -> Iterator[str]:
     uri = f"http://127.0.0.1:{port}"
     os.environ["ROS_MASTER_URI"] = uri
     os.environ["ROS_IP"] = "127.0.0.1"
-    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], start_new_session=True, stdout=subprocess.DEVNULL)  # noqa: S607
+    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], start_new_session=True, stdout=subprocess.DEVNULL)
 
     def answers() -> bool:
         try:

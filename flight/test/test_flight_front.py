@@ -1,0 +1,175 @@
+"""What the front checks before anything starts, and how it ends what it started."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from alula_flight.claims import claim_domain, free_port
+from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
+from alula_flight.fly import CANNOT_START, main, parse
+from alula_flight.live import LiveEvents, event_line
+from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run
+from alula_flight.spec import Fault, RequestError, RunSpec, parse_fault
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["nosuch"], ["nosuch", "mapping"]),
+        (["mapping", "--fail", "nosuch"], ["nosuch", "zed", "lidar"]),
+        (["mapping", "--fail", "zed@x"], ["zed@x", "zed@30"]),
+        (["mapping", "--fail", "zed@-1"], ["zed@-1"]),
+        (["mapping", "--seed", "-3"], ["--seed -3"]),
+        (["mapping", "--rate", "nan"], ["--rate nan"]),
+        (["mapping", "--rate", "-1"], ["--rate -1"]),
+        (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--fail", "zed@3"], ["--autopilot"]),
+    ],
+)
+def test_wrong_request_is_one_line_and_exit_code_2(arguments, names, capsys):
+    assert main(arguments) == CANNOT_START
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    for name in names:
+        assert name in said
+
+
+@pytest.mark.parametrize("arguments", [["mapping", "--seed", "x"], [], ["mapping", "--nosuch"]])
+def test_malformed_command_line_is_exit_code_2(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == CANNOT_START
+    assert capsys.readouterr().err
+
+
+def test_a_run_never_overwrites_another(tmp_path, capsys):
+    (tmp_path / "summary.json").write_text("{}")
+    assert main(["mapping", "--out", str(tmp_path)]) == CANNOT_START
+    assert "never overwrites" in capsys.readouterr().err
+    assert (tmp_path / "summary.json").read_text() == "{}"
+
+
+@given(st.sampled_from(["zed", "lidar", "imu"]), st.none() | st.floats(min_value=0, max_value=1e5).map(lambda s: round(s, 3)))
+def test_fault_reads_back_what_it_prints(sensor, seconds):
+    assert parse_fault(str(Fault(sensor, seconds))).sensor == sensor
+    if seconds is not None and seconds < 1e4:
+        assert parse_fault(str(Fault(sensor, seconds))).after_lift_off_s == pytest.approx(seconds, rel=1e-4)
+
+
+@given(st.text())
+def test_any_fault_text_is_read_or_refused(text):
+    try:
+        parse_fault(text)
+    except RequestError as error:
+        assert "--fail" in str(error)  # noqa: PT017
+
+
+def test_specification_survives_its_file(tmp_path):
+    spec = parse(["mapping", "--fail", "zed@30", "--seed", "7", "--rate", "0", "--out", str(tmp_path / "run")])
+    spec.save(tmp_path / "run.json")
+    assert RunSpec.load(tmp_path / "run.json") == spec
+    assert "faults:=zed@30" in spec.launch_arguments()
+    assert "simulate:=false" not in spec.launch_arguments()
+
+
+def test_real_autopilot_takes_the_place_of_the_simulator(tmp_path):
+    spec = parse(["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--out", str(tmp_path / "run")])
+    assert {"simulate:=false", "autopilot:=udpin:127.0.0.1:14550"} <= set(spec.launch_arguments())
+
+
+def test_parallel_runs_get_different_domains_and_give_them_back(tmp_path):
+    first, second = claim_domain(tmp_path), claim_domain(tmp_path)
+    assert first.domain != second.domain
+    first.release()
+    third = claim_domain(tmp_path)
+    assert third.domain == first.domain
+    second.release()
+    third.release()
+
+
+def test_free_port_can_be_bound():
+    assert 1024 <= free_port() < 65536
+
+
+# A child that ignores polite requests and a grandchild in a session of its own: what a crash leaves behind.
+STUBBORN = """
+import os, signal, subprocess, sys, time
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+if len(sys.argv) > 1:
+    subprocess.Popen([sys.executable, __file__], start_new_session=True)
+print("up", flush=True)
+time.sleep(600)
+"""
+
+
+def test_everything_of_a_run_ends_and_nothing_else(tmp_path):
+    script = tmp_path / "stubborn.py"
+    script.write_text(STUBBORN)
+    run_id, other_id = uuid.uuid4().hex, uuid.uuid4().hex
+    started = [
+        subprocess.Popen([sys.executable, str(script), *more], env={**os.environ, RUN_ID_VARIABLE: identity}, stdout=subprocess.PIPE)
+        for identity, more in ((run_id, ["family"]), (other_id, []))
+    ]
+    mine, other = started
+    for process in started:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"up\n"
+    end = time.monotonic() + 10
+    while len(processes_of_run(run_id)) < 2 and time.monotonic() < end:
+        time.sleep(0.01)
+    assert len(processes_of_run(run_id)) == 2
+    assert len(end_run(run_id, patience_s=0.3)) == 2
+    assert processes_of_run(run_id) == []
+    assert mine.wait(5) == -9
+    assert other.poll() is None
+    other.kill()
+    other.wait()
+
+
+def test_deaths_are_written_at_once_and_a_cut_line_is_left_out(tmp_path):
+    record = DeathRecord(tmp_path / "deaths.jsonl")
+    death = Death("zed_depth", describe_exit(-9), 12.5)
+    record.add(death)
+    with (tmp_path / "deaths.jsonl").open("a") as file:
+        file.write('{"name": "ros_br')
+    assert read_deaths(tmp_path / "deaths.jsonl") == [death]
+    assert "SIGKILL" in death.sentence()
+    assert "started again" in death.sentence()
+
+
+def test_live_lines_wait_for_whole_lines(tmp_path):
+    said: list[str] = []
+    live = LiveEvents(tmp_path, said.append)
+    live.show_new()
+    events = tmp_path / "events.jsonl"
+    whole = '{"stamp_s": 3.0, "skillset": "navigation", "skill": "goto", "state": "RUNNING", "resource": ""}\n'
+    events.write_text(whole + whole[:20])
+    live.show_new()
+    assert len(said) == 1
+    with events.open("a") as file:
+        file.write(whole[20:])
+    live.show_new()
+    assert len(said) == 2
+    assert "navigation.goto" in said[0]
+
+
+def test_event_line_tells_transitions_and_hides_requests():
+    base = {"stamp_s": 1.0, "skillset": "perception"}
+    arrow = event_line({**base, "resource": "zed_status", "from_state": "OK", "to_state": "BROKEN"})
+    assert arrow is not None
+    assert "OK -> BROKEN" in arrow
+    assert event_line({**base, "skill": "zed_depthmap", "state": "REQUESTED"}) is None
+
+
+def test_the_package_needs_no_ros_to_be_imported():
+    code = "import alula_flight.fly, sys; assert not {'rospy', 'rclpy', 'open3d', 'matplotlib'} & set(sys.modules), 'imported too early'"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
