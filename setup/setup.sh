@@ -34,7 +34,7 @@ step() {
     printf '%s' "$key" >"$stamp"
   else
     printf '\n'
-    local reason; reason=$(grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |alula: )' "$log" | tail -n 1)
+    local reason; reason=$(tac "$log" | sed '/^===== /q' | grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |alula: )' | head -n 1)
     fail "'$title' failed: ${reason:-see the log}" "the last lines of $log tell more; './alula setup' goes on where it stopped"
   fi
 }
