@@ -1,8 +1,8 @@
 """The front of ``./alula fly``: checks the request, starts the supervisor, shows what happens, and never leaves anything running.
 
-    1. read the command line                  4. when it is over, end whatever is left of the run
-    2. claim folder, ports and DDS domain     5. make the report from what was recorded
-    3. start the supervisor and watch         6. say how it went
+1. read the command line                  4. when it is over, end whatever is left of the run
+2. claim folder, ports and DDS domain     5. make the report from what was recorded
+3. start the supervisor and watch         6. say how it went
 """
 
 from __future__ import annotations

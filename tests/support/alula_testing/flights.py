@@ -1,0 +1,133 @@
+"""Whole flights for tests: started as a user starts them, watched through the files of their folder."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from alula_flight.processes import end_run, processes_of_run
+
+ALULA_ROOT = Path(__file__).resolve().parents[3]
+FLIGHT_LIMIT_S = 900.0  # wall clock; several times what a flight takes, so that a hang fails and a slow machine does not
+
+
+@dataclass
+class Flight:
+    """One ``./alula fly`` and the folder it writes to."""
+
+    process: subprocess.Popen[str]
+    out: Path
+
+    @property
+    def run_id(self) -> str:
+        """The id that all processes of the run carry."""
+        return str(json.loads((self.out / "run.json").read_text(encoding="utf-8"))["run_id"])
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The run's summary."""
+        return dict(json.loads((self.out / "summary.json").read_text(encoding="utf-8")))
+
+    def events(self) -> list[dict[str, Any]]:
+        """All whole lines of events.jsonl so far."""
+        path = self.out / "events.jsonl"
+        if not path.exists():
+            return []
+        found = []
+        for line in path.read_text(encoding="utf-8").splitlines():
+            with contextlib.suppress(json.JSONDecodeError):
+                found.append(json.loads(line))
+        return found
+
+    def processes(self) -> dict[str, int]:
+        """Map each living process of the run to its id, by a word of its command line."""
+        words = {
+            "mission": "uav_missions",
+            "uav_simulator": "uav_simulator_node",
+            "uav_guidance": "uav_guidance_node",
+            "zed_depth": "zed_depth_node",
+            "lidar_obstacles": "lidar_obstacles_node",
+            "lidar_mapping": "lidar_mapping_node",
+            "ros_bridge": "ros_bridge",
+            "navigation": "uav_skills.navigation",
+            "perception": "uav_skills.perception",
+            "mapping": "uav_skills.mapping",
+            "supervisor": "alula_flight.supervisor",
+            "record": "rosbag/record",
+        }
+        found = {}
+        for pid in processes_of_run(self.run_id):
+            with contextlib.suppress(OSError):
+                command = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace")
+                for name, word in words.items():
+                    if word in command and name not in found:
+                        found[name] = pid
+        return found
+
+    def wait_for(self, what: str, condition: Callable[[], bool], *, limit_s: float = FLIGHT_LIMIT_S) -> None:
+        """Wait until the condition holds; fail with the flight's output when it does not, or when the flight ends first."""
+        end = time.monotonic() + limit_s
+        while not condition():
+            if self.process.poll() is not None or time.monotonic() > end:
+                pytest.fail(f"{what}: not seen; the flight's exit code is {self.process.poll()}, its last words:\n{self.words()[-2000:]}")
+            time.sleep(0.1)
+
+    def wait_running(self, skill: str) -> None:
+        """Wait until a skill runs."""
+        self.wait_for(f"{skill} RUNNING", lambda: any(e.get("skill") == skill and e.get("state") == "RUNNING" for e in self.events()))
+
+    def words(self) -> str:
+        """What the flight printed so far."""
+        return (self.out.parent / f"{self.out.name}.txt").read_text(encoding="utf-8")
+
+    def end(self) -> int:
+        """Wait for the flight's end and return its exit code; fail if any process of the run is left."""
+        try:
+            code = self.process.wait(FLIGHT_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            end_run(self.run_id)
+            pytest.fail(f"the flight did not end within {FLIGHT_LIMIT_S:.0f} s:\n{self.words()[-2000:]}")
+        assert self.left_over() == {}
+        return code
+
+    def left_over(self) -> Mapping[int, str]:
+        """Return processes of the run that live although it has ended."""
+        if not (self.out / "run.json").exists():
+            return {}
+        return {pid: Path(f"/proc/{pid}/cmdline").read_text(encoding="utf-8") for pid in processes_of_run(self.run_id)}
+
+    def give_up(self) -> None:
+        """End whatever is left after a failed test."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGKILL)
+            self.process.wait()
+        if (self.out / "run.json").exists():
+            end_run(self.run_id)
+
+
+def start_flight(out: Path, *arguments: str) -> Flight:
+    """Start ``./alula fly mapping ARGUMENTS`` as fast as the machine can, as a user's shell would."""
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_"))}
+    with (out.parent / f"{out.name}.txt").open("w", encoding="utf-8") as words:
+        process = subprocess.Popen(
+            [str(ALULA_ROOT / "alula"), "fly", "mapping", "--out", str(out), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=words,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment,
+            cwd=ALULA_ROOT,
+            start_new_session=True,
+        )
+    return Flight(process, out)

@@ -1,0 +1,121 @@
+"""The mapping mission through the whole stack: nominal, and with sensors that fail. Two flights at a time share the machine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from alula_testing.flights import Flight, start_flight
+
+pytestmark = [pytest.mark.flight, pytest.mark.timeout(1200)]
+Summary = dict[str, Any]
+MIN_CLEARANCE_M = 0.8
+MAX_RMSE_M = 0.15
+MAX_RECOVERY_S = 1.0
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Flight, Flight]]:
+    """Fly the nominal mission and the one that loses its ZED at the same time: parallel runs must not disturb each other."""
+    base = tmp_path_factory.mktemp("flights")
+    nominal, failing = start_flight(base / "nominal", "--rate", "0"), start_flight(base / "failing", "--rate", "0", "--fail", "zed@30")
+    yield nominal, failing
+    nominal.give_up()
+    failing.give_up()
+
+
+@pytest.fixture(scope="module")
+def nominal(pair: tuple[Flight, Flight]) -> Summary:
+    assert pair[0].end() == 0, pair[0].words()
+    return pair[0].summary
+
+
+@pytest.fixture(scope="module")
+def failing(pair: tuple[Flight, Flight]) -> Summary:
+    assert pair[1].end() == 0, pair[1].words()
+    return pair[1].summary
+
+
+def executions(summary: Summary, skill: str) -> list[Summary]:
+    return [e for e in summary["skills"] if e["skill"] == skill]
+
+
+def assert_safe(summary: Summary) -> None:
+    assert summary["landed"] is True
+    assert summary["collisions"] == 0
+    assert summary["min_clearance_m"] >= MIN_CLEARANCE_M
+
+
+def test_nominal_mission_is_accomplished_and_safe(nominal: Summary) -> None:
+    assert nominal["outcome"] == "accomplished"
+    assert_safe(nominal)
+    assert not executions(nominal, "lidar_depthmap")
+    assert all(e["result"] == "ARRIVED" for e in executions(nominal, "goto_straight"))
+    assert nominal["problems"] == []
+
+
+def test_nominal_map_is_true_and_complete(nominal: Summary) -> None:
+    assert nominal["map"]["rmse_m"] <= MAX_RMSE_M
+    assert nominal["map"]["coverage"] >= 0.9
+
+
+def test_every_execution_of_a_flight_ends_exactly_once(pair: tuple[Flight, Flight], nominal: Summary, failing: Summary) -> None:
+    for flight, summary in zip(pair, (nominal, failing), strict=True):
+        terminal = [e["id"] for e in flight.events() if e.get("skill") and e["state"] not in {"REQUESTED", "RUNNING"}]
+        assert len(terminal) == len(set(terminal))
+        assert set(terminal) == {e["id"] for e in summary["skills"]}
+
+
+def test_losing_the_zed_reconfigures_the_mission(failing: Summary) -> None:
+    """The paper's Figure 12, as events in their order."""
+    assert failing["outcome"] == "degraded"
+    assert_safe(failing)
+    (zed,) = executions(failing, "zed_depthmap")
+    assert zed["outcome"] == "RESOURCE_INVARIANT_VIOLATED"
+    assert "zed_ok" in (zed["result"] + zed["message"])
+    interrupted = executions(failing, "goto_straight")[-1]
+    assert interrupted["outcome"] == "INTERRUPTED"
+    order = ["zed_depthmap", "lidar_depthmap", "rotate_head", "lock_head", "goto", "land"]
+    starts = {s: next(e["start_s"] for e in failing["skills"] if e["skill"] == s and e["outcome"] != "NOT_READY") for s in order}
+    assert sorted(order, key=lambda s: starts[s]) == order
+    assert zed["end_s"] <= starts["lidar_depthmap"]
+
+
+def test_recovery_takes_less_than_a_second(failing: Summary) -> None:
+    recovery = failing["recovery"]
+    assert recovery["failure_s"] == pytest.approx(30.0, abs=0.2)
+    assert recovery["failure_s"] < recovery["detected_s"] <= recovery["fallback_running_s"] < recovery["moving_again_s"]
+    assert recovery["fallback_running_s"] - recovery["failure_s"] <= MAX_RECOVERY_S
+
+
+def test_degraded_map_is_true_and_covers_most(failing: Summary) -> None:
+    assert failing["map"]["rmse_m"] <= MAX_RMSE_M
+    assert failing["map"]["coverage"] >= 0.6
+
+
+def test_the_folder_holds_what_it_should(pair: tuple[Flight, Flight], failing: Summary) -> None:
+    assert failing["scenario"] == "mapping"
+    out: Path = pair[1].out
+    names = ("summary.json", "timeline.svg", "timeline.json", "tree.svg", "map.ply", "map.png", "world.ply", "functional.bag", "logs")
+    for name in names:
+        path = out / name
+        assert path.exists(), name
+        assert path.is_dir() or path.stat().st_size > 500, name
+    assert json.loads((out / "timeline.json").read_text(encoding="utf-8"))
+
+
+def test_both_sensors_failing_lands_where_it_is(tmp_path: Path) -> None:
+    flight = start_flight(tmp_path / "blind", "--rate", "0", "--fail", "zed@8", "--fail", "lidar@8", "--seed", "3")
+    try:
+        assert flight.end() == 1, flight.words()
+    finally:
+        flight.give_up()
+    summary = flight.summary
+    assert summary["outcome"] == "given_up"
+    assert_safe(summary)
+    assert executions(summary, "land")[-1]["result"] == "LANDED"
+    assert summary["distance_m"] < 30.0
