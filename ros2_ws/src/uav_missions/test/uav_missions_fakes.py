@@ -1,0 +1,179 @@
+"""A skillset without ROS for the tests of trees: it obeys a script, and complains about what a real one would refuse."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from uav_missions.blackboard import Blackboard
+from uav_missions.mapping import Clients
+from uav_missions.pending import PendingInterrupts
+from uav_missions.route import Route
+
+SQUARE = [(0.0, 0.0, 3.0), (10.0, 0.0, 3.0), (10.0, 8.0, 3.0)]
+
+
+class State(Enum):
+    REQUESTED = 0
+    RUNNING = 1
+    TERMINATED = 2
+    INTERRUPTED = 3
+    RESOURCE_INVARIANT_VIOLATED = 4
+    NOT_READY = 5
+    FAILED = 6
+
+
+# Which resource each skill holds while it runs.
+HOLDS = {
+    "takeoff": ("axes",),
+    "goto": ("axes",),
+    "goto_straight": ("axes", "heading"),
+    "rotate_head": ("heading",),
+    "lock_head": ("heading",),
+    "hover": ("axes",),
+    "land": ("axes",),
+    "zed_depthmap": ("zed",),
+    "lidar_depthmap": ("lidar",),
+    "lidar_mapping": ("mapper",),
+}
+NOMINAL = {
+    "takeoff": "AT_ALTITUDE",
+    "goto": "ARRIVED",
+    "goto_straight": "ARRIVED",
+    "rotate_head": "ALIGNED",
+    "hover": "HOVERED",
+    "land": "LANDED",
+}
+
+
+@dataclass
+class FakeHandle:
+    skill: str
+    inputs: dict
+    world: World
+    started_s: float
+    state: State = State.REQUESTED
+    result: str = ""
+    message: str = ""
+    progress: float = 0.0
+    interrupted_s: float | None = None
+
+    @property
+    def done(self) -> bool:
+        return self.state not in {State.REQUESTED, State.RUNNING}
+
+    @property
+    def outcome(self) -> str:
+        return self.state.name if self.done else ""
+
+    def interrupt(self) -> None:
+        self.interrupted_s = self.world.now_s
+        self.world.log.append(("interrupt", self.skill))
+
+    def end(self, state: State, result: str = "", message: str = "") -> None:
+        self.state, self.result, self.message = state, result, message
+        self.world.log.append(("end", self.skill, result or state.name))
+
+
+@dataclass
+class World:
+    """Virtual time, three fake skillsets, a vehicle that is on the ground or in the air."""
+
+    now_s: float = 0.0
+    duration_s: float = 1.0
+    interrupt_takes_s: float = 0.2
+    log: list[tuple] = field(default_factory=list)
+    handles: list[FakeHandle] = field(default_factory=list)
+    script: Callable[[FakeHandle], str | None] = lambda _handle: None
+    broken: set[str] = field(default_factory=set)
+    conflicts: list[str] = field(default_factory=list)
+    resources: dict[str, str] = field(default_factory=lambda: {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND"})
+
+    def clock_ns(self) -> int:
+        return round(self.now_s * 1e9)
+
+    def start(self, skill: str, inputs: dict) -> FakeHandle:
+        handle = FakeHandle(skill, inputs, self, self.now_s)
+        self.log.append(("start", skill))
+        for other in self.running():
+            shared = set(HOLDS[skill]) & set(HOLDS[other.skill])
+            if shared:
+                self.conflicts.append(f"{skill} needs {shared}, held by {other.skill}")
+        self.handles.append(handle)
+        return handle
+
+    def running(self) -> list[FakeHandle]:
+        return [handle for handle in self.handles if not handle.done]
+
+    def pass_time(self, dt_s: float = 0.1) -> None:
+        self.now_s += dt_s
+        for handle in self.running():
+            self._advance(handle)
+
+    def break_sensor(self, sensor: str) -> None:
+        self.broken.add(sensor)
+        for handle in self.running():
+            if handle.skill == f"{sensor}_depthmap" and handle.state is State.RUNNING:
+                handle.end(State.RESOURCE_INVARIANT_VIOLATED, f"{sensor}_ok", f"{sensor}_ok: {sensor}_status is BROKEN")
+
+    def take_authority(self) -> None:
+        self.resources["SDK_authority"] = "UNAVAILABLE"
+        for handle in self.running():
+            if "axes" in HOLDS[handle.skill] or "heading" in HOLDS[handle.skill]:
+                handle.end(State.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")
+
+    def _advance(self, handle: FakeHandle) -> None:
+        if handle.interrupted_s is not None:
+            if self.now_s - handle.interrupted_s >= self.interrupt_takes_s:
+                handle.end(State.INTERRUPTED)
+            return
+        if handle.state is State.REQUESTED:
+            self._begin(handle)
+            return
+        handle.progress = 1.0 if handle.skill.endswith("depthmap") else 0.5
+        if self.now_s - handle.started_s < self.duration_s:
+            return
+        result = self.script(handle) or NOMINAL.get(handle.skill)
+        if result is None:
+            return
+        if handle.skill in {"takeoff", "land"} and result in {"AT_ALTITUDE", "LANDED"}:
+            self.resources["flight_status"] = "IN_AIR" if handle.skill == "takeoff" else "ON_GROUND"
+        handle.end(State.FAILED if result == "FAILED" else State.TERMINATED, "" if result == "FAILED" else result)
+
+    def _begin(self, handle: FakeHandle) -> None:
+        air = self.resources["flight_status"] == "IN_AIR"
+        flying = "axes" in HOLDS[handle.skill] or "heading" in HOLDS[handle.skill]
+        if handle.skill.partition("_")[0] in self.broken and handle.skill.endswith("depthmap"):
+            handle.end(State.NOT_READY, "sensor_ok")
+        elif flying and self.resources["SDK_authority"] != "AVAILABLE":
+            handle.end(State.NOT_READY, "sdk_authority")
+        elif flying and air is (handle.skill == "takeoff"):
+            handle.end(State.NOT_READY, "on_ground" if handle.skill == "takeoff" else "in_air")
+        else:
+            handle.state = State.RUNNING
+            self.log.append(("running", handle.skill))
+
+    def starts(self) -> list[str]:
+        return [entry[1] for entry in self.log if entry[0] == "start"]
+
+
+@dataclass
+class FakeClient:
+    skillset: str
+    world: World
+
+    @property
+    def resources(self) -> dict[str, str]:
+        return self.world.resources
+
+    def start(self, skill: str, **inputs: object) -> FakeHandle:
+        return self.world.start(skill, inputs)
+
+
+def clients(world: World) -> Clients:
+    return Clients(FakeClient("navigation", world), FakeClient("perception", world), FakeClient("mapping", world))
+
+
+def make_blackboard(world: World, waypoints=SQUARE) -> Blackboard:
+    return Blackboard(world.clock_ns, Route(waypoints), PendingInterrupts(world.clock_ns))

@@ -1,0 +1,1 @@
+"""Missions of the drone as Behaviour Trees whose leaves are skills."""
