@@ -1,0 +1,28 @@
+"""What the supervisor knows of a run and no file tells: the input of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypedDict
+
+
+class Death(TypedDict):
+    """A process that ended although nobody had told it to. ``when_s``: absolute mission clock, None if unknown."""
+
+    name: str
+    when_s: float | None
+    how: str
+
+
+@dataclass(frozen=True)
+class RunFacts:
+    """One run. ``faults`` as on the command line (``zed@30``); ``mission_exit`` None: the mission did not end by itself."""
+
+    scenario: str
+    seed: int
+    out_dir: Path
+    faults: Sequence[str]
+    died: Sequence[Death]
+    mission_exit: int | None

@@ -1,0 +1,101 @@
+"""Read files that a crash may have cut off, write files that no crash can cut off."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+class ReportError(Exception):
+    """Something in the run's folder can't be used; the message names it."""
+
+
+class Problems:
+    """What could not be read, known or believed, a sentence each; a report goes on without it and says so."""
+
+    def __init__(self) -> None:
+        self._sentences: list[str] = []
+
+    def note(self, sentence: str) -> None:
+        """Add a sentence, once."""
+        if sentence not in self._sentences:
+            self._sentences.append(sentence)
+
+    @contextmanager
+    def survive(self, what: str) -> Iterator[None]:
+        """Turn any error of the block into a problem; what the block was to bind must have a value before."""
+        try:
+            yield
+        except ReportError as error:
+            self.note(str(error))
+        except Exception as error:  # noqa: BLE001  (a report is read most closely after a crash: it must not crash itself)
+            self.note(f"{what}: {type(error).__name__}: {error}".replace("\n", " "))
+
+    @property
+    def sentences(self) -> list[str]:
+        """All problems in the order of their discovery."""
+        return list(self._sentences)
+
+
+def finite(value: object) -> float | None:
+    """Return a finite number as a float, None for anything else (also for booleans, infinity and NaN)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if math.isfinite(value) else None
+
+
+def mapping(value: object) -> dict[str, object]:
+    """Return a JSON object as it is, an empty one for anything else."""
+    return value if isinstance(value, dict) else {}
+
+
+def sequence(value: object) -> list[object]:
+    """Return a JSON array as it is, an empty one for anything else."""
+    return value if isinstance(value, list) else []
+
+
+def read_json(path: Path) -> object:
+    """Return what the file holds; raise ReportError when it is missing or no JSON."""
+    try:
+        value: object = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ReportError(f"{path.name} is missing") from None
+    except (OSError, ValueError) as error:
+        raise ReportError(f"{path.name} can't be read: {error}") from error
+    return value
+
+
+def write_aside(path: Path, write: Callable[[Path], None]) -> None:
+    """Let ``write`` make the file under another name (same suffix), then rename it: the final name never holds half a file."""
+    aside = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        write(aside)
+        aside.replace(path)
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def strict(value: object) -> object:
+    """Return a copy of a JSON value with null where it holds NaN or infinities, which JSON does not have."""
+    match value:
+        case dict():
+            return {str(key): strict(entry) for key, entry in value.items()}
+        case list() | tuple():
+            return [strict(entry) for entry in value]
+        case float() if not math.isfinite(value):
+            return None
+        case _:
+            return value
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write strict JSON aside and rename."""
+    text = json.dumps(strict(value), indent=2, allow_nan=False) + "\n"
+
+    def write(aside: Path) -> None:
+        aside.write_text(text, encoding="utf-8")
+
+    write_aside(path, write)

@@ -1,0 +1,90 @@
+"""The report's main flow: from what a run left in its folder to numbers and pictures."""
+
+from __future__ import annotations
+
+from alula_flight.report.events import History, fold, read_events
+from alula_flight.report.facts import RunFacts
+from alula_flight.report.files import Problems, write_aside, write_json
+from alula_flight.report.map_picture import MapScene, draw_map
+from alula_flight.report.map_quality import Floats, MapQuality, judge_map, load_map, load_route
+from alula_flight.report.phases import find_phases
+from alula_flight.report.recording import Recording, read_recording
+from alula_flight.report.recovery import find_recovery, injected
+from alula_flight.report.summary import Summary, summarise
+from alula_flight.report.timeline import make_timeline
+from alula_flight.report.timeline_picture import draw_timeline
+from alula_flight.report.truth import Encounter, disagreements, encounter, rests
+from alula_flight.report.world import World
+
+
+def make_report(facts: RunFacts) -> Summary:
+    """Make ``timeline.json``, ``timeline.svg``, ``map.png`` and ``summary.json`` in the run's folder and return the summary.
+
+    Whatever is missing, cut off or makes no sense is named in the summary's ``problems``; numbers that depend on it are None.
+
+    Raises:
+        OSError: the summary itself can't be written.
+    """
+    folder, problems = facts.out_dir, Problems()
+
+    # 1. What happened in the skillsets, and what the functional layer recorded.
+    history, recording = History(), Recording()
+    with problems.survive("events.jsonl"):
+        history = fold(read_events(folder / "events.jsonl", problems), problems)
+    with problems.survive("functional.bag"):
+        recording = read_recording(folder, problems)
+    phases = find_phases(history, recording)
+    recovery = find_recovery(facts.scenario, history, recording, phases)
+
+    # 2. The flight against the true world.
+    world: World | None = None
+    with problems.survive("world.ply"):
+        world = World.load(folder / "world.ply")
+    recomputed, resting = Encounter(), None
+    with problems.survive("the clearance to the true surfaces"):
+        recomputed = encounter(recording.truth, world, phases)
+        resting = rests(recording.truth, world, phases)
+        for sentence in disagreements(recording, recomputed):
+            problems.note(sentence)
+
+    # 3. The map against the true world.
+    points: Floats | None = None
+    route: Floats | None = None
+    with problems.survive("map.ply"):
+        points = load_map(folder / "map.ply")
+    with problems.survive("route.json"):
+        route = load_route(folder / "route.json")
+    quality = MapQuality()
+    with problems.survive("the map's quality"):
+        quality = judge_map(points, route, world, problems)
+
+    # 4. The pictures.
+    failed = next((fault.sensor for fault in injected(recording)), "")
+    with problems.survive("timeline"):
+        timeline = make_timeline(history, phases, recovery, failed)
+        write_json(folder / "timeline.json", timeline)
+        write_aside(folder / "timeline.svg", lambda aside: draw_timeline(timeline, aside, title=_title(facts)))
+    with problems.survive("map.png"):
+        failure_s = recovery.failure_s or recovery.detected_s if recovery is not None else None
+        scene = MapScene(points, quality.missed_enu_m, world, route, recording.path, failure_s, failed)
+        write_aside(folder / "map.png", lambda aside: draw_map(scene, aside, title=_title(facts)))
+
+    # 5. The numbers, last, because they tell what went wrong with the rest.
+    summary = summarise(
+        facts,
+        history=history,
+        recording=recording,
+        phases=phases,
+        recovery=recovery,
+        recomputed=recomputed,
+        resting=resting,
+        quality=quality,
+        problems=problems,
+    )
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+def _title(facts: RunFacts) -> str:
+    failing = f", failing {', '.join(facts.faults)}" if facts.faults else ""
+    return f"{facts.scenario}, seed {facts.seed}{failing}"

@@ -1,0 +1,76 @@
+"""How a flight got over a broken sensor: when it broke, when that was noticed, when the fallback ran, when it flew on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alula_flight.report.events import Execution, History
+from alula_flight.report.phases import Phases
+from alula_flight.report.recording import Fault, Recording, Track
+
+VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
+BROKEN = "BROKEN"
+MENDED = "ok"
+# Per scenario, the skill whose running means that the vehicle can see ahead again (paper, Figure 6).
+FALLBACK_SKILLS = {"mapping": "lidar_depthmap"}
+MOVING_M_S = 0.2
+# The managers' clock ticks at 50 Hz, so an event's stamp may be a tick older than what caused it.
+STAMP_TOLERANCE_S = 0.05
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """Absolute seconds of mission clock; None: not known, or it did not happen."""
+
+    failure_s: float | None
+    detected_s: float | None
+    fallback_running_s: float | None
+    moving_again_s: float | None
+
+
+def injected(recording: Recording) -> tuple[Fault, ...]:
+    """Return what the simulator broke, in the order of time."""
+    faults = recording.simulator.faults if recording.simulator is not None else ()
+    return tuple(sorted((fault for fault in faults if fault.mode != MENDED), key=lambda fault: fault.t_s))
+
+
+def find_recovery(scenario: str, history: History, recording: Recording, phases: Phases) -> Recovery | None:
+    """Return the recovery from the first failure, or None without one."""
+    faults = injected(recording)
+    broken = [change.stamp_s for change in history.transitions if change.target == BROKEN]
+    if not faults and not broken:
+        return None
+    failure_s = faults[0].t_s if faults else None
+    since_s = -np.inf if failure_s is None else failure_s - STAMP_TOLERANCE_S
+    violated = [execution.end_s for execution in history.executions if execution.outcome == VIOLATED and execution.end_s is not None]
+    detected_s = _first([*broken, *violated], since_s)
+    fallback_s = _fallback(FALLBACK_SKILLS.get(scenario), history.executions, since_s if detected_s is None else detected_s)
+    moving_s = None if fallback_s is None or recording.path is None else moving_again(recording.path, fallback_s, phases.landing_s)
+    return Recovery(failure_s, detected_s, fallback_s, moving_s)
+
+
+def _first(stamps: list[float], since_s: float) -> float | None:
+    return min((stamp for stamp in stamps if stamp >= since_s), default=None)
+
+
+def _fallback(skill: str | None, executions: tuple[Execution, ...], since_s: float) -> float | None:
+    """Return when the fallback skill came to run; one that was running before the failure needs no mention."""
+    return _first([e.running_s for e in executions if e.skill == skill and e.running_s is not None], since_s)
+
+
+def moving_again(track: Track, since_s: float, landing_s: float | None) -> float | None:
+    """Return when the vehicle set off (horizontally) after it had stopped; ``since_s`` itself if it never stopped.
+
+    A vehicle that still brakes when the fallback begins has not moved on; it has when it got slow and fast again.
+    """
+    part = (track.t_s >= since_s) & (track.t_s < (np.inf if landing_s is None else landing_s))
+    t_s, fast = track.t_s[part], track.horizontal_speed_m_s()[part] > MOVING_M_S
+    if not len(t_s):
+        return None
+    if fast.all():
+        return since_s
+    stopped = int(np.argmin(fast))
+    moving = np.flatnonzero(fast[stopped:])
+    return float(t_s[stopped + moving[0]]) if len(moving) else None

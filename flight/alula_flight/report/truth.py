@@ -1,0 +1,130 @@
+"""How near the vehicle truly came to the world, computed from its true path and not taken from the simulator's word.
+
+During take-off and landing the ground below is no obstacle, it is the destination. So in these phases only moments above
+1.5 m count, and only if the nearest surface is not the one below; in between every moment and every surface count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from alula_flight.report.phases import Phases
+from alula_flight.report.recording import Recording, SimulatorAccount, Track
+from alula_flight.report.world import World
+
+VEHICLE_RADIUS_M = 0.85  # with propellers
+LOW_M = 1.5  # above the place of take-off
+BELOW_DEG = 45.0  # a surface within this cone around straight down is the ground that one starts from or lands on
+REST_S = 1.0
+REST_MOVE_M = 0.1
+REST_HEIGHT_M = 0.2
+CLEARANCE_AGREES_M = 0.2
+DISTANCE_AGREES = 0.05
+
+
+@dataclass(frozen=True)
+class Encounter:
+    """How near the vehicle came. ``min_clearance_m``: from its radius to the nearest surface; None where that can't be known."""
+
+    collisions: int | None = None
+    min_clearance_m: float | None = None
+    distance_m: float | None = None
+
+
+def encounter(track: Track | None, world: World | None, phases: Phases) -> Encounter:
+    """Compute it from the true track (None: unknown)."""
+    if track is None:
+        return Encounter()
+    flown = track.between(phases.zero_s, np.inf if phases.touch_down_s is None else phases.touch_down_s)
+    distance_m = flown.length_m() if phases.lifted_off else 0.0
+    if world is None or not phases.lifted_off:
+        return Encounter(distance_m=distance_m)
+    clearance, counts = clearances(track, world, phases)
+    if not counts.any():
+        return Encounter(collisions=0, distance_m=distance_m)
+    return Encounter(entries_below_zero(clearance, counts), float(clearance[counts].min()), distance_m)
+
+
+def clearances(track: Track, world: World, phases: Phases) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the clearance in metres at each sample of the track, (N,), and which of the samples count, (N,)."""
+    nearest = world.nearest(track.position_enu_m) - track.position_enu_m
+    distance = np.linalg.norm(nearest, axis=1)
+    below = -nearest[:, 2] > distance * np.cos(np.radians(BELOW_DEG))
+    high = track.position_enu_m[:, 2] - _start_height(track, phases) >= LOW_M
+    cruise = (track.t_s >= _cruise_begins(track, high, phases)) & (track.t_s < _landing_begins(track, high, phases))
+    airborne = (track.t_s >= phases.zero_s) & (track.t_s < (np.inf if phases.touch_down_s is None else phases.touch_down_s))
+    return distance - VEHICLE_RADIUS_M, airborne & (cruise | (high & ~below))
+
+
+def entries_below_zero(clearance: NDArray[np.float64], counts: NDArray[np.bool_]) -> int:
+    """Count how often a clearance that counts falls below zero; staying there is one collision."""
+    touching = np.concatenate([[False], (clearance < 0) & counts])
+    return int((touching[1:] & ~touching[:-1]).sum())
+
+
+def _start_height(track: Track, phases: Phases) -> float:
+    """Return z of the vehicle's centre where it stood before lift-off."""
+    before = track.t_s <= phases.zero_s
+    return float(track.position_enu_m[before][-1, 2] if before.any() else track.position_enu_m[0, 2])
+
+
+def _cruise_begins(track: Track, high: NDArray[np.bool_], phases: Phases) -> float:
+    """Return the end of the take-off; if nobody told, the first moment above 1.5 m (a take-off that nobody ended has no cruise)."""
+    if phases.cruise_s is not None:
+        return phases.cruise_s
+    return float(track.t_s[high][0]) if high.any() else np.inf
+
+
+def _landing_begins(track: Track, high: NDArray[np.bool_], phases: Phases) -> float:
+    """Return the beginning of the landing; if nobody told of one, the last moment above 1.5 m, if the flight ended at all."""
+    if phases.landing_s is not None:
+        return phases.landing_s
+    if phases.touch_down_s is None or not high.any():
+        return np.inf
+    return float(track.t_s[high][-1])
+
+
+def rests(track: Track | None, world: World | None, phases: Phases) -> bool | None:
+    """Tell whether the vehicle stands still on a surface at the end as it did before lift-off; None if that can't be known."""
+    if track is None or world is None or track.t_s[0] > phases.zero_s:
+        return None
+    end = track.between(track.t_s[-1] - REST_S, np.inf).position_enu_m
+    heights = [_height_above_surface(world, place) for place in (end[-1], track.position_enu_m[0])]
+    still = np.ptp(end, axis=0).max() < REST_MOVE_M
+    return bool(still and heights[0] - heights[1] < REST_HEIGHT_M)
+
+
+def _height_above_surface(world: World, place: NDArray[np.float64]) -> float:
+    return float(world.first_hit_m(place, np.array([[0.0, 0.0, -1.0]]))[0])
+
+
+def worse(simulator: SimulatorAccount | None, recomputed: Encounter) -> Encounter:
+    """Return of each number the one that is worse for the vehicle."""
+    if simulator is None:
+        return recomputed
+    collisions = [n for n in (simulator.collisions, recomputed.collisions) if n is not None]
+    clearance = [m for m in (simulator.min_clearance_m, recomputed.min_clearance_m) if m is not None]
+    distance = [m for m in (simulator.distance_m, recomputed.distance_m) if m is not None]
+    return Encounter(max(collisions, default=None), min(clearance, default=None), max(distance, default=None))
+
+
+def disagreements(recording: Recording, recomputed: Encounter) -> list[str]:
+    """Say where the simulator's own numbers and the recomputed ones differ by more than sampling explains."""
+    said = recording.simulator
+    if said is None:
+        return []
+    sentences = []
+    if None not in (said.collisions, recomputed.collisions) and said.collisions != recomputed.collisions:
+        sentences.append(f"the simulator counted {said.collisions} collisions, the true path has {recomputed.collisions}")
+    if said.min_clearance_m is not None and recomputed.min_clearance_m is not None:
+        pair = (said.min_clearance_m, recomputed.min_clearance_m)
+        if abs(pair[0] - pair[1]) > CLEARANCE_AGREES_M:
+            sentences.append(f"the simulator saw a clearance of {pair[0]:.2f} m, the true path has {pair[1]:.2f} m")
+    if said.distance_m is not None and recomputed.distance_m is not None:
+        pair = (said.distance_m, recomputed.distance_m)
+        if abs(pair[0] - pair[1]) > 0.5 + DISTANCE_AGREES * max(pair):
+            sentences.append(f"the simulator counted {pair[0]:.1f} m flown, the true path is {pair[1]:.1f} m long")
+    return sentences
