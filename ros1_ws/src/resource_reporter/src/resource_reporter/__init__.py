@@ -1,0 +1,6 @@
+"""Extern transitions: the functional layer says which state a resource has, this package sees to it that the skillset knows."""
+
+from resource_reporter.ledger import Call, Ledger
+from resource_reporter.reporter import ResourceReporter
+
+__all__ = ["Call", "Ledger", "ResourceReporter"]

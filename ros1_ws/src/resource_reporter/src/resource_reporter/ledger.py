@@ -1,0 +1,96 @@
+"""Desired against actual states of one skillset's resources, and which transition to ask for next. No ROS, no threads, no clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+FIRST_RETRY_S = 0.025
+LONGEST_RETRY_S = 0.2
+
+
+@dataclass(frozen=True)
+class Call:
+    """One call of the skillset's transition service."""
+
+    resource: str
+    to: str
+
+
+@dataclass
+class _Entry:
+    """What is wanted of one resource, and when it may be asked for."""
+
+    state: str
+    not_before_s: float = 0.0
+    retry_s: float = FIRST_RETRY_S
+
+    def put_off(self, now_s: float) -> None:
+        """Ask again later: 25 ms after the first attempt, then twice as long each time, at most 0.2 s."""
+        self.not_before_s = now_s + self.retry_s
+        self.retry_s = min(2.0 * self.retry_s, LONGEST_RETRY_S)
+
+
+@dataclass
+class Ledger:
+    """Keep what the hardware says beside what the skillset says. Times are seconds of any clock that only grows.
+
+    Level-triggered: only the last wanted state of a resource counts, and it is asked for again whenever the skillset disagrees,
+    for instance because it was started anew. Before the skillset has shown its states nothing is asked.
+    """
+
+    _wanted: dict[str, _Entry] = field(default_factory=dict)
+    _actual: dict[str, str] = field(default_factory=dict)
+    _told: set[tuple[Call, str]] = field(default_factory=set)
+
+    def want(self, resource: str, state: str) -> bool:
+        """Note the state that the hardware has; return whether this is news."""
+        entry = self._wanted.get(resource)
+        if entry is not None and entry.state == state:
+            return False
+        self._wanted[resource] = _Entry(state)
+        return True
+
+    def observe(self, states: dict[str, str]) -> None:
+        """Note the states that the skillset shows (all of its resources). One that changed may be asked for at once."""
+        for resource, entry in self._wanted.items():
+            before, after = self._actual.get(resource), states.get(resource)
+            if before not in {after, entry.state}:
+                entry.not_before_s = 0.0
+        self._actual = dict(states)
+
+    def next_call(self, now_s: float) -> Call | None:
+        """Return the transition to ask for now, the longest waiting first; None if all agree or must wait."""
+        due = [(entry.not_before_s, name) for name, entry in self._wanted.items() if self._differs(name) and entry.not_before_s <= now_s]
+        if not due:
+            return None
+        name = min(due, key=lambda item: item[0])[1]
+        return Call(name, self._wanted[name].state)
+
+    def wait_s(self, now_s: float) -> float | None:
+        """Return for how long nothing is due; None if not before the hardware or the skillset says something new."""
+        times = [entry.not_before_s for name, entry in self._wanted.items() if self._differs(name)]
+        return max(0.0, min(times) - now_s) if times else None
+
+    def accepted(self, call: Call, state: str, now_s: float) -> None:
+        """Note that the call was accepted and which state it left; what is shown meanwhile may be older than the answer."""
+        self._actual[call.resource] = state
+        self._put_off(call, now_s)
+
+    def refused(self, call: Call, reason: str, now_s: float) -> bool:
+        """Note a refusal or a failed call, to be tried again; return whether this (call, reason) is told for the first time."""
+        self._put_off(call, now_s)
+        first = (call, reason) not in self._told
+        self._told.add((call, reason))
+        return first
+
+    def unknown(self) -> list[str]:
+        """Return the wanted resources that the skillset, which has shown its states, does not have."""
+        return [name for name in self._wanted if self._actual and name not in self._actual]
+
+    def _put_off(self, call: Call, now_s: float) -> None:
+        entry = self._wanted.get(call.resource)
+        if entry is not None and entry.state == call.to:
+            entry.put_off(now_s)
+
+    def _differs(self, resource: str) -> bool:
+        return resource in self._actual and self._actual[resource] != self._wanted[resource].state

@@ -1,0 +1,92 @@
+"""The rospy part: a worker thread between the hardware's node and the skillset's manager."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import rospy
+from skillset_interfaces.msg import ResourceStates
+
+from resource_reporter.caller import CallFailedError, TransitionCaller
+from resource_reporter.ledger import Call, Ledger
+
+# A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
+LONGEST_WAIT_S = 1.0
+
+
+class ResourceReporter:
+    """Tell a skillset the states of resources that only the hardware knows (its extern transitions).
+
+    To be made after ``rospy.init_node``. ``report`` may be called from any thread, as often as one likes, and never blocks: the
+    service is called by a thread of its own, at once, and until ``/<skillset>/resource_states`` agrees with what was reported last.
+    """
+
+    def __init__(self, skillset: str) -> None:
+        self._skillset = skillset
+        self._ledger = Ledger()
+        self._changed = threading.Condition()
+        self._ended = False
+        self._told_unknown: set[str] = set()
+        self._caller = TransitionCaller(skillset)
+        self._worker = threading.Thread(target=self._work, name=f"report_{skillset}", daemon=True)
+        self._worker.start()
+        self._subscriber = rospy.Subscriber(f"/{skillset}/resource_states", ResourceStates, self._on_states, tcp_nodelay=True)
+
+    def report(self, resource: str, state: str) -> None:
+        """Say that the hardware's resource has this state."""
+        with self._changed:
+            if self._ledger.want(resource, state):
+                self._changed.notify()
+
+    def close(self) -> None:
+        """End the worker and drop the connections."""
+        self._subscriber.unregister()
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+        self._caller.close()
+        self._worker.join(LONGEST_WAIT_S)
+
+    def _on_states(self, message: ResourceStates) -> None:
+        with self._changed:
+            self._ledger.observe({resource.name: resource.state for resource in message.resources})
+            for name in set(self._ledger.unknown()) - self._told_unknown:
+                self._told_unknown.add(name)
+                rospy.logerr("the skillset %s has no resource %s", self._skillset, name)
+            self._changed.notify()
+
+    def _work(self) -> None:
+        while (call := self._next_call()) is not None:
+            self._make(call)
+
+    def _next_call(self) -> Call | None:
+        """Wait for the next transition to ask for; None at the end."""
+        with self._changed:
+            while not self._ended and not rospy.is_shutdown():
+                now_s = time.monotonic()
+                call = self._ledger.next_call(now_s)
+                if call is not None:
+                    return call
+                wait_s = self._ledger.wait_s(now_s)
+                self._changed.wait(LONGEST_WAIT_S if wait_s is None else min(wait_s, LONGEST_WAIT_S))
+            return None
+
+    def _make(self, call: Call) -> None:
+        """Make one call, outside the lock, and note its answer."""
+        try:
+            answer = self._caller.call(call)
+        except CallFailedError as error:
+            self._note_refusal(call, str(error))
+            return
+        if answer.accepted:
+            with self._changed:
+                self._ledger.accepted(call, answer.state, time.monotonic())
+            return
+        self._note_refusal(call, answer.reason)
+
+    def _note_refusal(self, call: Call, reason: str) -> None:
+        with self._changed:
+            first = self._ledger.refused(call, reason, time.monotonic())
+        if first and not rospy.is_shutdown():
+            rospy.logwarn("%s.%s -> %s: %s; will be tried again", self._skillset, call.resource, call.to, reason)
