@@ -1,0 +1,55 @@
+"""Who commands the vehicle: the companion, as long as the mode is its own, and never against the pilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from uav_guidance.vehicle import Mode, Vehicle
+
+
+class Change(Enum):
+    """What happened to the authority at an update."""
+
+    NONE = auto()
+    GAINED = auto()
+    LOST = auto()
+
+
+@dataclass
+class Authority:
+    """The companion has authority in GUIDED, and in LAND if it asked for that itself; any other mode is the pilot's or a failsafe's."""
+
+    held: bool = False
+    _land_asked: bool = False
+    _start_settled: bool = False
+
+    def ask_land(self) -> None:
+        """Note that the companion itself asks for LAND, before it does."""
+        self._land_asked = True
+
+    def land_refused(self) -> None:
+        """Note that the autopilot did not agree to land."""
+        self._land_asked = False
+
+    def update(self, vehicle: Vehicle, *, link: bool) -> Change:
+        """Judge by the mode of the last heartbeat."""
+        if vehicle.mode not in {Mode.GUIDED, Mode.LAND}:
+            self._land_asked = False
+        before = self.held
+        self.held = link and (vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked))
+        if self.held == before:
+            return Change.NONE
+        return Change.GAINED if self.held else Change.LOST
+
+    def wants_start(self, vehicle: Vehicle, *, link: bool) -> bool:
+        """Return whether to take GUIDED now, once in a node's life: ready, on the ground, disarmed, and nobody flew before."""
+        if self._start_settled or not link:
+            return False
+        if vehicle.armed or self.held or vehicle.off_ground:
+            self._start_settled = True
+        return not self._start_settled and vehicle.ready and vehicle.on_ground
+
+    def settle_start(self) -> None:
+        """Note that GUIDED was asked for, and answered."""
+        self._start_settled = True

@@ -1,0 +1,123 @@
+"""MAVLink commands one after the other: sent, repeated when no answer comes, refused in the autopilot's own words."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from uav_guidance.vehicle import Mode
+
+DO_SET_MODE = 176
+ARM_DISARM = 400
+NAV_TAKEOFF = 22
+
+ACCEPTED = 0
+IN_PROGRESS = 5
+RESULT_NAMES = {1: "temporarily rejected", 2: "denied", 3: "unsupported", 4: "failed", 6: "cancelled"}
+
+ANSWER_S = 1.0  # the autopilot answers within some 10 ms; the rest is the link's
+ATTEMPTS = 4
+# The autopilot queues its texts: they may leave up to a few 100 ms after the answer that they explain.
+TEXT_GRACE_S = 0.4
+WORST_SEVERITY_TOLD = 4  # WARNING; notices and infos are no reasons
+
+
+@dataclass(frozen=True)
+class Command:
+    """A COMMAND_LONG."""
+
+    name: str
+    number: int
+    parameters: tuple[float, float, float, float, float, float, float] = (0.0,) * 7
+    confirmation: int = 0
+
+
+def set_mode(mode: Mode) -> Command:
+    """Ask for a flight mode."""
+    return Command(f"mode {mode.name}", DO_SET_MODE, (1.0, float(mode), 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def arm() -> Command:
+    """Ask to arm."""
+    return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def disarm() -> Command:
+    """Ask to disarm; refused in the air."""
+    return Command("disarm", ARM_DISARM)
+
+
+def take_off(height_above_home_m: float) -> Command:
+    """Ask to climb to a height above home."""
+    return Command("take-off", NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_above_home_m))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a procedure ended."""
+
+    accepted: bool
+    reason: str = ""
+    answered: bool = True
+    """Whether it was the autopilot that accepted or refused."""
+
+
+class Procedure:
+    """Commands in order, the next one when the one before was accepted. Times are seconds of the mission clock."""
+
+    def __init__(self, commands: Sequence[Command]) -> None:
+        self.outcome: Outcome | None = None if commands else Outcome(accepted=True)
+        self._commands = deque(commands)
+        self._attempts = 0
+        self._answer_until_s = 0.0
+        self._refusal: tuple[float, str] | None = None
+        self._texts: list[str] = []
+
+    def due(self, now_s: float) -> Command | None:
+        """Return the command to send now, if any; to be asked at every step."""
+        if self.outcome is not None or self._refused(now_s) or (self._attempts and now_s < self._answer_until_s):
+            return None
+        command = self._commands[0]
+        if self._attempts == ATTEMPTS:
+            self.abort(f"{command.name}: the autopilot does not answer")
+            return None
+        self._attempts += 1
+        self._answer_until_s = now_s + ANSWER_S
+        return Command(command.name, command.number, command.parameters, confirmation=self._attempts - 1)
+
+    def on_answer(self, number: int, result: int, now_s: float) -> None:
+        """Take a COMMAND_ACK; one of a command that is not under way is not meant."""
+        if self.outcome is not None or self._refusal is not None or not self._attempts or number != self._commands[0].number:
+            return
+        if result == IN_PROGRESS:
+            self._answer_until_s = now_s + ANSWER_S
+        elif result == ACCEPTED:
+            self._commands.popleft()
+            self._attempts = 0
+            self._texts.clear()
+            if not self._commands:
+                self.outcome = Outcome(accepted=True)
+        else:
+            self._refusal = (now_s, RESULT_NAMES.get(result, f"result {result}"))
+
+    def on_text(self, severity: int, text: str) -> None:
+        """Take a STATUSTEXT: what comes while a command is under way may be the reason for its refusal."""
+        if self.outcome is None and self._attempts and severity <= WORST_SEVERITY_TOLD and text not in self._texts:
+            self._texts.append(text)
+
+    def abort(self, reason: str) -> None:
+        """End it as not accepted, if it has not ended."""
+        if self.outcome is None:
+            self.outcome = Outcome(accepted=False, reason=reason, answered=False)
+
+    def _refused(self, now_s: float) -> bool:
+        """Return whether the command was refused; the outcome follows when the texts had time to arrive."""
+        if self._refusal is None or self.outcome is not None:
+            return False
+        refused_s, result = self._refusal
+        if now_s - refused_s >= TEXT_GRACE_S:
+            words = "; ".join(self._texts)
+            reason = f"{self._commands[0].name} {result}" + (f": {words}" if words else "")
+            self.outcome = Outcome(accepted=False, reason=reason)
+        return True

@@ -1,0 +1,376 @@
+"""The guidance's state machine: requests, what the vehicle says and the time go in; commands and setpoints come out.
+
+Everything is in `map` (ENU, metres), times are seconds of the mission clock. Nothing here blocks, nothing here knows of ROS or sockets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from uav_guidance.authority import Authority, Change
+from uav_guidance.carrot import HeadingCarrot
+from uav_guidance.commands import Command, Procedure, arm, disarm, set_mode, take_off
+from uav_guidance.frames import wrap
+from uav_guidance.obstacles import ObstacleWatch, Sighting, Way
+from uav_guidance.references import Heading, Hold, Land, Reference, Takeoff, Travel, Turn
+from uav_guidance.requests import (
+    AuthorityRequest,
+    Decision,
+    HeadingRequest,
+    HoverRequest,
+    LandRequest,
+    PositionRequest,
+    Refusal,
+    Request,
+    TakeoffRequest,
+    check_fence,
+    check_flying,
+    check_height,
+    check_number,
+    check_takeoff,
+    require,
+)
+from uav_guidance.settings import Settings
+from uav_guidance.stillness import StillWatch
+from uav_guidance.vectors import Line, Vec3
+from uav_guidance.vehicle import Landed, Mode, Vehicle, mode_name, updated
+
+SETPOINT_PERIOD_S = 0.1
+LONGEST_STEP_S = 0.2  # after a pause of the clock or the link the carrot must not jump
+PREARM_PREFIX = "PreArm: "
+
+
+@dataclass(frozen=True)
+class Setpoint:
+    """Where the vehicle should be now, and its heading."""
+
+    position_enu_m: Vec3
+    yaw_rad: float
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the guidance knows and does; the fields are those of uav_msgs/GuidanceState."""
+
+    vehicle: Vehicle
+    link: bool
+    authority: bool
+    reference: str
+    reference_id: int
+    target_enu_m: Vec3
+    target_yaw_rad: float
+    remaining_enu_m: Vec3
+    drift_m: float
+    heading_error_rad: float
+    heading_locked: bool
+    still_s: float
+    obstacle_stop: bool
+    obstacle_m: float
+
+
+class Guidance:
+    """Follow one reference at a time, and a heading beside it, as long as the companion has the authority."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.vehicle = Vehicle()
+        self._settings = settings
+        self._authority = Authority()
+        self._heading = Heading(HeadingCarrot(0.0))
+        self._obstacles = ObstacleWatch(settings)
+        self._still = StillWatch(reached_m=settings.reached_m, reached_rad=settings.reached_rad)
+        self._still_s = 0.0
+        self._reference: Reference | None = None
+        self._reference_id = 0
+        self._procedure: Procedure | None = None
+        self._start_procedure: Procedure | None = None
+        self._streaming = False
+        self._blocked = False
+        self._last_step_s: float | None = None
+        self._last_setpoint_s = -math.inf
+        self._prearm_text = ""
+        self._answers: dict[type[Request], Callable[[Any, float], Decision]] = {
+            TakeoffRequest: self._take_off,
+            PositionRequest: self._set_position,
+            HeadingRequest: self._set_heading,
+            HoverRequest: self._hover,
+            LandRequest: self._land,
+            AuthorityRequest: self._take_authority,
+        }
+
+    # ---- what comes in -------------------------------------------------------------------------------------------------
+
+    def on_message(self, message: Any, now_s: float) -> None:
+        """Take a MAVLink message of the autopilot."""
+        kind = message.get_type()
+        if kind == "COMMAND_ACK":
+            if self._procedure is not None:
+                self._procedure.on_answer(message.command, message.result, now_s)
+            return
+        self.vehicle = updated(self.vehicle, message, now_s)
+        if kind == "HEARTBEAT":
+            self._check_authority(now_s)
+
+    def on_text(self, severity: int, text: str) -> None:
+        """Take a whole STATUSTEXT of the autopilot."""
+        if text.startswith(PREARM_PREFIX):
+            self._prearm_text = text.removeprefix(PREARM_PREFIX)
+        if self._procedure is not None:
+            self._procedure.on_text(severity, text)
+
+    def on_obstacle(self, sighting: Sighting) -> None:
+        """Take a sensor's word about the corridor ahead."""
+        self._obstacles.see(sighting)
+
+    def ask(self, request: Request, now_s: float) -> Decision:
+        """Accept a request or refuse it with a reason; a refused one changes nothing."""
+        try:
+            return self._answers[type(request)](request, now_s)
+        except Refusal as refusal:
+            return Decision(accepted=False, reason=str(refusal))
+
+    def fence_reason(self, target_enu_m: Vec3) -> str:
+        """Return why a target is outside the fence; empty if it is inside."""
+        try:
+            check_fence(target_enu_m, self.vehicle, self._settings)
+        except Refusal as refusal:
+            return str(refusal)
+        return ""
+
+    # ---- what goes out -------------------------------------------------------------------------------------------------
+
+    def step(self, now_s: float) -> list[Command | Setpoint]:
+        """Go on to this time; return what has to be sent now. To be called at 20 Hz, and whenever something has come in."""
+        dt_s = 0.0 if self._last_step_s is None else min(max(now_s - self._last_step_s, 0.0), LONGEST_STEP_S)
+        self._last_step_s = now_s
+        self._check_authority(now_s)
+        self._take_authority_at_start(now_s)
+        command = self._procedure.due(now_s) if self._procedure is not None else None
+        self._drop_what_ended(now_s)
+        self._adopt_hover(now_s)
+        setpoint = self._follow(now_s, dt_s)
+        self._measure_stillness(now_s)
+        return [item for item in (command, setpoint) if item is not None]
+
+    def link(self, now_s: float) -> bool:
+        """Return whether the autopilot's heartbeats arrive."""
+        heard_s = self.vehicle.heartbeat_s
+        return heard_s is not None and abs(now_s - heard_s) <= self._settings.link_lost_s
+
+    def resources(self) -> dict[str, str]:
+        """Return the states of navigation's resources that the hardware decides; what is not known is left out."""
+        states = {
+            "SDK_authority": "AVAILABLE" if self._authority.held else "UNAVAILABLE",
+            "homepoint_status": "VALID" if self.vehicle.home is not None else "INVALID",
+        }
+        if self.vehicle.landed is not Landed.UNDEFINED:
+            states["flight_status"] = "ON_GROUND" if self.vehicle.on_ground else "IN_AIR"
+        return states
+
+    def report(self, now_s: float) -> Report:
+        """Return what the guidance knows and does."""
+        place = self.vehicle.position_enu_m or Vec3()
+        reference = self._reference
+        line = Line(place, place) if reference is None else reference.line
+        return Report(
+            vehicle=self.vehicle,
+            link=self.link(now_s),
+            authority=self._authority.held,
+            reference=Reference.name if reference is None else reference.name,
+            reference_id=self._reference_id,
+            target_enu_m=line.target,
+            target_yaw_rad=wrap(self.vehicle.yaw_rad + self._heading_error()),
+            remaining_enu_m=Vec3() if reference is None else reference.remaining(self.vehicle),
+            drift_m=line.distance(place),
+            heading_error_rad=self._heading_error(),
+            heading_locked=self._heading.locked,
+            still_s=self._still_s,
+            obstacle_stop=self._blocked,
+            obstacle_m=self._obstacles.nearest_m(now_s),
+        )
+
+    # ---- requests ------------------------------------------------------------------------------------------------------
+
+    def _take_off(self, request: TakeoffRequest, now_s: float) -> Decision:
+        self._require_authority()
+        check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
+        check_height(request.height_m, self._settings)
+        check_takeoff(self.vehicle, self._prearm_text)
+        reference = Takeoff(self._settings, height_m=request.height_m, speed_m_s=request.speed_m_s)
+        return self._accept(reference, [*self._to_guided(), arm(), take_off(request.height_m)], now_s)
+
+    def _set_position(self, request: PositionRequest, now_s: float) -> Decision:
+        self._require_authority()
+        check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
+        check_flying(self.vehicle)
+        check_fence(request.target_enu_m, self.vehicle, self._settings)
+        require(not (request.along_travel and self._heading.locked), "the heading is locked: it can't turn into the travel")
+        reference = Travel(
+            self._settings,
+            target_enu_m=request.target_enu_m,
+            speed_m_s=request.speed_m_s,
+            along_travel=request.along_travel,
+        )
+        return self._accept(reference, self._to_guided(), now_s)
+
+    def _set_heading(self, request: HeadingRequest, now_s: float) -> Decision:
+        if request.release:
+            self._heading.locked = False
+            return Decision(accepted=True, reference_id=self._reference_id)
+        self._require_authority()
+        require(math.isfinite(request.yaw_rad), f"yaw is {request.yaw_rad}: not a number")
+        check_number("rate", request.rate_rad_s, self._settings.max_yaw_rate_rad_s)
+        check_flying(self.vehicle)
+        if request.lock:
+            return self._lock_heading(request, now_s)
+        require(not self._heading.locked, "the heading is locked")
+        return self._accept(Turn(self._settings, yaw_rad=request.yaw_rad, rate_rad_s=request.rate_rad_s), self._to_guided(), now_s)
+
+    def _lock_heading(self, request: HeadingRequest, now_s: float) -> Decision:
+        """Set the heading beside the reference, which goes on and keeps its id."""
+        self._adopt_hover(now_s)
+        self._heading.locked = True
+        self._heading.carrot.turn(request.yaw_rad, request.rate_rad_s)
+        self._still.restart(now_s)
+        return Decision(accepted=True, reference_id=self._reference_id)
+
+    def _hover(self, _request: HoverRequest, now_s: float) -> Decision:
+        self._require_authority()
+        if self.vehicle.on_ground:
+            require(isinstance(self._reference, Takeoff), "not in the air")
+            return self._accept(Hold(self._settings), [disarm()], now_s)
+        require(self.vehicle.off_ground, "the autopilot has not said whether it is in the air")
+        require(self.vehicle.located, "the autopilot does not say where it is")
+        return self._accept(Hold(self._settings), self._to_guided(), now_s)
+
+    def _land(self, _request: LandRequest, now_s: float) -> Decision:
+        self._require_authority()
+        require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._reference, Takeoff), "on the ground already")
+        self._authority.ask_land()
+        self._heading.locked = False
+        return self._accept(Land(), [] if self.vehicle.mode == Mode.LAND else [set_mode(Mode.LAND)], now_s)
+
+    def _take_authority(self, _request: AuthorityRequest, now_s: float) -> Decision:
+        require(self.link(now_s), "no link to the autopilot")
+        if self._authority.held:
+            return Decision(accepted=True, reference_id=self._reference_id)
+        self._run(Procedure([set_mode(Mode.GUIDED)]))
+        return Decision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
+
+    def _require_authority(self) -> None:
+        if self.vehicle.heartbeat_s is None:
+            raise Refusal("no authority: nothing was heard of the autopilot")
+        require(self._authority.held, f"no authority: the vehicle is in {mode_name(self.vehicle.mode)} or the link is lost")
+
+    def _to_guided(self) -> list[Command]:
+        return [] if self.vehicle.mode == Mode.GUIDED else [set_mode(Mode.GUIDED)]
+
+    def _accept(self, reference: Reference, commands: Sequence[Command], now_s: float) -> Decision:
+        """Follow another reference from now on."""
+        # Ids go on after a restart of the node: they begin at the mission clock's milliseconds.
+        self._reference_id = max(self._reference_id + 1, int(now_s * 1000.0) & 0xFFFFFFF)
+        self._run(Procedure(commands))
+        self._set_reference(reference, now_s)
+        return Decision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
+
+    def _run(self, procedure: Procedure) -> None:
+        if self._procedure is not None:
+            self._procedure.abort("another command came")
+        self._procedure = procedure
+
+    def _set_reference(self, reference: Reference | None, now_s: float) -> None:
+        self._reference = reference
+        self._streaming = self._blocked = False
+        self._last_setpoint_s = -math.inf
+        self._obstacles.forget_hold()
+        self._still.restart(now_s)
+        if reference is not None:
+            reference.accept(self.vehicle, self._heading)
+
+    # ---- at each step --------------------------------------------------------------------------------------------------
+
+    def _check_authority(self, now_s: float) -> None:
+        """Drop everything when the pilot, a failsafe or a broken link takes the authority away; nothing is taken back."""
+        if self._authority.update(self.vehicle, link=self.link(now_s)) is not Change.LOST:
+            return
+        why = f"the vehicle went into {mode_name(self.vehicle.mode)}" if self.link(now_s) else "the link was lost"
+        if self._procedure is not None:
+            self._procedure.abort(f"authority lost: {why}")
+        self._heading.locked = False
+        self._set_reference(None, now_s)
+
+    def _take_authority_at_start(self, now_s: float) -> None:
+        """Take GUIDED once, when the vehicle stands ready on the ground; try again only if nobody answered."""
+        running = self._start_procedure
+        if running is not None and running.outcome is not None:
+            if running.outcome.answered:
+                self._authority.settle_start()
+            self._start_procedure = None
+        elif running is None and self._authority.wants_start(self.vehicle, link=self.link(now_s)):
+            self._start_procedure = Procedure([set_mode(Mode.GUIDED)])
+            self._run(self._start_procedure)
+
+    def _drop_what_ended(self, now_s: float) -> None:
+        """Follow nothing if the autopilot did not agree, or if the vehicle stands on the ground, disarmed (a landing keeps its name)."""
+        outcome = self._procedure.outcome if self._procedure is not None else None
+        if outcome is not None and not outcome.accepted:
+            self._procedure = None
+            if isinstance(self._reference, Land):
+                self._authority.land_refused()
+            if self._reference is not None and not self._streaming:
+                self._set_reference(None, now_s)
+        elif outcome is not None:
+            self._procedure = None
+        standing = self.vehicle.on_ground and not self.vehicle.armed
+        if standing and self._procedure is None and not isinstance(self._reference, Land | None):
+            self._set_reference(None, now_s)
+
+    def _adopt_hover(self, now_s: float) -> None:
+        """Stay in place when there is the authority but no reference, in the air: after a restart, or given back by the pilot."""
+        flying = self.vehicle.landed is Landed.IN_AIR and self.vehicle.located and self.vehicle.mode == Mode.GUIDED
+        if self._reference is None and self._authority.held and flying:
+            self._set_reference(Hold(self._settings), now_s)
+
+    def _follow(self, now_s: float, dt_s: float) -> Setpoint | None:
+        """Move the carrots and return a setpoint if one is due."""
+        reference, vehicle = self._reference, self.vehicle
+        if isinstance(reference, Takeoff) and not self._streaming:
+            reference.keep_to_home(vehicle.home_enu_m)
+        if reference is None or not self._may_stream(reference):
+            return None
+        if not self._streaming:
+            reference.start(vehicle, self._heading)
+            self._streaming = True
+        self._blocked = reference.travelling and self._obstacles.blocked(self._way(reference), now_s)
+        position = reference.setpoint(vehicle, blocked=self._blocked, dt_s=dt_s)
+        yaw_rad = self._heading.carrot.step(vehicle.yaw_rad, dt_s)
+        # The clock has steps of its own (20 ms in simulation): a tenth of a second may look a little shorter.
+        if now_s - self._last_setpoint_s < SETPOINT_PERIOD_S - 0.005:
+            return None
+        self._last_setpoint_s = now_s
+        return Setpoint(position, yaw_rad)
+
+    def _may_stream(self, reference: Reference) -> bool:
+        """Setpoints are for GUIDED only, and for a vehicle whose take-off they can't cancel."""
+        vehicle = self.vehicle
+        return self._authority.held and vehicle.mode == Mode.GUIDED and vehicle.located and vehicle.landed in reference.STREAMS_IN
+
+    def _way(self, reference: Reference) -> Way:
+        remaining = reference.remaining(self.vehicle)
+        ahead = self.vehicle.velocity_enu_m_s.dot(remaining) / remaining.norm if remaining.norm > 0.0 else 0.0
+        return Way(self.vehicle.position_enu_m or Vec3(), remaining, max(ahead, 0.0))
+
+    def _heading_error(self) -> float:
+        """Return the way to the heading's target, counter-clockwise positive; zero while the autopilot minds the heading itself."""
+        minded = (
+            self._reference is None or isinstance(self._reference, Land) or (isinstance(self._reference, Takeoff) and not self._streaming)
+        )
+        return 0.0 if minded else wrap(self._heading.carrot.target_rad - self.vehicle.yaw_rad)
+
+    def _measure_stillness(self, now_s: float) -> None:
+        if self._reference is None:
+            self._still.restart(now_s)
+        distance_m = 0.0 if self._reference is None else self._reference.remaining(self.vehicle).norm
+        self._still_s = self._still.step(distance_m=distance_m, heading_error_rad=self._heading_error(), now_s=now_s)

@@ -1,0 +1,95 @@
+"""The guidance's values as ROS messages and back."""
+
+from __future__ import annotations
+
+import rospy
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
+from tf2_msgs.msg import TFMessage
+from uav_msgs.msg import GuidanceState, Obstacle
+
+from uav_guidance.frames import turned
+from uav_guidance.guidance import Report
+from uav_guidance.obstacles import Sighting
+from uav_guidance.vectors import Vec3
+from uav_guidance.vehicle import Vehicle, mode_name
+
+FRAME = "map"
+BODY = "base_link"
+
+
+def time_of(stamp_ns: int) -> rospy.Time:
+    """Return a ROS time."""
+    return rospy.Time(*divmod(stamp_ns, 1_000_000_000))
+
+
+def vec3(point: Point) -> Vec3:
+    """Return a point as a vector."""
+    return Vec3(point.x, point.y, point.z)
+
+
+def sighting(message: Obstacle) -> Sighting:
+    """Return what a sensor says about the corridor ahead."""
+    return Sighting(
+        source=message.source,
+        stamp_s=message.header.stamp.to_sec(),
+        detected=message.detected,
+        distance_m=message.distance_m,
+        nearest_enu_m=vec3(message.nearest_enu_m),
+    )
+
+
+def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
+    """Return the guidance's state as a message."""
+    vehicle, remaining = report.vehicle, report.remaining_enu_m
+    place, velocity, target = vehicle.position_enu_m or Vec3(), vehicle.velocity_enu_m_s, report.target_enu_m
+    message = GuidanceState(
+        link=report.link,
+        ready=vehicle.ready,
+        armed=vehicle.armed,
+        mode=mode_name(vehicle.mode),
+        landed_state=int(vehicle.landed),
+        authority=report.authority,
+        home_valid=vehicle.home is not None,
+        position_enu_m=Point(place.x, place.y, place.z),
+        velocity_enu_m_s=Vector3(velocity.x, velocity.y, velocity.z),
+        yaw_rad=vehicle.yaw_rad,
+        reference=report.reference,
+        reference_id=report.reference_id,
+        target_enu_m=Point(target.x, target.y, target.z),
+        target_yaw_rad=report.target_yaw_rad,
+        distance_to_go_m=remaining.norm,
+        horizontal_to_go_m=remaining.horizontal,
+        vertical_to_go_m=abs(remaining.z),
+        drift_m=report.drift_m,
+        heading_error_rad=report.heading_error_rad,
+        heading_locked=report.heading_locked,
+        still_s=report.still_s,
+        obstacle_stop=report.obstacle_stop,
+        obstacle_m=report.obstacle_m,
+    )
+    message.header.stamp = stamp
+    message.header.frame_id = FRAME
+    return message
+
+
+def pose_message(vehicle: Vehicle, stamp: rospy.Time) -> PoseStamped | None:
+    """Return the pose at the moment of the position; the attitude, a few ms older or newer, is turned on to it."""
+    if vehicle.position_enu_m is None or vehicle.quat_xyzw is None:
+        return None
+    apart_s = min(max((vehicle.boot_ms - vehicle.attitude_boot_ms) * 1e-3, -0.05), 0.05)
+    message = PoseStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = FRAME
+    place = vehicle.position_enu_m
+    message.pose.position = Point(place.x, place.y, place.z)
+    message.pose.orientation = Quaternion(*turned(vehicle.quat_xyzw, vehicle.rates_flu_rad_s, apart_s))
+    return message
+
+
+def transform_message(pose: PoseStamped) -> TFMessage:
+    """Return the pose as a transform from map to base_link."""
+    transform = TransformStamped(header=pose.header, child_frame_id=BODY)
+    place = pose.pose.position
+    transform.transform.translation = Vector3(place.x, place.y, place.z)
+    transform.transform.rotation = pose.pose.orientation
+    return TFMessage(transforms=[transform])

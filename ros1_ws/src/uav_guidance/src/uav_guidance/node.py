@@ -1,0 +1,207 @@
+"""The ROS node /uav_guidance: services and obstacles in, state and pose out, the autopilot behind a MAVLink link."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import PoseStamped
+from tf2_msgs.msg import TFMessage
+from uav_msgs.msg import GuidanceState, Obstacle
+from uav_msgs.srv import (
+    CheckFence,
+    CheckFenceRequest,
+    CheckFenceResponse,
+    Command,
+    CommandResponse,
+    SetHeadingReference,
+    SetHeadingReferenceRequest,
+    SetHeadingReferenceResponse,
+    SetPositionReference,
+    SetPositionReferenceRequest,
+    SetPositionReferenceResponse,
+    Takeoff,
+    TakeoffResponse,
+)
+from uav_msgs.srv import TakeoffRequest as TakeoffCall
+
+from resource_reporter import ResourceReporter
+from uav_guidance import requests
+from uav_guidance.guidance import Guidance, Setpoint
+from uav_guidance.link import Link, StreamKeeper
+from uav_guidance.messages import pose_message, sighting, state_message, time_of, transform_message, vec3
+from uav_guidance.settings import Settings, SettingsError
+from uav_guidance.stamping import StampClock
+from uav_guidance.texts import TextAssembler
+
+log = logging.getLogger(__name__)
+
+STATE_HZ = 20.0
+HEARTBEAT_PERIOD_S = 1.0
+# The autopilot's agreement is bounded on the mission clock; this bounds the wait of a caller should that clock stand still.
+AGREEMENT_WALL_S = 30.0
+SKILLSET = "navigation"
+
+
+class GuidanceNode:
+    """Connect the pure guidance with ROS and with the link; one lock guards it, whoever comes."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._guidance = Guidance(settings)
+        self._changed = threading.Condition(threading.RLock())
+        self._streams = StreamKeeper()
+        self._stamps = StampClock()
+        self._texts = TextAssembler()
+        self._heartbeat_s = -HEARTBEAT_PERIOD_S
+        self._reporter = ResourceReporter(SKILLSET)
+        self._state = rospy.Publisher("~state", GuidanceState, queue_size=5)
+        self._pose = rospy.Publisher("~pose", PoseStamped, queue_size=10)
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
+        self._link = Link(settings.url, settings.baud, on_message=self._on_message, on_connect=self._on_connect)
+        for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
+            rospy.Subscriber(topic, Obstacle, self._on_obstacle, queue_size=5, tcp_nodelay=True)
+        self._offer_services()
+
+    def run(self) -> None:
+        """Step at 20 Hz of the mission clock until the node is shut down; a clock that starts late is waited for."""
+        self._link.start()
+        rate = rospy.Rate(STATE_HZ, reset=True)
+        while not rospy.is_shutdown():
+            self._step()
+            try:
+                rate.sleep()
+            except rospy.ROSInterruptException:
+                break
+        self._link.close()
+        self._reporter.close()
+
+    # ---- services ------------------------------------------------------------------------------------------------------
+
+    def _offer_services(self) -> None:
+        rospy.Service("~takeoff", Takeoff, self._take_off)
+        rospy.Service("~set_position", SetPositionReference, self._set_position)
+        rospy.Service("~set_heading", SetHeadingReference, self._set_heading)
+        rospy.Service("~hover", Command, lambda _: self._ask(requests.HoverRequest(), CommandResponse))
+        rospy.Service("~land", Command, lambda _: self._ask(requests.LandRequest(), CommandResponse))
+        rospy.Service("~take_authority", Command, lambda _: self._ask(requests.AuthorityRequest(), CommandResponse))
+        rospy.Service("~check_fence", CheckFence, self._check_fence)
+
+    def _take_off(self, call: TakeoffCall) -> TakeoffResponse:
+        return self._ask(requests.TakeoffRequest(call.height_m, call.speed_m_s), TakeoffResponse)
+
+    def _set_position(self, call: SetPositionReferenceRequest) -> SetPositionReferenceResponse:
+        along_travel = call.heading == SetPositionReferenceRequest.ALONG_TRAVEL
+        request = requests.PositionRequest(vec3(call.target_enu_m), call.speed_m_s, along_travel)
+        return self._ask(request, SetPositionReferenceResponse)
+
+    def _set_heading(self, call: SetHeadingReferenceRequest) -> SetHeadingReferenceResponse:
+        request = requests.HeadingRequest(call.yaw_rad, call.rate_rad_s, lock=call.lock, release=call.release)
+        return self._ask(request, SetHeadingReferenceResponse)
+
+    def _check_fence(self, call: CheckFenceRequest) -> CheckFenceResponse:
+        with self._changed:
+            reason = self._guidance.fence_reason(vec3(call.target_enu_m))
+        return CheckFenceResponse(inside=not reason, reason=reason)
+
+    def _ask(self, request: requests.Request, response: Any) -> Any:
+        """Ask the guidance, act at once, and answer when the autopilot has agreed or refused (its words are the reason)."""
+        with self._changed:
+            decision = self._guidance.ask(request, _now_s())
+            self._advance()
+            procedure = decision.procedure
+            accepted, reason = decision.accepted, decision.reason
+            if procedure is not None:
+                self._changed.wait_for(lambda: procedure.outcome is not None or rospy.is_shutdown(), AGREEMENT_WALL_S)
+                outcome = procedure.outcome
+                accepted = outcome is not None and outcome.accepted
+                reason = outcome.reason if outcome is not None else "the autopilot has not answered"
+        log.info("%s: %s", request, "accepted" if accepted else f"refused: {reason}")
+        return response(accepted=accepted, reason=reason, reference_id=decision.reference_id if accepted else 0)
+
+    # ---- what comes in -------------------------------------------------------------------------------------------------
+
+    def _on_obstacle(self, message: Obstacle) -> None:
+        with self._changed:
+            self._guidance.on_obstacle(sighting(message))
+
+    def _on_connect(self) -> None:
+        with self._changed:
+            self._streams.forget()
+
+    def _on_message(self, message: Any) -> None:
+        """Take a message of the autopilot, in the link's thread; what can't wait for the next step is done at once."""
+        arrival = rospy.get_rostime()
+        kind = message.get_type()
+        pose: PoseStamped | None = None
+        with self._changed:
+            self._streams.hear(message.get_msgId(), arrival.to_sec())
+            if kind == "STATUSTEXT":
+                self._on_text(message)
+            self._guidance.on_message(message, arrival.to_sec())
+            if kind == "LOCAL_POSITION_NED":
+                pose = self._stamped_pose(message.time_boot_ms, arrival)
+            elif kind == "COMMAND_ACK":
+                self._advance()
+            elif kind != "ATTITUDE":
+                self._report_resources()
+        if pose is not None:
+            self._pose.publish(pose)
+            self._tf.publish(transform_message(pose))
+
+    def _on_text(self, message: Any) -> None:
+        text = self._texts.take(message.text, message.id, message.chunk_seq)
+        if text is not None:
+            log.info("autopilot: %s", text)
+            self._guidance.on_text(message.severity, text)
+
+    def _stamped_pose(self, boot_ms: int, arrival: rospy.Time) -> PoseStamped | None:
+        stamp_ns = self._stamps.stamp_ns(boot_ms, arrival.to_nsec())
+        return None if stamp_ns is None else pose_message(self._guidance.vehicle, time_of(max(stamp_ns, 0)))
+
+    # ---- what goes out -------------------------------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        """Make one step of 50 ms: heartbeat, streams, setpoints, state."""
+        now = rospy.get_rostime()
+        now_s = now.to_sec()
+        with self._changed:
+            if abs(now_s - self._heartbeat_s) >= HEARTBEAT_PERIOD_S:
+                self._heartbeat_s = now_s
+                self._link.send_heartbeat()
+            for number in self._streams.due(now_s):
+                self._link.ask_stream(number)
+            self._advance()
+            state = state_message(self._guidance.report(now_s), now)
+        self._state.publish(state)
+
+    def _advance(self) -> None:
+        """Step the guidance to now and send what it says."""
+        for item in self._guidance.step(_now_s()):
+            if isinstance(item, Setpoint):
+                self._link.send_setpoint(item)
+            else:
+                self._link.send_command(item)
+        self._report_resources()
+        self._changed.notify_all()
+
+    def _report_resources(self) -> None:
+        for resource, state in self._guidance.resources().items():
+            self._reporter.report(resource, state)
+
+
+def _now_s() -> float:
+    return float(rospy.get_rostime().to_sec())
+
+
+def main() -> None:
+    """Run the node."""
+    rospy.init_node("uav_guidance")
+    try:
+        settings = Settings.from_parameters(rospy.get_param(rospy.get_name(), {}))
+    except SettingsError as error:
+        rospy.logfatal("%s", error)
+        sys.exit(2)
+    GuidanceNode(settings).run()

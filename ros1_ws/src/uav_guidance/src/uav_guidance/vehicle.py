@@ -1,0 +1,171 @@
+"""What is known of the vehicle: an immutable snapshot, and how each MAVLink message changes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any
+
+from uav_guidance.frames import (
+    Quaternion,
+    enu_from_ned,
+    local_enu_from_global,
+    quaternion_enu_flu,
+    rates_flu_from_frd,
+    yaw_enu_from_ned,
+)
+from uav_guidance.vectors import ZERO, Vec3
+
+ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+PREARM_CHECK = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
+REBOOT_MS = 1000  # the autopilot's clock may step back by less (messages out of order)
+
+GlobalPlace = tuple[int, int, int]
+
+
+class Mode(IntEnum):
+    """ArduCopter's flight modes (``custom_mode`` of HEARTBEAT)."""
+
+    STABILIZE = 0
+    ACRO = 1
+    ALT_HOLD = 2
+    AUTO = 3
+    GUIDED = 4
+    LOITER = 5
+    RTL = 6
+    CIRCLE = 7
+    LAND = 9
+    DRIFT = 11
+    SPORT = 13
+    FLIP = 14
+    AUTOTUNE = 15
+    POSHOLD = 16
+    BRAKE = 17
+    THROW = 18
+    AVOID_ADSB = 19
+    GUIDED_NOGPS = 20
+    SMART_RTL = 21
+    FLOWHOLD = 22
+    FOLLOW = 23
+    ZIGZAG = 24
+
+
+class Landed(IntEnum):
+    """MAV_LANDED_STATE of EXTENDED_SYS_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKING_OFF = 3
+    LANDING = 4
+
+
+def mode_name(mode: int | None) -> str:
+    """Return a mode's name, or its number if it has none here; empty if nothing was heard."""
+    if mode is None:
+        return ""
+    return Mode(mode).name if mode in Mode._value2member_map_ else str(mode)
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A snapshot of the vehicle. Frame `map` (ENU, origin at the EKF origin), metres, radians, body FLU."""
+
+    heartbeat_s: float | None = None
+    mode: int | None = None
+    armed: bool = False
+    ready: bool = False
+    landed: Landed = Landed.UNDEFINED
+    boot_ms: int = 0
+    position_enu_m: Vec3 | None = None
+    velocity_enu_m_s: Vec3 = ZERO
+    quat_xyzw: Quaternion | None = None
+    yaw_rad: float = 0.0
+    rates_flu_rad_s: Vec3 = ZERO
+    attitude_boot_ms: int = 0
+    origin: GlobalPlace | None = None
+    home: GlobalPlace | None = None
+    home_local_enu_m: Vec3 = ZERO
+
+    @property
+    def located(self) -> bool:
+        """Whether position and attitude are known."""
+        return self.position_enu_m is not None and self.quat_xyzw is not None
+
+    @property
+    def home_enu_m(self) -> Vec3 | None:
+        """Home in `map`: from the two global positions, because ArduPilot leaves HOME_POSITION's local fields at zero."""
+        if self.home is None:
+            return None
+        if self.origin is None:
+            return self.home_local_enu_m
+        return local_enu_from_global(self.home, self.origin)
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the autopilot says that it stands."""
+        return self.landed is Landed.ON_GROUND
+
+    @property
+    def off_ground(self) -> bool:
+        """Whether it has lifted off: the landed state is known and is not "on ground"."""
+        return self.landed in {Landed.IN_AIR, Landed.TAKING_OFF, Landed.LANDING}
+
+
+def _heartbeat(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+    return replace(vehicle, heartbeat_s=now_s, mode=int(message.custom_mode), armed=bool(message.base_mode & ARMED_FLAG))
+
+
+def _sys_status(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+    return replace(vehicle, ready=bool(message.onboard_control_sensors_health & PREARM_CHECK))
+
+
+def _extended_sys_state(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+    known = message.landed_state in Landed._value2member_map_
+    return replace(vehicle, landed=Landed(message.landed_state) if known else Landed.UNDEFINED)
+
+
+def _local_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+    if message.time_boot_ms + REBOOT_MS < vehicle.boot_ms:
+        # The autopilot started anew: nothing of what it said before holds.
+        vehicle = Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed)
+    position = enu_from_ned(Vec3(message.x, message.y, message.z))
+    velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))
+    return replace(vehicle, boot_ms=int(message.time_boot_ms), position_enu_m=position, velocity_enu_m_s=velocity)
+
+
+def _attitude(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+    return replace(
+        vehicle,
+        quat_xyzw=quaternion_enu_flu(message.roll, message.pitch, message.yaw),
+        yaw_rad=yaw_enu_from_ned(message.yaw),
+        rates_flu_rad_s=rates_flu_from_frd(Vec3(message.rollspeed, message.pitchspeed, message.yawspeed)),
+        attitude_boot_ms=int(message.time_boot_ms),
+    )
+
+
+def _home_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+    local = enu_from_ned(Vec3(message.x, message.y, message.z))
+    return replace(vehicle, home=(message.latitude, message.longitude, message.altitude), home_local_enu_m=local)
+
+
+def _global_origin(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+    return replace(vehicle, origin=(message.latitude, message.longitude, message.altitude))
+
+
+_CHANGES: dict[str, Callable[[Vehicle, Any, float], Vehicle]] = {
+    "HEARTBEAT": _heartbeat,
+    "SYS_STATUS": _sys_status,
+    "EXTENDED_SYS_STATE": _extended_sys_state,
+    "LOCAL_POSITION_NED": _local_position,
+    "ATTITUDE": _attitude,
+    "HOME_POSITION": _home_position,
+    "GPS_GLOBAL_ORIGIN": _global_origin,
+}
+
+
+def updated(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+    """Return the snapshot after a MAVLink message of the autopilot; the same one if the message says nothing about it."""
+    change = _CHANGES.get(message.get_type())
+    return vehicle if change is None else change(vehicle, message, now_s)

@@ -1,0 +1,300 @@
+"""A small autopilot for tests: a real MAVLink peer over TCP that behaves, in what the guidance can see, like ArduCopter 4.6.
+
+It owns the simulated time: ``tick`` moves vehicle and clock on by 20 ms. Its transcript keeps what the companion sent, runs of equal
+setpoint masks being one entry.
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+TICK_S = 0.02
+SPOOL_UP_S = 2.4
+CLIMB_M_S, SINK_M_S = 1.5, 1.0
+ACCEL_M_S2, TOP_M_S, YAW_RAD_S = 2.5, 5.0, 1.2
+GROUND_DISARM_S, LANDED_DISARM_S = 10.0, 0.5
+FOLLOWED_MASKS = {0x0DF8, 0x09F8, 0x05F8, 0x01F8, 0x0000}
+HOME = (473977418, 85455939, 488000)
+GUIDED, LOITER, LAND = 4, 5, 9
+KNOWN_MODES = {0, 3, 4, 5, 6, 9, 17}
+
+
+@dataclass
+class Body:
+    """The vehicle; NED, metres, yaw clockwise from north."""
+
+    place: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    speed: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    yaw: float = 0.3
+    armed: bool = False
+    mode: int = 0
+    landed: int = 1
+
+
+class FakeAutopilot:
+    """Listen on a free loopback port; one client."""
+
+    def __init__(self, *, on_clock: Callable[[float], None], rate: float = 4.0, ready_s: float = 1.0, start_s: float = 100.0) -> None:
+        self.body = Body()
+        self.transcript: list[tuple[Any, ...]] = []
+        self.now_s = start_s
+        self.refuse_arming = ""
+        self.stuck = False
+        self.setpoint: tuple[float, float, float, float] | None = None
+        self.heartbeats_heard = 0
+        self._on_clock, self._rate = on_clock, rate
+        self._ready_from_s = start_s + ready_s
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._client: socket.socket | None = None
+        self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._intervals: dict[int, tuple[float, float]] = {}
+        self._takeoff: tuple[float, float] | None = None
+        self._climb_to: float | None = None
+        self._armed_s = self._touched_s = 0.0
+        self._heartbeat_s = 0.0
+        self._ended = threading.Event()
+        self._lock = threading.RLock()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    @property
+    def url(self) -> str:
+        return f"tcp:127.0.0.1:{self._listener.getsockname()[1]}"
+
+    @property
+    def enu(self) -> tuple[float, float, float]:
+        north, east, down = self.body.place
+        return (east, north, -down)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join(2.0)
+        self.drop_client()
+        self._listener.close()
+
+    def drop_client(self) -> None:
+        with self._lock:
+            if self._client is not None:
+                self._client.close()
+            self._client = None
+            self._intervals.clear()
+
+    def pilot(self, mode: int) -> None:
+        """The pilot takes another mode."""
+        with self._lock:
+            self._change_mode(mode)
+
+    # ---- the thread ----------------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        next_wall_s = time.monotonic()
+        while not self._ended.is_set():
+            next_wall_s = max(next_wall_s + TICK_S / self._rate, time.monotonic() - 0.1)
+            while (left_s := next_wall_s - time.monotonic()) > 0.0:
+                self._serve(left_s)
+            with self._lock:
+                self.now_s += TICK_S
+                self._move()
+                self._speak()
+            self._on_clock(self.now_s)
+
+    def _serve(self, wait_s: float) -> None:
+        client = self._client
+        ready, _, _ = select.select([client if client is not None else self._listener], [], [], wait_s)
+        if not ready:
+            return
+        with self._lock:
+            if client is None:
+                self._client, _ = self._listener.accept()
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+                self._mav.robust_parsing = True
+                return
+            try:
+                data = client.recv(4096)
+            except OSError:
+                data = b""
+            if not data:
+                self.drop_client()
+                return
+            for message in self._mav.parse_buffer(data) or ():
+                self._hear(message)
+
+    def _send(self, message: Any) -> None:
+        if self._client is not None:
+            try:
+                self._client.sendall(message.pack(self._mav))
+                self._mav.seq = (self._mav.seq + 1) % 256
+            except OSError:
+                self.drop_client()
+
+    # ---- what it hears -------------------------------------------------------------------------------------------------
+
+    def _hear(self, message: Any) -> None:
+        assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 191)
+        kind = message.get_type()
+        if kind == "HEARTBEAT":
+            self.heartbeats_heard += 1
+        elif kind == "SET_POSITION_TARGET_LOCAL_NED":
+            self._hear_setpoint(message)
+        elif kind == "COMMAND_LONG":
+            result = self._obey(message)
+            self._send(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, 1, 191))
+
+    def _note(self, *entry: Any) -> None:
+        if not self.transcript or self.transcript[-1] != entry or entry[0] != "setpoints":
+            self.transcript.append(entry)
+
+    def _hear_setpoint(self, message: Any) -> None:
+        self._note("setpoints", hex(message.type_mask), self.body.landed)
+        self.last_setpoint_ned = (message.x, message.y, message.z, message.yaw)
+        if self.body.mode != GUIDED or not self.body.armed or message.type_mask not in FOLLOWED_MASKS:
+            return
+        if self.body.landed == 1:
+            self._takeoff = None  # silently cancelled
+        else:
+            self._climb_to = None
+            self.setpoint = (message.x, message.y, message.z, message.yaw)
+
+    def _obey(self, message: Any) -> int:
+        if message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+            self._intervals[int(message.param1)] = (message.param2 * 1e-6, 0.0)
+            return mavlink.MAV_RESULT_ACCEPTED
+        parameters = [message.param1, message.param2, message.param7]
+        self._note(mavlink.enums["MAV_CMD"][message.command].name, *parameters)
+        return {
+            mavlink.MAV_CMD_DO_SET_MODE: self._set_mode,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self._take_off,
+        }[message.command](*parameters)
+
+    def _set_mode(self, use_custom: float, mode: float, _: float) -> int:
+        if use_custom != 1.0:
+            return mavlink.MAV_RESULT_DENIED
+        if int(mode) not in KNOWN_MODES:
+            return mavlink.MAV_RESULT_FAILED
+        self._change_mode(int(mode))
+        return mavlink.MAV_RESULT_ACCEPTED
+
+    def _change_mode(self, mode: int) -> None:
+        self.body.mode = mode
+        self.setpoint = self._climb_to = self._takeoff = None
+        self._heartbeat_s = 0.0
+
+    def _arm(self, wanted: float, _: float, __: float) -> int:
+        body = self.body
+        if not wanted:
+            if body.landed != 1:
+                return mavlink.MAV_RESULT_FAILED
+            body.armed, self._takeoff = False, None
+            return mavlink.MAV_RESULT_ACCEPTED
+        why = self.refuse_arming or ("" if self.ready else "GPS 1: waiting for home")
+        if why:
+            # As on the real one, the text leaves after the answer.
+            self._late_text = (self.now_s + 0.1, f"Arm: {why}")
+            return mavlink.MAV_RESULT_FAILED
+        body.armed, self._armed_s = True, self.now_s
+        self._send_home()
+        return mavlink.MAV_RESULT_ACCEPTED
+
+    def _take_off(self, _: float, __: float, height: float) -> int:
+        if not self.body.armed or self.body.mode != GUIDED or self.body.landed != 1:
+            return mavlink.MAV_RESULT_FAILED
+        self._takeoff = (self.now_s + SPOOL_UP_S, height)
+        return mavlink.MAV_RESULT_ACCEPTED
+
+    # ---- what it does --------------------------------------------------------------------------------------------------
+
+    @property
+    def ready(self) -> bool:
+        return self.now_s >= self._ready_from_s
+
+    def _move(self) -> None:
+        body = self.body
+        if body.landed == 1:
+            self._stand()
+            return
+        wanted = [0.0, 0.0, 0.0]
+        if body.mode == LAND:
+            body.landed, wanted[2] = 4, SINK_M_S
+        elif self._climb_to is not None:
+            body.landed, wanted[2] = 3, -min(CLIMB_M_S, 0.2 + body.place[2] + self._climb_to)
+            if body.place[2] <= -self._climb_to + 0.05:
+                self._climb_to = None
+        else:
+            body.landed = 2
+            if self.setpoint is not None:
+                wanted = self._to_setpoint(self.setpoint)
+        for axis in range(3):
+            change = min(max(wanted[axis] - body.speed[axis], -ACCEL_M_S2 * TICK_S), ACCEL_M_S2 * TICK_S)
+            body.speed[axis] = 0.0 if self.stuck else body.speed[axis] + change
+            body.place[axis] += body.speed[axis] * TICK_S
+        if body.place[2] >= 0.0 and body.speed[2] > 0.0:
+            body.place[2], body.speed, body.landed, self._touched_s = 0.0, [0.0] * 3, 1, self.now_s
+
+    def _stand(self) -> None:
+        body = self.body
+        if self._takeoff is not None and self.now_s >= self._takeoff[0]:
+            self._climb_to, self._takeoff, body.landed = self._takeoff[1], None, 3
+        elif (body.armed and body.mode == LAND and self.now_s > self._touched_s + LANDED_DISARM_S) or (
+            body.armed and self._takeoff is None and self.now_s > max(self._armed_s, self._touched_s) + GROUND_DISARM_S
+        ):
+            body.armed = False
+
+    def _to_setpoint(self, setpoint: tuple[float, float, float, float]) -> list[float]:
+        body = self.body
+        offset = [setpoint[axis] - body.place[axis] for axis in range(3)]
+        distance = math.hypot(*offset)
+        speed = min(1.2 * distance, math.sqrt(2.0 * 0.5 * ACCEL_M_S2 * distance), TOP_M_S)
+        turn = math.remainder(setpoint[3] - body.yaw, math.tau)
+        body.yaw = math.remainder(body.yaw + min(max(turn, -YAW_RAD_S * TICK_S), YAW_RAD_S * TICK_S), math.tau)
+        return [speed * part / distance if distance > 1e-6 else 0.0 for part in offset]
+
+    # ---- what it says --------------------------------------------------------------------------------------------------
+
+    _late_text: tuple[float, str] | None = None
+    last_setpoint_ned: tuple[float, float, float, float] | None = None
+
+    def _speak(self) -> None:
+        if self.now_s - self._heartbeat_s >= 1.0:
+            self._heartbeat_s = self.now_s
+            base_mode = 1 | (128 if self.body.armed else 0)
+            self._send(mavlink.MAVLink_heartbeat_message(13, 3, base_mode, self.body.mode, 4, 3))
+        if self._late_text is not None and self.now_s >= self._late_text[0]:
+            self._send(mavlink.MAVLink_statustext_message(2, self._late_text[1].encode()))
+            self._late_text = None
+        for number, (period_s, last_s) in list(self._intervals.items()):
+            if self.now_s - last_s >= period_s - 1e-6:
+                self._intervals[number] = (period_s, self.now_s)
+                self._say(number)
+
+    def _say(self, number: int) -> None:
+        body, boot_ms = self.body, int(self.now_s * 1000.0)
+        if number == mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
+            self._send(mavlink.MAVLink_local_position_ned_message(boot_ms, *body.place, *body.speed))
+        elif number == mavlink.MAVLINK_MSG_ID_ATTITUDE:
+            self._send(mavlink.MAVLink_attitude_message(boot_ms, 0.0, 0.0, body.yaw, 0.0, 0.0, 0.0))
+        elif number == mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE:
+            self._send(mavlink.MAVLink_extended_sys_state_message(0, body.landed))
+        elif number == mavlink.MAVLINK_MSG_ID_SYS_STATUS:
+            health = 0x10000000 if self.ready else 0
+            self._send(mavlink.MAVLink_sys_status_message(0x10000000, 0x10000000, health, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
+        elif number == mavlink.MAVLINK_MSG_ID_HOME_POSITION and self.ready:
+            self._send_home()
+        elif number == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN and self.ready:
+            self._send(mavlink.MAVLink_gps_global_origin_message(*HOME))
+
+    def _send_home(self) -> None:
+        # ArduPilot leaves the local fields at zero.
+        self._send(mavlink.MAVLink_home_position_message(*HOME, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0))

@@ -1,0 +1,224 @@
+"""The node on a live graph, with a real MAVLink peer that moves the clock four times as fast as the wall's."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+rospy = pytest.importorskip("rospy")
+
+from geometry_msgs.msg import Point, PoseStamped  # noqa: E402
+from guidance_fake_autopilot import GUIDED, LAND, LOITER, FakeAutopilot  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
+from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
+from uav_msgs.msg import GuidanceState, Obstacle  # noqa: E402
+from uav_msgs.srv import (  # noqa: E402
+    CheckFence,
+    Command,
+    SetHeadingReference,
+    SetPositionReference,
+    SetPositionReferenceRequest,
+    Takeoff,
+)
+
+from alula_testing.ros1 import StartNode, end_process, wait_until  # noqa: E402
+
+SOURCES = Path(__file__).resolve().parents[2]
+KEEP, ALONG = SetPositionReferenceRequest.KEEP, SetPositionReferenceRequest.ALONG_TRAVEL
+
+
+class Bench:
+    """One flight: autopilot, node, and a navigation skillset that accepts every transition."""
+
+    def __init__(self, start_node: StartNode) -> None:
+        self._start_node = start_node
+        self.states: list[GuidanceState] = []
+        self.poses: list[PoseStamped] = []
+        self.resources = {"SDK_authority": "UNAVAILABLE", "flight_status": "ON_GROUND", "homepoint_status": "INVALID"}
+        self.transitions: list[tuple[str, str]] = []
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
+        self.autopilot = FakeAutopilot(on_clock=lambda now_s: self._clock.publish(rospy.Time.from_sec(now_s)))
+        self._shown = rospy.Publisher("/navigation/resource_states", ResourceStates, queue_size=10, latch=True)
+        self._service = rospy.Service("/navigation/transition", Transition, self._take_transition)
+        self.obstacles = rospy.Publisher("/zed_depth/obstacle", Obstacle, queue_size=10)
+        self._subscribers = [
+            rospy.Subscriber("/uav_guidance/state", GuidanceState, self.states.append),
+            rospy.Subscriber("/uav_guidance/pose", PoseStamped, self.poses.append),
+        ]
+        self._show()
+        rospy.set_param("/use_sim_time", True)
+        rospy.set_param("/uav_guidance", {"url": self.autopilot.url})
+        self.node = self.run_node()
+        self.autopilot.start()
+
+    def run_node(self) -> subprocess.Popen[bytes]:
+        path = os.environ.get("PYTHONPATH", "")
+        os.environ["PYTHONPATH"] = ":".join([str(SOURCES / "uav_guidance/src"), str(SOURCES / "resource_reporter/src"), path])
+        self.node = self._start_node(["python3", str(SOURCES / "uav_guidance/scripts/uav_guidance_node")])
+        os.environ["PYTHONPATH"] = path
+        return self.node
+
+    @property
+    def state(self) -> GuidanceState:
+        return self.states[-1] if self.states else GuidanceState()
+
+    def until(self, condition: Callable[[GuidanceState], bool], what: str, timeout_s: float = 15.0) -> None:
+        wait_until(lambda: bool(self.states) and condition(self.state), timeout_s=timeout_s, what=what)
+
+    def call(self, name: str, kind: type, *arguments: object) -> object:
+        rospy.wait_for_service(f"/uav_guidance/{name}", timeout=10.0)
+        return rospy.ServiceProxy(f"/uav_guidance/{name}", kind)(*arguments)
+
+    def take_off(self, height_m: float = 3.0) -> None:
+        self.until(lambda s: s.authority and s.ready and s.home_valid, "the companion has the authority")
+        answer = self.call("takeoff", Takeoff, height_m, 1.5)
+        assert answer.accepted, answer.reason
+        self.until(lambda s: s.landed_state == 2 and s.distance_to_go_m < 0.2, "at altitude")
+
+    def show_obstacle(self, distance_m: float | None) -> None:
+        message = Obstacle(source="zed", detected=distance_m is not None, distance_m=math.inf if distance_m is None else distance_m)
+        message.header.stamp = rospy.Time.from_sec(self.autopilot.now_s)
+        self.obstacles.publish(message)
+
+    def close(self) -> None:
+        end_process(self.node)
+        self.autopilot.close()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        for publisher in (self._clock, self._shown, self.obstacles):
+            publisher.unregister()
+        self._service.shutdown()
+        rospy.set_param("/use_sim_time", False)
+        rospy.delete_param("/uav_guidance")
+
+    def _take_transition(self, request: TransitionRequest) -> TransitionResponse:
+        self.transitions.append((request.resource, request.to))
+        self.resources[request.resource] = request.to
+        self._show()
+        return TransitionResponse(True, "", request.to)
+
+    def _show(self) -> None:
+        resources = [ResourceState(name=name, state=state) for name, state in self.resources.items()]
+        self._shown.publish(ResourceStates(skillset="navigation", resources=resources))
+
+
+@pytest.fixture
+def bench(start_node: StartNode) -> Iterator[Bench]:
+    bench = Bench(start_node)
+    yield bench
+    bench.close()
+
+
+def test_whole_mission_leaves_the_golden_transcript(bench):
+    bench.take_off(3.0)
+    assert bench.autopilot.enu[2] == pytest.approx(3.0, abs=0.3)
+
+    answer = bench.call("set_position", SetPositionReference, Point(6.0, 0.0, 3.0), 1.5, ALONG)
+    assert answer.accepted, answer.reason
+    bench.until(lambda s: s.reference_id == answer.reference_id and s.distance_to_go_m < 0.2, "at the waypoint")
+    assert bench.autopilot.enu == pytest.approx((6.0, 0.0, 3.0), abs=0.3)
+    assert bench.state.yaw_rad == pytest.approx(0.0, abs=0.1)
+
+    assert bench.call("set_heading", SetHeadingReference, math.pi / 2, 0.8, True, False).accepted
+    bench.until(lambda s: s.heading_locked and abs(s.heading_error_rad) < 0.05, "the heading is locked")
+    answer = bench.call("set_position", SetPositionReference, Point(2.0, 0.0, 3.0), 1.0, KEEP)
+    bench.until(lambda s: s.reference_id == answer.reference_id and s.distance_to_go_m < 0.2, "back, sideways")
+    assert bench.state.yaw_rad == pytest.approx(math.pi / 2, abs=0.05)
+    assert bench.call("set_heading", SetHeadingReference, 0.0, 0.0, False, True).accepted
+
+    assert bench.call("hover", Command).accepted
+    bench.until(lambda s: s.reference == "hover" and not s.heading_locked, "hovering")
+    assert bench.call("land", Command).accepted
+    bench.until(lambda s: s.reference == "land" and s.landed_state == 1 and not s.armed, "landed and disarmed")
+    assert bench.state.distance_to_go_m == 0.0
+
+    assert bench.autopilot.transcript == [
+        ("MAV_CMD_DO_SET_MODE", 1.0, GUIDED, 0.0),
+        ("MAV_CMD_COMPONENT_ARM_DISARM", 1.0, 0.0, 0.0),
+        ("MAV_CMD_NAV_TAKEOFF", 0.0, 0.0, 3.0),
+        ("setpoints", "0x9f8", 2),
+        ("MAV_CMD_DO_SET_MODE", 1.0, LAND, 0.0),
+    ]
+    wait_until(lambda: bench.resources["flight_status"] == "ON_GROUND", timeout_s=5.0, what="the skillset knows of the landing")
+    assert [state for name, state in bench.transitions if name == "flight_status"] == ["IN_AIR", "ON_GROUND"]
+    assert ("SDK_authority", "AVAILABLE") in bench.transitions
+    assert ("homepoint_status", "VALID") in bench.transitions
+    assert bench.autopilot.heartbeats_heard >= 10
+
+
+def test_pilot_takes_over_and_nothing_is_taken_back(bench):
+    bench.take_off()
+    bench.call("set_position", SetPositionReference, Point(20.0, 0.0, 3.0), 1.5, KEEP)
+    bench.until(lambda s: s.position_enu_m.x > 1.0, "under way")
+    bench.autopilot.pilot(LOITER)
+    bench.until(lambda s: not s.authority and s.reference == "idle" and s.mode == "LOITER", "taken over")
+    wait_until(lambda: bench.resources["SDK_authority"] == "UNAVAILABLE", timeout_s=2.0, what="the skillset knows it")
+    sent = len(bench.autopilot.transcript)
+    before_s = bench.autopilot.now_s
+    refused = bench.call("set_position", SetPositionReference, Point(1.0, 0.0, 3.0), 1.5, KEEP)
+    assert not refused.accepted
+    assert "LOITER" in refused.reason
+    bench.until(lambda s: s.header.stamp.to_sec() > before_s + 5.0, "five seconds with the pilot")
+    assert len(bench.autopilot.transcript) == sent
+    assert bench.call("take_authority", Command).accepted
+    bench.until(lambda s: s.authority and s.reference == "hover", "the operator gave it back")
+
+
+def test_fence_and_limits_refuse(bench):
+    bench.until(lambda s: s.home_valid, "home is known")
+    assert bench.call("check_fence", CheckFence, Point(10.0, 0.0, 3.0)).inside
+    outside = bench.call("check_fence", CheckFence, Point(60.1, 0.0, 3.0))
+    assert not outside.inside
+    assert "60.1 m from home" in outside.reason
+    assert not bench.call("set_position", SetPositionReference, Point(1.0, 0.0, 3.0), 1.5, KEEP).accepted
+    bench.until(lambda s: s.authority, "the companion has the authority")
+    bench.autopilot.refuse_arming = "Compass not calibrated"
+    refused = bench.call("takeoff", Takeoff, 3.0, 1.5)
+    assert not refused.accepted
+    assert "Arm: Compass not calibrated" in refused.reason
+    bench.until(lambda s: s.reference == "idle", "the take-off is given up")
+
+
+def test_obstacle_stops_it_and_it_goes_on_when_clear(bench):
+    bench.take_off()
+    bench.call("set_position", SetPositionReference, Point(15.0, 0.0, 3.0), 1.5, KEEP)
+    bench.until(lambda s: s.position_enu_m.x > 2.0, "under way")
+    obstacle_at = bench.autopilot.enu[0] + 2.9
+
+    def see_and(condition: Callable[[GuidanceState], bool]) -> bool:
+        bench.show_obstacle(max(0.1, obstacle_at - bench.autopilot.enu[0]))
+        return condition(bench.state)
+
+    wait_until(lambda: see_and(lambda s: s.obstacle_stop and s.still_s > 3.0), timeout_s=10.0, what="held back, and it counts as still")
+    assert bench.autopilot.enu[0] < obstacle_at - 1.0
+    bench.show_obstacle(None)
+    bench.until(lambda s: not s.obstacle_stop and s.position_enu_m.x > obstacle_at, "going on")
+
+
+def test_reconnects_and_asks_for_its_streams_again(bench):
+    bench.take_off()
+    bench.autopilot.drop_client()
+    poses = len(bench.poses)
+    wait_until(lambda: len(bench.poses) > poses + 20, timeout_s=5.0, what="poses arrive again")
+    bench.until(lambda s: s.authority and s.landed_state == 2, "it still flies")
+
+
+def test_respawned_in_flight_it_hovers_where_it_is(bench):
+    bench.take_off()
+    bench.call("set_position", SetPositionReference, Point(15.0, 0.0, 3.0), 1.0, KEEP)
+    bench.until(lambda s: s.position_enu_m.x > 2.0, "under way")
+    bench.node.kill()
+    bench.node.wait()
+    bench.states.clear()
+    sent = [entry for entry in bench.autopilot.transcript if entry[0] != "setpoints"]
+    bench.run_node()
+    bench.until(lambda s: s.authority and s.reference == "hover", "hovering after the restart")
+    assert [entry for entry in bench.autopilot.transcript if entry[0] != "setpoints"] == sent
+    assert bench.call("land", Command).accepted
+    bench.until(lambda s: s.landed_state == 1 and not s.armed, "landed")
