@@ -1,0 +1,25 @@
+from setuptools import find_packages, setup
+
+package_name = "skill_language"
+
+setup(
+    name=package_name,
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + package_name]),
+        ("share/" + package_name, ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="The Alula developers",
+    maintainer_email="alula@alula-robotics.org",
+    description="The skill language: model, paper notation, checks, JSON form and code generator.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "skill_check = skill_language.check_cli:main",
+            "skill_generate = skill_language.generate.__main__:main",
+        ],
+    },
+)

@@ -1,0 +1,161 @@
+"""What is wrong with a model: findings with a stable code, their place, and how to mend it.
+
+Codes are a contract: tests, users and tools refer to them, so that a number is never given a second meaning.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from skill_language.model import NOWHERE, Span
+
+CODES: Mapping[str, str] = {
+    "ALU001": "a file can't be read",
+    "ALU002": "a file is not UTF-8 text",
+    "ALU003": "a file is too large for a model",
+    "ALU004": "a JSON form that is no model",
+    "ALU005": "a side file (types, bindings) that is not as it should be",
+    "ALU006": "a folder without skillsets",
+    "ALU100": "a character that the language doesn't know",
+    "ALU101": "a string without its end",
+    "ALU102": "a number out of range",
+    "ALU103": "something else was expected here",
+    "ALU104": "a block without its end",
+    "ALU105": "a condition nested too deeply",
+    "ALU106": "a block or setting given twice",
+    "ALU107": "too many errors to go on",
+    "ALU201": "a name defined twice",
+    "ALU202": "unknown resource",
+    "ALU203": "unknown state",
+    "ALU204": "unknown effect",
+    "ALU205": "unknown type",
+    "ALU206": "unknown data",
+    "ALU207": "a resource without an initial state",
+    "ALU208": "an initial state that has no arrow",
+    "ALU209": "an effect that no arrow of the resource allows",
+    "ALU210": "an effect that would need an extern arrow",
+    "ALU211": "a period that is not positive",
+    "ALU212": "a resource set twice by one effect",
+    "ALU213": "data where only resources may be asked",
+    "ALU214": "a comparison that makes no sense for its value",
+    "ALU215": "a name that the generated interface needs for itself",
+    "ALU216": "a name that ROS doesn't allow",
+    "ALU217": "two names that become one in generated code",
+    "ALU218": "a skill that can't end by itself nor be ended",
+    "ALU301": "an effect that is never used",
+    "ALU302": "a state that can't be reached",
+    "ALU303": "a type that is never used",
+    "ALU304": "an input or output that has the name of a resource or data",
+    "ALU401": "a type without an entry in types.yaml",
+    "ALU402": "a binding for something that isn't there",
+    "ALU403": "data that no topic is bound to",
+    "ALU404": "two skillsets of one name",
+}
+
+
+class Severity(Enum):
+    """An error keeps a model from being used, a warning doesn't."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One finding. ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about."""
+
+    code: str
+    message: str
+    span: Span = NOWHERE
+    severity: Severity = Severity.ERROR
+    hint: str = ""
+    expected: tuple[str, ...] = ()
+    source_line: str = field(default="", compare=False)
+
+    def render(self) -> str:
+        """Return the finding as text for people: place, code, message, the line with a caret, what was expected, hint."""
+        lines = [f"{_place(self.span)}{self.severity.value} {self.code}: {self.message}"]
+        if self.span.line and self.source_line.strip():
+            lines += _excerpt(self.span, self.source_line)
+        if self.expected:
+            lines.append(f"      = expected {'one of ' if len(self.expected) > 1 else ''}{', '.join(self.expected)}")
+        if self.hint:
+            lines.append(f"      = hint: {self.hint}")
+        return "\n".join(lines)
+
+    def as_json(self) -> dict[str, object]:
+        """Return the finding as plain values for tools."""
+        return {
+            "code": self.code,
+            "severity": self.severity.value,
+            "message": self.message,
+            "file": self.span.file,
+            "line": self.span.line,
+            "column": self.span.column,
+            "end_column": self.span.end_column,
+            "hint": self.hint,
+            "expected": list(self.expected),
+        }
+
+
+class LanguageError(Exception):
+    """All that was found in a file or robot, at least one error among it; ``str()`` is the rendered list."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
+        super().__init__(render(self.diagnostics))
+
+
+def render(diagnostics: Iterable[Diagnostic]) -> str:
+    """Return findings in the order given, an empty line between two."""
+    return "\n\n".join(diagnostic.render() for diagnostic in diagnostics)
+
+
+def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
+    """Tell whether a finding is more than a warning."""
+    return any(diagnostic.severity is Severity.ERROR for diagnostic in diagnostics)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return a hint that names the known name nearest to this one, or lists the few there are, or is empty."""
+    candidates = sorted(set(known))
+    # Names are compared without case: AVAILABLE for available is the commonest slip.
+    folded: dict[str, str] = {}
+    for candidate in candidates:
+        folded.setdefault(candidate.lower(), candidate)
+    match = difflib.get_close_matches(name.lower()[:80], folded, n=1, cutoff=0.6)
+    if match:
+        return f"did you mean `{folded[match[0]]}`?"
+    if 0 < len(candidates) <= _FEW:
+        return f"there is {quoted(candidates)}"
+    return ""
+
+
+def quoted(names: Sequence[str]) -> str:
+    """Return names in backquotes, comma separated."""
+    return ", ".join(f"`{name}`" for name in names)
+
+
+_FEW = 8
+_WIDTH = 120
+
+
+def _place(span: Span) -> str:
+    if not span.file:
+        return ""
+    return f"{span}: " if span.line else f"{span.file}: "
+
+
+def _excerpt(span: Span, source_line: str) -> list[str]:
+    """Return the line and the caret below it, cut to a window where the line is very long."""
+    start = max(0, span.column - 1 - _WIDTH // 2) if span.column > _WIDTH - 20 else 0
+    shown = source_line[start : start + _WIDTH]
+    column = span.column - 1 - start
+    # A tab stays a tab below the line, so that the caret stands where the terminal puts the text.
+    padding = "".join("\t" if character == "\t" else " " for character in shown[:column])
+    length = max(1, min(span.end_column - span.column, len(shown) - column))
+    printable = "".join(c if c.isprintable() or c == "\t" else "\N{REPLACEMENT CHARACTER}" for c in shown)
+    return [f"{span.line:5} | {printable.rstrip()}", f"      | {padding}{'^' * length}"]

@@ -1,0 +1,21 @@
+"""All files of a robot: two packages a skillset, and the bridge's configuration."""
+
+from __future__ import annotations
+
+from skill_language.generate.bridge import bridge_configuration
+from skill_language.generate.interfaces import interface_package
+from skill_language.generate.manager_package import manager_package
+from skill_language.robot import Robot
+
+Files = dict[str, str]
+"""Text by path, the path relative to the output folder."""
+
+
+def robot_files(robot: Robot) -> Files:
+    """Return everything that is generated for a robot; the same models give the same text."""
+    files: Files = {}
+    for skillset in robot.skillsets:
+        files |= interface_package(robot, skillset)
+        files |= manager_package(robot, skillset)
+    files[f"{robot.name}_bridge.yaml"] = bridge_configuration(robot)
+    return files

@@ -1,0 +1,144 @@
+"""A place in a row of tokens, what may come next, and how to go on after an error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from skill_language.lexer import MAX_ERRORS, Kind, Source, Token, tokenize
+from skill_language.model import Span
+
+
+class SyntaxFault(Exception):  # noqa: N818 - it never leaves the parser
+    """What stands here can't be read; it has been reported already. The block around it goes on at its end."""
+
+
+OPERATOR_WORDS = frozenset({"and", "or", "not", "true", "false"})
+"""The only words that can't be names anywhere; all others have their meaning by where they stand."""
+
+
+class Cursor:
+    """Walks over the tokens of one source; every ``expect`` reports and raises SyntaxFault when it isn't met."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self._tokens = tokenize(source)
+        self._index = 0
+
+    @property
+    def here(self) -> Token:
+        """The token that is read next."""
+        return self._tokens[self._index]
+
+    @property
+    def previous(self) -> Token:
+        """The token that was read last (the first one before anything was read)."""
+        return self._tokens[max(0, self._index - 1)]
+
+    @property
+    def at_end(self) -> bool:
+        """Nothing is left to read."""
+        return self.here.kind is Kind.END
+
+    def ahead(self, offset: int = 1) -> Token:
+        """Return a later token without reading it."""
+        return self._tokens[min(self._index + offset, len(self._tokens) - 1)]
+
+    def advance(self) -> Token:
+        """Read one token; the END token stays where it is."""
+        token = self.here
+        self._index = min(self._index + 1, len(self._tokens) - 1)
+        return token
+
+    def at(self, *texts: str) -> bool:
+        """Tell whether one of these punctuations or words comes next."""
+        return self.here.text in texts and self.here.kind in {Kind.NAME, Kind.PUNCTUATION}
+
+    def at_word(self, word: str) -> bool:
+        """Tell whether this word comes next in its meaning for the language, not as a name of an entry or state."""
+        return self.at(word) and self.ahead().text not in {":", "->"}
+
+    def accept(self, *texts: str) -> Token | None:
+        """Read the next token if it is one of these."""
+        return self.advance() if self.at(*texts) else None
+
+    def expect(self, *texts: str, hint: str = "") -> Token:
+        """Read one of these or fail."""
+        if self.at(*texts):
+            return self.advance()
+        raise self.fail(*(f"`{text}`" for text in texts), hint=hint)
+
+    def name(self, what: str) -> Token:
+        """Read a name; ``what`` says whose, as in `a state`."""
+        if self.here.kind is Kind.NAME and self.here.text not in OPERATOR_WORDS:
+            return self.advance()
+        hint = f"`{self.here.text}` is a word of the language, choose another name" if self.here.text in OPERATOR_WORDS else ""
+        raise self.fail(what, hint=hint)
+
+    def kind(self, kind: Kind) -> Token:
+        """Read a token of this kind or fail."""
+        if self.here.kind is kind:
+            return self.advance()
+        raise self.fail(kind.value)
+
+    def span(self, first: Token, last: Token | None = None) -> Span:
+        """Return the place from one token to another of the same line (to the first one's end when it isn't)."""
+        span = self.source.span(first)
+        if last is None or last.line != first.line:
+            return span
+        return Span(span.file, span.line, span.column, self.source.span(last).end_column)
+
+    def fail(self, *expected: str, hint: str = "") -> SyntaxFault:
+        """Report that something else was expected here and return the fault to raise."""
+        message = f"expected {' or '.join(expected) if len(expected) <= _FEW else 'something else'}, found {self.here.shown}"
+        listed = expected if len(expected) > 1 else ()
+        self.source.report("ALU103", message, self.source.span(self.here), hint=hint, expected=listed)
+        return SyntaxFault()
+
+    def block(self, entry: Callable[[], None], outer: Callable[[], bool]) -> None:
+        """Read `{ entry* }`. ``outer`` tells that what comes next can only stand outside, so that the `}` is missing."""
+        opening = self.expect("{")
+        while not self.accept("}"):
+            if self.at_end or outer():
+                self._missing_end(opening)
+                return
+            before = self._index
+            try:
+                entry()
+            except SyntaxFault:
+                self._skip_to_end(outer, minimum=before)
+                return
+            if len(self.source.diagnostics) >= MAX_ERRORS:
+                self._index = len(self._tokens) - 1
+                return
+
+    def _missing_end(self, opening: Token) -> None:
+        before = "the file ends" if self.at_end else f"{self.here.shown} begins"
+        message = f"the block opened in line {opening.line} has no `}}` before {before}"
+        self.source.report("ALU104", message, self.source.span(self.here), hint="close the block with `}`")
+
+    def _skip_to_end(self, outer: Callable[[], bool], *, minimum: int) -> None:
+        """Go on behind the `}` of the present block, or where something begins that can only stand outside."""
+        depth = sum({"{": 1, "}": -1}.get(token.text, 0) for token in self._tokens[minimum : self._index])
+        while not self.at_end and not (depth <= 0 and outer()):
+            if self.here.text == "{":
+                depth += 1
+            elif self.here.text == "}":
+                depth -= 1
+                if depth < 0:
+                    self.advance()
+                    return
+            self.advance()
+
+
+def starts_block(cursor: Cursor, words: Collection[str]) -> bool:
+    """Tell whether `word {` comes next, with one of these words."""
+    return cursor.here.text in words and cursor.here.kind is Kind.NAME and cursor.ahead().text == "{"
+
+
+def starts_member(cursor: Cursor, words: Collection[str]) -> bool:
+    """Tell whether `word name` comes next, with one of these words, as in `skill takeoff`."""
+    following = cursor.ahead()
+    return cursor.here.text in words and cursor.here.kind is Kind.NAME and following.kind is Kind.NAME and cursor.ahead(2).text != "->"
+
+
+_FEW = 3

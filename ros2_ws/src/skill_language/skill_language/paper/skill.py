@@ -1,0 +1,230 @@
+"""A skill of the paper's notation (Listing 3).
+
+Beyond the listing: an effect of several changes is written `name { r1 -> S1  r2 -> S2 }`; `output { ... }` is an `input`
+the other way; `interrupt { apply = effect }` says what an interruption changes; `violation` and `apply` may be left out;
+`post resource = (...)` after a result says what must hold once its effect was applied (section 4.1.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from skill_language.errors import nearest
+from skill_language.lexer import Kind, Token, number
+from skill_language.model import (
+    NO_EFFECT,
+    TRUE,
+    Assignment,
+    Effect,
+    Expression,
+    Interrupt,
+    Invariant,
+    Parameter,
+    Precondition,
+    Progress,
+    Result,
+    Skill,
+    Span,
+)
+from skill_language.paper.conditions import condition
+from skill_language.paper.cursor import Cursor, starts_block, starts_member
+
+BLOCKS = ("progress", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
+MEMBERS = ("type", "data", "resource", "skill")
+
+
+@dataclass
+class _Parts:
+    """What was read of a skill so far; an effect that is referred to has its name only until ``build``."""
+
+    inputs: list[Parameter] = field(default_factory=list)
+    outputs: list[Parameter] = field(default_factory=list)
+    effects: list[Effect] = field(default_factory=list)
+    preconditions: list[Precondition] = field(default_factory=list)
+    start: Effect = NO_EFFECT
+    invariants: list[Invariant] = field(default_factory=list)
+    progress: Progress | None = None
+    interrupt: Interrupt = field(default_factory=Interrupt)
+    results: list[Result] = field(default_factory=list)
+
+
+def read_skill(cursor: Cursor) -> Skill:
+    """Read `skill name { ... }`."""
+    cursor.expect("skill")
+    name = cursor.name("the name of the skill")
+    reader = _SkillReader(cursor)
+    cursor.block(reader.member, lambda: starts_member(cursor, MEMBERS))
+    return reader.build(name)
+
+
+def ends_block(cursor: Cursor) -> bool:
+    """Tell whether something begins that can't stand inside a block of a skill: the block's `}` is missing."""
+    progress = cursor.at("progress") and cursor.ahead().text == "=" and cursor.ahead(2).kind is Kind.NUMBER
+    return progress or starts_block(cursor, BLOCKS) or starts_member(cursor, ("skill",))
+
+
+class _SkillReader:
+    """Reads the blocks of one skill in any order."""
+
+    def __init__(self, cursor: Cursor) -> None:
+        self.cursor = cursor
+        self.parts = _Parts()
+        self._seen: set[str] = set()
+
+    def member(self) -> None:
+        """Read one block, or `progress = 0.5`."""
+        word = self.cursor.here
+        if word.text in BLOCKS and word.kind is Kind.NAME:
+            self._once(word)
+        parts = self.parts
+        match word.text:
+            case "progress":
+                self._progress()
+            case "input":
+                self._block(lambda: parts.inputs.append(read_parameter(self.cursor, "an input")))
+            case "output":
+                self._block(lambda: parts.outputs.append(read_parameter(self.cursor, "an output")))
+            case "effect":
+                self._block(self._effect)
+            case "precondition":
+                self._block(self._precondition)
+            case "invariant":
+                self._block(self._invariant)
+            case "interrupt":
+                self._block(self._interrupt)
+            case "result":
+                self._block(self._result)
+            case _:
+                hint = nearest(word.text, BLOCKS) if word.kind is Kind.NAME else ""
+                raise self.cursor.fail(*(f"`{block}`" for block in BLOCKS), "`}`", hint=hint if hint.startswith("did") else "")
+
+    def build(self, name: Token) -> Skill:
+        """Put the parts together, with every effect that is referred to filled in."""
+        parts, named = self.parts, {effect.name: effect for effect in reversed(self.parts.effects)}
+
+        def resolve(reference: Effect) -> Effect:
+            if not reference.name:
+                return reference
+            if reference.name in named:
+                return replace(named[reference.name], span=reference.span)
+            message = f"skill `{name.text}` has no effect `{reference.name}`"
+            hint = nearest(reference.name, named) or "define it in the skill's `effect` block"
+            self.cursor.source.report("ALU204", message, reference.span, hint=hint)
+            return reference
+
+        return Skill(
+            name=name.text,
+            inputs=tuple(parts.inputs),
+            outputs=tuple(parts.outputs),
+            effects=tuple(parts.effects),
+            preconditions=tuple(parts.preconditions),
+            start=resolve(parts.start),
+            invariants=tuple(replace(i, effect=resolve(i.effect)) for i in parts.invariants),
+            progress=parts.progress,
+            interrupt=replace(parts.interrupt, effect=resolve(parts.interrupt.effect)),
+            results=tuple(replace(r, effect=resolve(r.effect)) for r in parts.results),
+            span=self.cursor.span(name),
+        )
+
+    # --- blocks ---------------------------------------------------------------------------------------------------
+
+    def _once(self, word: Token) -> None:
+        if word.text in self._seen:
+            hint = "a skill has one of each; put the entries together"
+            self.cursor.source.report("ALU106", f"`{word.text}` is given twice in this skill", self.cursor.span(word), hint=hint)
+        self._seen.add(word.text)
+
+    def _block(self, entry: Callable[[], None]) -> None:
+        self.cursor.advance()
+        self.cursor.block(entry, lambda: ends_block(self.cursor))
+
+    def _progress(self) -> None:
+        first = self.cursor.advance()
+        self.cursor.expect("=", hint="write `progress = 0.5`, the period in seconds")
+        value = self.cursor.kind(Kind.NUMBER)
+        self.parts.progress = Progress(number(self.cursor.source, value), span=self.cursor.span(first, value))
+
+    def _effect(self) -> None:
+        name = self.cursor.name("the name of an effect")
+        changes: list[Assignment] = []
+        if self.cursor.accept(":"):
+            changes.append(self._assignment())
+        elif self.cursor.at("{"):
+            self.cursor.block(lambda: changes.append(self._assignment()), lambda: ends_block(self.cursor))
+        else:
+            raise self.cursor.fail("`:`", "`{`", hint=f"write `{name.text}: resource -> STATE` or `{name.text} {{}}`")
+        self.parts.effects.append(Effect(name.text, tuple(changes), span=self.cursor.span(name)))
+
+    def _assignment(self) -> Assignment:
+        resource = self.cursor.name("a resource")
+        self.cursor.expect("->")
+        state = self.cursor.name("a state")
+        return Assignment(resource.text, state.text, span=self.cursor.span(resource, state))
+
+    def _precondition(self) -> None:
+        if self.cursor.at_word("success"):
+            word = self.cursor.advance()
+            if self.parts.start is not NO_EFFECT:
+                self.cursor.source.report("ALU106", "`success` is given twice in this precondition", self.cursor.span(word))
+            self.parts.start = self._reference()
+            return
+        name, holds = self._named_condition("a precondition")
+        self.parts.preconditions.append(Precondition(name.text, holds, span=self.cursor.span(name)))
+
+    def _invariant(self) -> None:
+        name, holds = self._named_condition("an invariant")
+        effect = self._setting("violation") if self.cursor.at_word("violation") else NO_EFFECT
+        self.parts.invariants.append(Invariant(name.text, holds, effect, span=self.cursor.span(name)))
+
+    def _interrupt(self) -> None:
+        if not self.cursor.at("apply", "post"):
+            raise self.cursor.fail("`apply`", "`post`", "`}`")
+        word = self.cursor.here
+        interrupt = self.parts.interrupt
+        given = interrupt.effect is not NO_EFFECT if word.text == "apply" else interrupt.postcondition is not TRUE
+        if given:
+            self.cursor.source.report("ALU106", f"`{word.text}` is given twice in this block", self.cursor.span(word))
+        effect, postcondition = self._outcome()
+        self.parts.interrupt = Interrupt(
+            effect=effect if effect is not NO_EFFECT else interrupt.effect,
+            postcondition=postcondition if postcondition is not TRUE else interrupt.postcondition,
+            span=self.cursor.span(word),
+        )
+
+    def _result(self) -> None:
+        name = self.cursor.name("a result")
+        effect, postcondition = self._outcome() if self.cursor.accept(":") else (NO_EFFECT, TRUE)
+        comment = self.cursor.previous.comment
+        span: Span = self.cursor.span(name)
+        self.parts.results.append(Result(name.text, effect=effect, postcondition=postcondition, comment=comment, span=span))
+
+    def _outcome(self) -> tuple[Effect, Expression]:
+        """Read `apply = effect`, `post condition`, both or none."""
+        effect = self._setting("apply") if self.cursor.at_word("apply") else NO_EFFECT
+        if not self.cursor.at_word("post"):
+            return effect, TRUE
+        self.cursor.advance()
+        return effect, condition(self.cursor)
+
+    def _named_condition(self, what: str) -> tuple[Token, Expression]:
+        name = self.cursor.name(what)
+        self.cursor.expect(":", hint=f"{what} is written `name: resource = (...)`")
+        return name, condition(self.cursor)
+
+    def _setting(self, word: str) -> Effect:
+        self.cursor.expect(word)
+        self.cursor.expect("=")
+        return self._reference()
+
+    def _reference(self) -> Effect:
+        name = self.cursor.name("the name of an effect")
+        return Effect(name.text, span=self.cursor.span(name))
+
+
+def read_parameter(cursor: Cursor, what: str) -> Parameter:
+    """Read `name: Type // comment`."""
+    name = cursor.name(what)
+    cursor.expect(":", hint=f"{what} is written `name: Type`")
+    kind = cursor.name("a type")
+    return Parameter(name.text, kind.text, comment=kind.comment, span=cursor.span(name, kind))
