@@ -93,8 +93,8 @@ def test_the_interrupted_leg_is_finished_by_the_lidar_branch_with_the_nose_to_th
     flight.fly_until_running("goto_straight", 2)
     flight.world.break_sensor("zed")
     flight.fly()
-    rotations = [handle.inputs["yaw"] for handle in flight.world.handles if handle.skill == "rotate_head"]
-    locks = [handle.inputs["yaw"] for handle in flight.world.handles if handle.skill == "lock_head"]
+    rotations = [handle.inputs["heading"] for handle in flight.world.handles if handle.skill == "rotate_head"]
+    locks = [handle.inputs["heading"] for handle in flight.world.handles if handle.skill == "lock_head"]
     targets = [handle.inputs["target"] for handle in flight.world.handles if handle.skill == "goto"]
     assert rotations == pytest.approx([math.pi / 2, math.pi])
     assert locks == pytest.approx(rotations)
@@ -275,7 +275,7 @@ def test_stopping_the_tree_and_landing_is_what_an_abort_does():
     assert not flight.world.running()
 
 
-RESULTS = ["ARRIVED", "AT_ALTITUDE", "ALIGNED", "BLOCKED", "ABORTED", "LOST", "FAILED", "HOVERED", "LANDED", None]
+RESULTS = ["ARRIVED", "AT_ALTITUDE", "ALIGNED", "BLOCKED", "ABORTED", "LOST", "FAILED", "DONE", "LANDED", None]
 
 
 @settings(max_examples=150, deadline=None)

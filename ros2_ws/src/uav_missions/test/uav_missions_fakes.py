@@ -42,7 +42,7 @@ NOMINAL = {
     "goto": "ARRIVED",
     "goto_straight": "ARRIVED",
     "rotate_head": "ALIGNED",
-    "hover": "HOVERED",
+    "hover": "DONE",
     "land": "LANDED",
 }
 

@@ -125,7 +125,7 @@ class MappingMission:
     def landing_here(self) -> Behaviour:
         """Make a tree that stops the vehicle and lands it where it is; also what an abort from outside ends with."""
         settings, navigation = self._settings, self._clients.navigation
-        hover = self._skill("hover", navigation, "hover", {"duration": settings.hover_s}, success="HOVERED")
+        hover = self._skill("hover", navigation, "hover", {"duration": settings.hover_s}, success="DONE")
         land = RetryAfter(
             "until it lands",
             self._land("land here"),
@@ -193,10 +193,10 @@ class MappingMission:
         return {"target": {"x": x, "y": y, "z": z}, "speed": self._settings.speed_m_s}
 
     def _rotate_inputs(self, blackboard: Blackboard) -> Mapping[str, object]:
-        return {"yaw": sideways_yaw_rad(blackboard), "rate": self._settings.turn_rate_rad_s}
+        return {"heading": sideways_yaw_rad(blackboard), "rate": self._settings.turn_rate_rad_s}
 
     def _lock_inputs(self, blackboard: Blackboard) -> Mapping[str, object]:
-        return {"yaw": sideways_yaw_rad(blackboard)}
+        return {"heading": sideways_yaw_rad(blackboard)}
 
     @staticmethod
     def _note_yaw(blackboard: Blackboard) -> None:

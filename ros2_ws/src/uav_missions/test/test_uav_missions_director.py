@@ -1,0 +1,162 @@
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+
+import pytest
+from uav_missions.director import EXIT_CODES, Director, Outcome, unmet_conditions
+from uav_missions.drawing import draw
+from uav_missions.mapping import MappingMission
+from uav_missions_fakes import World, clients, make_blackboard
+
+READY = {
+    "SDK_authority": "AVAILABLE",
+    "flight_status": "ON_GROUND",
+    "homepoint_status": "VALID",
+    "zed_status": "OK",
+    "lidar_status": "OK",
+}
+
+
+def make(world: World) -> Director:
+    blackboard = make_blackboard(world)
+    skillsets = clients(world)
+    return Director(MappingMission(skillsets, blackboard), skillsets, blackboard, start_timeout_s=60.0)
+
+
+def run(director: Director, world: World, until=lambda: False, limit_s: float = 200.0) -> None:
+    while director.end is None and not until():
+        assert world.now_s < limit_s, world.log[-8:]
+        director.step()
+        world.pass_time()
+
+
+def test_nothing_starts_before_the_vehicle_is_ready_and_the_wait_is_bounded():
+    world = World(resources={**READY, "homepoint_status": "INVALID", "lidar_status": "UNKNOWN"})
+    director = make(world)
+    run(director, world)
+    assert director.end.outcome is Outcome.NOT_STARTED
+    assert director.end.reason == "the home point is not valid; nothing is known of the LiDAR"
+    assert EXIT_CODES[director.end.outcome] == 2
+    assert world.now_s == pytest.approx(60.2, abs=0.3)
+    assert world.starts() == []
+
+
+@pytest.mark.parametrize(
+    ("resource", "state"),
+    [
+        ("SDK_authority", "UNAVAILABLE"),
+        ("homepoint_status", "INVALID"),
+        ("flight_status", "IN_AIR"),
+        ("zed_status", "UNKNOWN"),
+        ("lidar_status", "UNKNOWN"),
+        ("lidar_status", "BROKEN"),
+    ],
+)
+def test_each_condition_of_the_start_counts(resource, state):
+    assert unmet_conditions(clients(World(resources=dict(READY)))) == []
+    assert len(unmet_conditions(clients(World(resources={**READY, resource: state})))) == 1
+
+
+def test_a_broken_zed_does_not_keep_the_mission_from_starting():
+    world = World(resources={**READY, "zed_status": "BROKEN"}, broken={"zed"})
+    director = make(world)
+    run(director, world)
+    assert director.end.outcome is Outcome.DEGRADED
+    assert director.end.reason.startswith("perception.zed_depthmap: NOT_READY")
+
+
+def test_a_nominal_flight_is_accomplished():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world)
+    assert director.end.outcome is Outcome.ACCOMPLISHED
+    assert not world.running()
+
+
+def test_a_flight_without_eyes_is_given_up_with_the_reason():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world, until=lambda: ("running", "goto_straight") in world.log)
+    world.break_sensor("zed")
+    world.break_sensor("lidar")
+    run(director, world)
+    assert director.end.outcome is Outcome.GIVEN_UP
+    assert "zed_ok" in director.end.reason
+    assert EXIT_CODES[director.end.outcome] == 1
+
+
+def test_an_abort_in_the_air_stops_everything_and_lands():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world, until=lambda: ("running", "goto_straight") in world.log)
+    assert director.abort("operator") == "the vehicle stops and lands where it is"
+    assert director.abort("operator again") == "the vehicle is landing already"
+    run(director, world)
+    assert director.end.outcome is Outcome.ABORTED
+    assert director.end.reason == "operator"
+    assert world.starts()[-2:] == ["hover", "land"]
+    assert world.resources["flight_status"] == "ON_GROUND"
+    assert not world.running()
+    assert not world.conflicts
+
+
+def test_an_abort_before_the_start_starts_nothing():
+    world = World(resources={**READY, "homepoint_status": "INVALID"})
+    director = make(world)
+    director.step()
+    director.abort("operator")
+    assert director.end.outcome is Outcome.ABORTED
+    assert world.starts() == []
+
+
+def test_an_abort_while_landing_leaves_the_landing_alone():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world, until=lambda: ("running", "land") in world.log)
+    assert director.abort("operator") == "the vehicle is landing already"
+    run(director, world)
+    assert director.end.outcome is Outcome.ACCOMPLISHED
+    assert world.starts().count("land") == 1
+
+
+def test_the_view_remembers_how_each_node_ended():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world, until=lambda: ("running", "goto_straight") in world.log)
+    director.view()
+    world.break_sensor("zed")
+    while director.end is None:
+        director.step()
+        director.view()
+        world.pass_time()
+    status = {view.skill: view.status for view in director.view().walk() if view.skill}
+    assert status["perception.zed_depthmap"] == "FAILURE"
+    assert status["navigation.goto_straight"] == "INTERRUPTED"
+    assert status["perception.lidar_depthmap"] == "INTERRUPTED"
+    assert status["navigation.goto"] == "SUCCESS"
+    assert status["mapping.lidar_mapping"] == "INTERRUPTED"
+    assert json.loads(json.dumps(director.view().as_dict()))["status"] == "SUCCESS"
+
+
+def test_the_drawing_shows_every_node_in_the_signs_of_the_paper():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world)
+    view = director.view()
+    svg = draw(view, "Mission <mapping>")
+    root = ET.fromstring(svg)
+    space = "{http://www.w3.org/2000/svg}"
+    texts = [element.text for element in root.iter(f"{space}text")]
+    assert sum(text == "? navigate" for text in texts) == 1
+    assert "take off (takeoff)" in texts
+    nodes = list(view.walk())
+    shapes = [element for element in root.iter() if element.tag in {f"{space}rect", f"{space}polygon"}]
+    legend_and_background = 8
+    assert len(shapes) == len(nodes) + legend_and_background
+    trapeziums = [element for element in shapes if element.tag == f"{space}polygon"]
+    assert len(trapeziums) == sum(view.kind == "parallel" for view in nodes) + 1
+    width = float(root.get("width"))
+    for element in shapes:
+        if element.tag == f"{space}rect" and element.get("x"):
+            assert float(element.get("x")) + float(element.get("width")) <= width

@@ -1,0 +1,84 @@
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from uav_missions.files import EventLog, write_json
+from uav_missions.route import Route, RouteError, load_route, wrap_rad
+
+
+def test_legs_have_their_direction_on_the_ground_and_short_ones_that_of_a_neighbour():
+    route = Route([(0.0, 0.0, 3.0), (22.0, 0.0, 3.0), (22.0, 14.0, 3.0), (22.0, 14.0, 5.0)])
+    headings = []
+    while not route.done:
+        headings.append(route.leg_heading_rad())
+        route.mark_reached()
+    assert headings == pytest.approx([0.0, 0.0, math.pi / 2, math.pi / 2])
+    assert route.current is None
+
+
+def test_reaching_the_end_more_than_once_changes_nothing():
+    route = Route([(1.0, 0.0, 3.0)])
+    route.mark_reached()
+    route.mark_reached()
+    assert route.reached == 1
+
+
+@given(st.floats(-1e3, 1e3))
+def test_a_wrapped_angle_is_the_same_angle_in_half_a_turn(angle_rad):
+    wrapped = wrap_rad(angle_rad)
+    assert -math.pi < wrapped <= math.pi
+    assert math.cos(wrapped) == pytest.approx(math.cos(angle_rad), abs=1e-9)
+    assert math.sin(wrapped) == pytest.approx(math.sin(angle_rad), abs=1e-9)
+
+
+def test_routes_are_read_from_yaml_and_json(tmp_path):
+    yaml_file, json_file = tmp_path / "yard.yaml", tmp_path / "route.json"
+    yaml_file.write_text("name: yard\nroute:\n  - [0, 0, 3.0]\n  - [22.0, 0.0, 3.0]\n")
+    json_file.write_text(json.dumps({"route": [[0, 0, 3], [22, 0, 3]]}))
+    assert load_route(yaml_file).waypoints == load_route(json_file).waypoints == ((0.0, 0.0, 3.0), (22.0, 0.0, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("route: []", "has no key 'route'"),
+        ("- 1", "has no key 'route'"),
+        ("route: [[0, 0, 3], [0, 0]]", "waypoint 2 is [0, 0]"),
+        ("route: [[0, 0, .nan]]", "waypoint 1"),
+        ("route: [[0, 0, 'x']]", "waypoint 1"),
+        ("route: [", "while parsing"),
+    ],
+)
+def test_a_route_that_can_not_be_used_is_named_with_its_place(tmp_path, text, complaint):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(RouteError) as error:
+        load_route(path)
+    assert complaint in str(error.value)
+    assert str(path) in str(error.value)
+
+
+def test_a_missing_route_file_is_named(tmp_path):
+    with pytest.raises(RouteError, match="nowhere"):
+        load_route(tmp_path / "nowhere.yaml")
+
+
+def test_json_files_are_replaced_as_a_whole_and_nothing_is_left_beside(tmp_path):
+    path = tmp_path / "mission.json"
+    write_json(path, {"outcome": "running"})
+    write_json(path, {"outcome": "accomplished"})
+    assert json.loads(path.read_text()) == {"outcome": "accomplished"}
+    assert [file.name for file in tmp_path.iterdir()] == ["mission.json"]
+
+
+def test_each_event_is_on_disk_at_once(tmp_path):
+    log = EventLog(tmp_path / "events.jsonl")
+    for number in range(3):
+        log.add({"sequence": number})
+        lines = (tmp_path / "events.jsonl").read_text().splitlines()
+        assert [json.loads(line)["sequence"] for line in lines] == list(range(number + 1))
+    log.close()

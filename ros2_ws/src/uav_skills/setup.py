@@ -1,0 +1,24 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="uav_skills",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/uav_skills"]),
+        ("share/uav_skills", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="The Alula developers",
+    maintainer_email="alula@alula-robotics.org",
+    description="What the drone's skills do",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "navigation_skillset = uav_skills.navigation:main_navigation",
+            "perception_skillset = uav_skills.perception:main_perception",
+            "mapping_skillset = uav_skills.mapping:main_mapping",
+        ],
+    },
+)

@@ -1,0 +1,147 @@
+"""The functional layer as objects: what the paper's Listing 4 calls ``dji_guidance``.
+
+Each class wraps topics and services of one part (docs/architecture.md) on an rclpy node. Commands return at once, their
+answer comes to a callback; reports are kept and passed on to listeners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import Point
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_srvs.srv import SetBool, Trigger
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle
+from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Takeoff
+
+from uav_skills.calls import CallQueue, Reply, ignore_answer
+
+WATCH_PERIOD_S = 0.1
+LAST_FEW = QoSProfile(depth=10)
+
+
+class FunctionalPart:
+    """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._group = ReentrantCallbackGroup()
+        self._calls = CallQueue(lambda: self.now_s)
+        self._watchers: list[Callable[[], None]] = []
+        node.create_timer(WATCH_PERIOD_S, self._watch, callback_group=self._group)
+
+    @property
+    def now_s(self) -> float:
+        """Mission clock."""
+        return int(self._node.get_clock().now().nanoseconds) / 1e9
+
+    def watch(self, watcher: Callable[[], None]) -> None:
+        """Call ``watcher`` ten times a second of mission clock."""
+        self._watchers.append(watcher)
+
+    def _watch(self) -> None:
+        self._calls.tick()
+        for watcher in self._watchers:
+            watcher()
+
+    def _client(self, service_type: Any, name: str) -> Any:
+        return self._node.create_client(service_type, name, callback_group=self._group)
+
+    def _subscribe(self, message_type: Any, topic: str, callback: Callable[[Any], None]) -> None:
+        self._node.create_subscription(message_type, topic, callback, LAST_FEW, callback_group=self._group)
+
+
+class GuidanceApi(FunctionalPart):
+    """The guidance: references for position and heading, and what it says about following them."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self.state: GuidanceState | None = None
+        self._listeners: list[Callable[[GuidanceState], None]] = []
+        self._takeoff = self._client(Takeoff, "/uav_guidance/takeoff")
+        self._position = self._client(SetPositionReference, "/uav_guidance/set_position")
+        self._heading = self._client(SetHeadingReference, "/uav_guidance/set_heading")
+        self._hover = self._client(Command, "/uav_guidance/hover")
+        self._land = self._client(Command, "/uav_guidance/land")
+        self._subscribe(GuidanceState, "/uav_guidance/state", self._on_state)
+
+    def listen(self, listener: Callable[[GuidanceState], None]) -> None:
+        """Pass every state on to ``listener``."""
+        self._listeners.append(listener)
+
+    def takeoff(self, *, height_m: float, speed_m_s: float, reply: Reply) -> None:
+        """Climb to a height above home."""
+        self._calls.submit(self._takeoff, Takeoff.Request(height_m=height_m, speed_m_s=speed_m_s), reply)
+
+    def set_position(self, *, target_enu_m: Point, speed_m_s: float, along_travel: bool, reply: Reply) -> None:
+        """Fly to a point, the nose along the travel or kept where the heading reference wants it."""
+        kinds = SetPositionReference.Request
+        heading = kinds.ALONG_TRAVEL if along_travel else kinds.KEEP
+        self._calls.submit(self._position, kinds(target_enu_m=target_enu_m, speed_m_s=speed_m_s, heading=heading), reply)
+
+    def set_heading(self, *, heading_rad: float, rate_rad_s: float, lock: bool, reply: Reply) -> None:
+        """Turn on the spot, or hold a heading while position references move the vehicle."""
+        request = SetHeadingReference.Request(yaw_rad=heading_rad, rate_rad_s=rate_rad_s, lock=lock)
+        self._calls.submit(self._heading, request, reply)
+
+    def release_heading(self, reply: Reply = ignore_answer) -> None:
+        """End the holding of a heading."""
+        self._calls.submit(self._heading, SetHeadingReference.Request(release=True), reply)
+
+    def hover(self, reply: Reply = ignore_answer) -> None:
+        """Stop and stay."""
+        self._calls.submit(self._hover, Command.Request(), reply)
+
+    def land(self, reply: Reply) -> None:
+        """Land where the vehicle is."""
+        self._calls.submit(self._land, Command.Request(), reply)
+
+    def _on_state(self, state: GuidanceState) -> None:
+        self.state = state
+        for listener in self._listeners:
+            listener(state)
+
+
+class DepthApi(FunctionalPart):
+    """A sensor that looks ahead: ``node_name`` is zed_depth or lidar_obstacles."""
+
+    def __init__(self, node: Node, node_name: str) -> None:
+        super().__init__(node)
+        self.heard_s: float | None = None
+        self._enable = self._client(SetBool, f"/{node_name}/enable")
+        self._subscribe(Obstacle, f"/{node_name}/obstacle", self._on_obstacle)
+
+    def enable(self, *, on: bool, reply: Reply = ignore_answer) -> None:
+        """Start or stop the obstacle detection."""
+        self._calls.submit(self._enable, SetBool.Request(data=on), reply)
+
+    def _on_obstacle(self, _obstacle: Obstacle) -> None:
+        self.heard_s = self.now_s
+
+
+class MappingApi(FunctionalPart):
+    """The LiDAR mapping."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self.state: MappingState | None = None
+        self.registered_s: float | None = None
+        self._enable = self._client(SetBool, "/lidar_mapping/enable")
+        self._save = self._client(Trigger, "/lidar_mapping/save")
+        self._subscribe(MappingState, "/lidar_mapping/state", self._on_state)
+
+    def enable(self, *, on: bool, reply: Reply = ignore_answer) -> None:
+        """Start or stop the registration of scans."""
+        self._calls.submit(self._enable, SetBool.Request(data=on), reply)
+
+    def save(self, reply: Reply = ignore_answer) -> None:
+        """Write the map."""
+        self._calls.submit(self._save, Trigger.Request(), reply)
+
+    def _on_state(self, state: MappingState) -> None:
+        if self.state is None or state.scans != self.state.scans:
+            self.registered_s = self.now_s
+        self.state = state

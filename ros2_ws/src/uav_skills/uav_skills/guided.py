@@ -1,0 +1,162 @@
+"""What all skills of the navigation have in common: a reference given to the guidance, followed until a verdict.
+
+The life of one execution (paper, Listing 4): ``on_dispatch`` sends a command and returns; the answer brings the reference's id;
+every state of the guidance that speaks of this id is decided on; a verdict ends the execution. When the verdict is not the
+success, the vehicle is told to hover: nobody watches the motion any more. A guidance that speaks of something else, or not
+at all, ends the execution, too: the reference is lost.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from skill_runtime.hooks import SkillHooks
+
+from uav_skills.calls import Answer
+from uav_skills.checks import DEFAULT_LIMITS, Limits
+from uav_skills.decisions import DEFAULT_THRESHOLDS, Thresholds, Verdict, remaining_part, speaks_of
+
+if TYPE_CHECKING:
+    from skill_runtime.core.execution import Execution
+    from uav_msgs.msg import GuidanceState
+
+    from uav_skills.functional import GuidanceApi
+
+AUTHORITY_INVARIANT = "keep_sdk_authority"
+
+
+@dataclass
+class Motion:
+    """One execution's reference; times are seconds of mission clock."""
+
+    execution: Execution
+    reference_id: int | None = None
+    heard_s: float = 0.0
+    followed_since_s: float | None = None
+    initial: float = 0.0
+    remaining: float = 0.0
+
+
+class GuidedSkill(SkillHooks):
+    """Base of the hooks of the navigation; subclasses send their command and decide on states.
+
+    The skillset's axes and heading authorities see to it that a skill has one execution at a time.
+    """
+
+    reference: ClassVar[str] = ""
+    """What the guidance calls a reference of this skill."""
+    success: ClassVar[str] = ""
+    """The result after which the reference stays as it is."""
+    stops_when_it_fails: ClassVar[bool] = True
+    """Whether any other result tells the vehicle to hover."""
+
+    def __init__(self, guidance: GuidanceApi, limits: Limits = DEFAULT_LIMITS, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
+        super().__init__()
+        self.guidance = guidance
+        self.limits = limits
+        self.thresholds = thresholds
+        self._motion: Motion | None = None
+        self._lock = threading.Lock()
+        guidance.listen(self._on_state)
+        guidance.watch(self._on_watch)
+
+    # --- what a skill adds -------------------------------------------------------------------------------------------
+
+    def send(self, motion: Motion) -> None:
+        """Send the command; its answer goes to ``self.answer(motion)``."""
+        raise NotImplementedError
+
+    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:
+        """Say whether the execution ends; ``state`` speaks of its reference."""
+        raise NotImplementedError
+
+    def remaining(self, state: GuidanceState) -> float:
+        """Return what is still to go, in the unit of the skill, for the progress."""
+        return float(state.distance_to_go_m)
+
+    def lost(self, silent_s: float) -> Verdict:
+        """Say how the execution ends when the guidance does not speak of its reference any more."""
+        state = self.guidance.state
+        instead = "nothing" if state is None else f"{state.reference or 'nothing'} {state.reference_id}"
+        return Verdict("ABORTED", f"the guidance does not follow this reference for {silent_s:.1f} s; last it spoke of {instead}")
+
+    def stop(self) -> None:
+        """Stop the function."""
+        self.guidance.hover()
+
+    # --- hooks -------------------------------------------------------------------------------------------------------
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Send the command."""
+        motion = Motion(execution)
+        with self._lock:
+            self._motion = motion
+        self.send(motion)
+
+    def progress(self, execution: Execution) -> float:
+        """Tell how much of the way is behind."""
+        motion = self._motion
+        if motion is None or motion.execution is not execution or motion.followed_since_s is None:
+            return 0.0
+        return remaining_part(motion.remaining, motion.initial)
+
+    def on_interrupt(self, execution: Execution) -> None:
+        """Stop the vehicle."""
+        self._forget(execution)
+        self.stop()
+
+    def on_violation(self, execution: Execution) -> None:
+        """Stop the vehicle, unless it is the pilot's now: then it must not get a command of ours."""
+        self._forget(execution)
+        if execution.result != AUTHORITY_INVARIANT:
+            self.stop()
+
+    # --- what the functional layer says ------------------------------------------------------------------------------
+
+    def answer(self, motion: Motion, answer: Answer) -> None:
+        """Take the answer to the command."""
+        if self._motion is not motion:
+            return  # interrupted meanwhile: the command that stops it is in the queue behind
+        if not answer.accepted:
+            self._end(motion, Verdict("ABORTED", f"refused: {answer.reason}"), stop=False)
+            return
+        motion.heard_s = self.guidance.now_s
+        motion.reference_id = answer.reference_id
+
+    def _on_state(self, state: GuidanceState) -> None:
+        motion = self._motion
+        if motion is None or motion.reference_id is None:
+            return
+        if not speaks_of(state, kind=self.reference, reference_id=motion.reference_id):
+            return
+        motion.heard_s = self.guidance.now_s
+        motion.remaining = self.remaining(state)
+        if motion.followed_since_s is None:
+            motion.followed_since_s, motion.initial = motion.heard_s, motion.remaining
+        verdict = self.decide(motion, state)
+        if verdict is not None:
+            self._end(motion, verdict, stop=verdict.result != self.success)
+
+    def _on_watch(self) -> None:
+        motion = self._motion
+        if motion is None or motion.reference_id is None:
+            return
+        silent_s = self.guidance.now_s - motion.heard_s
+        if silent_s > self.thresholds.reference_lost_s:
+            self._end(motion, self.lost(silent_s), stop=True)
+
+    def _end(self, motion: Motion, verdict: Verdict, *, stop: bool) -> None:
+        with self._lock:
+            if self._motion is not motion:
+                return
+            self._motion = None
+        if stop and self.stops_when_it_fails:
+            self.stop()
+        motion.execution.terminate(verdict.result, verdict.message)
+
+    def _forget(self, execution: Execution) -> None:
+        with self._lock:
+            if self._motion is not None and self._motion.execution is execution:
+                self._motion = None

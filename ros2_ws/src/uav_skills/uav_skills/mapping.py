@@ -1,0 +1,59 @@
+"""Hooks of the skillset `mapping`: lidar_mapping."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+from mapping_managers.hooks import AbstractLidarMappingSkill
+
+from uav_skills.decisions import decide_mapping
+from uav_skills.functional import MappingApi
+from uav_skills.serve import serve
+from uav_skills.watched import WatchedSkill
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+    from skill_runtime.core.execution import Execution
+    from skill_runtime.hooks import SkillHooks
+
+    from uav_skills.decisions import Verdict
+
+
+class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):
+    """Register scans into the map until interrupted; then write it."""
+
+    def __init__(self, mapping: MappingApi) -> None:
+        super().__init__(mapping)
+        self._mapping = mapping
+
+    def switch_on(self, execution: Execution) -> None:
+        """Start the registration."""
+        self._mapping.enable(on=True, reply=functools.partial(self.answer, execution))
+
+    def switch_off(self) -> None:
+        """Stop the registration and write the map."""
+        self._mapping.enable(on=False)
+        self._mapping.save()
+
+    def heard_s(self) -> float | None:
+        """When the last scan was registered."""
+        return self._mapping.registered_s
+
+    def decide(self, silent_s: float) -> Verdict | None:
+        """End as ABORTED when no more are registered."""
+        return decide_mapping(silent_s)
+
+
+def make_hooks(node: Node) -> dict[str, SkillHooks]:
+    """Make the hooks of all skills of the skillset."""
+    return {"lidar_mapping": LidarMapping(MappingApi(node))}
+
+
+def main_mapping() -> None:
+    """Serve the skillset."""
+    serve("mapping", make_hooks)
+
+
+if __name__ == "__main__":
+    main_mapping()

@@ -1,0 +1,216 @@
+"""Hooks of the skillset `navigation`: takeoff, goto, goto_straight, rotate_head, lock_head, hover, land."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING
+
+from navigation_managers.hooks import (
+    AbstractGotoSkill,
+    AbstractGotoStraightSkill,
+    AbstractHoverSkill,
+    AbstractLandSkill,
+    AbstractLockHeadSkill,
+    AbstractRotateHeadSkill,
+    AbstractTakeoffSkill,
+)
+
+from uav_skills import checks, decisions
+from uav_skills.decisions import Verdict
+from uav_skills.functional import GuidanceApi
+from uav_skills.guided import GuidedSkill, Motion
+from uav_skills.serve import serve
+
+if TYPE_CHECKING:
+    from geometry_msgs.msg import Point
+    from navigation_managers.inputs import GotoInputs, GotoStraightInputs, HoverInputs, LockHeadInputs, RotateHeadInputs, TakeoffInputs
+    from rclpy.node import Node
+    from skill_runtime.core.execution import Execution
+    from skill_runtime.hooks import SkillHooks
+    from uav_msgs.msg import GuidanceState
+
+LOCK_RATE_RAD_S = 0.6
+
+
+class Takeoff(GuidedSkill, AbstractTakeoffSkill):
+    """Climb to a height above home (paper, Listings 3 and 4)."""
+
+    reference = "takeoff"
+    success = "AT_ALTITUDE"
+
+    def validate(self, inputs: TakeoffInputs) -> str:
+        """Check height and speed."""
+        return checks.check_takeoff(height_m=inputs.height, speed_m_s=inputs.speed, limits=self.limits)
+
+    def send(self, motion: Motion) -> None:
+        """Ask for the climb."""
+        inputs = motion.execution.inputs
+        self.guidance.takeoff(height_m=inputs.height, speed_m_s=inputs.speed, reply=functools.partial(self.answer, motion))
+
+    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+        """End at altitude, adrift, or blocked."""
+        return decisions.decide_takeoff(state, self.thresholds)
+
+    def remaining(self, state: GuidanceState) -> float:
+        """Metres to climb."""
+        return abs(float(state.vertical_to_go_m))
+
+
+class _Flight(GuidedSkill):
+    """Fly to a point; what both ways of doing so share."""
+
+    reference = "position"
+    success = "ARRIVED"
+    along_travel = False
+
+    def validate(self, inputs: GotoInputs | GotoStraightInputs) -> str:
+        """Check target and speed."""
+        target = inputs.target
+        return checks.check_target(target_enu_m=(target.x, target.y, target.z), speed_m_s=inputs.speed, limits=self.limits)
+
+    def send(self, motion: Motion) -> None:
+        """Give the position reference."""
+        target: Point = motion.execution.inputs.target
+        speed_m_s, reply = motion.execution.inputs.speed, functools.partial(self.answer, motion)
+        self.guidance.set_position(target_enu_m=target, speed_m_s=speed_m_s, along_travel=self.along_travel, reply=reply)
+
+    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+        """End on arrival, off the line, or blocked."""
+        return decisions.decide_goto(state, self.thresholds)
+
+
+class Goto(_Flight, AbstractGotoSkill):
+    """Fly to a point and leave the heading alone."""
+
+
+class GotoStraight(_Flight, AbstractGotoStraightSkill):
+    """Fly to a point with the nose along the travel."""
+
+    along_travel = True
+
+
+class RotateHead(GuidedSkill, AbstractRotateHeadSkill):
+    """Turn on the spot."""
+
+    reference = "heading"
+    success = "ALIGNED"
+
+    def validate(self, inputs: RotateHeadInputs) -> str:
+        """Check heading and rate."""
+        return checks.check_turn(heading_rad=inputs.heading, rate_rad_s=inputs.rate, limits=self.limits)
+
+    def send(self, motion: Motion) -> None:
+        """Give the heading reference."""
+        inputs, reply = motion.execution.inputs, functools.partial(self.answer, motion)
+        self.guidance.set_heading(heading_rad=inputs.heading, rate_rad_s=inputs.rate, lock=False, reply=reply)
+
+    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+        """End aligned, or when it does not turn on."""
+        return decisions.decide_rotation(state, self.thresholds)
+
+    def remaining(self, state: GuidanceState) -> float:
+        """Radians to turn."""
+        return abs(float(state.heading_error_rad))
+
+
+class LockHead(GuidedSkill, AbstractLockHeadSkill):
+    """Hold a heading while other skills move the vehicle, until interrupted."""
+
+    def validate(self, inputs: LockHeadInputs) -> str:
+        """Check the heading."""
+        return "" if math.isfinite(inputs.heading) else f"heading is {inputs.heading}, not a finite number"
+
+    def send(self, motion: Motion) -> None:
+        """Lock."""
+        heading_rad, reply = motion.execution.inputs.heading, functools.partial(self.answer, motion)
+        self.guidance.set_heading(heading_rad=heading_rad, rate_rad_s=LOCK_RATE_RAD_S, lock=True, reply=reply)
+
+    def stop(self) -> None:
+        """Release the heading; the motion goes on."""
+        self.guidance.release_heading()
+
+    def progress(self, execution: Execution) -> float:
+        """Tell whether the heading is held."""
+        motion = self._motion
+        return 1.0 if motion is not None and motion.execution is execution and motion.followed_since_s is not None else 0.0
+
+    def lost(self, silent_s: float) -> Verdict:
+        """End when the heading is not held: somebody else released it, or it never was."""
+        return Verdict("ABORTED", f"the heading is not locked for {silent_s:.1f} s")
+
+    def _on_state(self, state: GuidanceState) -> None:
+        """Look at the lock only: the reference that the state speaks of is that of the motion."""
+        motion = self._motion
+        if motion is not None and motion.reference_id is not None and state.heading_locked:
+            motion.heard_s = self.guidance.now_s
+            motion.followed_since_s = motion.followed_since_s or motion.heard_s
+
+
+class Hover(GuidedSkill, AbstractHoverSkill):
+    """Stay where the vehicle is for a while of mission clock."""
+
+    reference = "hover"
+    success = "DONE"
+
+    def validate(self, inputs: HoverInputs) -> str:
+        """Check the duration."""
+        return checks.check_duration(duration_s=inputs.duration, limits=self.limits)
+
+    def send(self, motion: Motion) -> None:
+        """Hover."""
+        self.guidance.hover(functools.partial(self.answer, motion))
+
+    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+        """End after the duration."""
+        return decisions.decide_hover(self._hovered_s(motion), motion.execution.inputs.duration)
+
+    def progress(self, execution: Execution) -> float:
+        """Tell how much of the time is over."""
+        motion = self._motion
+        if motion is None or motion.execution is not execution:
+            return 0.0
+        return min(1.0, self._hovered_s(motion) / motion.execution.inputs.duration)
+
+    @staticmethod
+    def _hovered_s(motion: Motion) -> float:
+        return 0.0 if motion.followed_since_s is None else motion.heard_s - motion.followed_since_s
+
+
+class Land(GuidedSkill, AbstractLandSkill):
+    """Land where the vehicle is. A landing that does not come lower goes on while the mission decides."""
+
+    reference = "land"
+    success = "LANDED"
+    stops_when_it_fails = False
+
+    def send(self, motion: Motion) -> None:
+        """Land."""
+        self.guidance.land(functools.partial(self.answer, motion))
+
+    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+        """End on the ground with the motors off, or when it does not come lower."""
+        return decisions.decide_landing(state, self.thresholds)
+
+
+def make_hooks(node: Node) -> dict[str, SkillHooks]:
+    """Make the hooks of all skills of the skillset."""
+    guidance = GuidanceApi(node)
+    return {
+        "takeoff": Takeoff(guidance),
+        "goto": Goto(guidance),
+        "goto_straight": GotoStraight(guidance),
+        "rotate_head": RotateHead(guidance),
+        "lock_head": LockHead(guidance),
+        "hover": Hover(guidance),
+        "land": Land(guidance),
+    }
+
+
+def main_navigation() -> None:
+    """Serve the skillset."""
+    serve("navigation", make_hooks)
+
+
+if __name__ == "__main__":
+    main_navigation()

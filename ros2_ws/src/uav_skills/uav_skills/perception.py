@@ -1,0 +1,70 @@
+"""Hooks of the skillset `perception`: zed_depthmap and lidar_depthmap."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING
+
+from perception_managers.hooks import AbstractLidarDepthmapSkill, AbstractZedDepthmapSkill
+from skill_runtime.hooks import SkillHooks
+
+from uav_skills.decisions import decide_watch
+from uav_skills.functional import DepthApi
+from uav_skills.serve import serve
+from uav_skills.watched import WatchedSkill
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+    from skill_runtime.core.execution import Execution
+
+    from uav_skills.decisions import Verdict
+
+
+class _Depthmap(WatchedSkill):
+    """Look ahead until interrupted. The progress is 1 once obstacle messages arrive: then somebody may fly."""
+
+    def __init__(self, sensor: str, depth: DepthApi) -> None:
+        super().__init__(depth)
+        self._sensor = sensor
+        self._depth = depth
+
+    def switch_on(self, execution: Execution) -> None:
+        """Start the obstacle detection."""
+        self._depth.enable(on=True, reply=functools.partial(self.answer, execution))
+
+    def switch_off(self) -> None:
+        """Stop the obstacle detection."""
+        self._depth.enable(on=False)
+
+    def heard_s(self) -> float | None:
+        """When the last obstacle message arrived."""
+        return self._depth.heard_s
+
+    def decide(self, silent_s: float) -> Verdict | None:
+        """End as LOST when no more arrive."""
+        return decide_watch(silent_s, self._sensor)
+
+
+class ZedDepthmap(_Depthmap, AbstractZedDepthmapSkill):
+    """Depth map of the stereo camera."""
+
+
+class LidarDepthmap(_Depthmap, AbstractLidarDepthmapSkill):
+    """Depth map of the LiDAR."""
+
+
+def make_hooks(node: Node) -> dict[str, SkillHooks]:
+    """Make the hooks of all skills of the skillset."""
+    return {
+        "zed_depthmap": ZedDepthmap("ZED", DepthApi(node, "zed_depth")),
+        "lidar_depthmap": LidarDepthmap("LiDAR", DepthApi(node, "lidar_obstacles")),
+    }
+
+
+def main_perception() -> None:
+    """Serve the skillset."""
+    serve("perception", make_hooks)
+
+
+if __name__ == "__main__":
+    main_perception()

@@ -1,0 +1,90 @@
+"""What the skills of perception and mapping have in common: a function that is switched on, and heard of while it works."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from skill_runtime.hooks import SkillHooks
+
+if TYPE_CHECKING:
+    from skill_runtime.core.execution import Execution
+
+    from uav_skills.calls import Answer
+    from uav_skills.decisions import Verdict
+    from uav_skills.functional import FunctionalPart
+
+
+class WatchedSkill(SkillHooks):
+    """Base of hooks of a skill that runs until it is interrupted, as long as its function is heard of.
+
+    An execution that starts while another one of the skill runs takes the watch over: the function is the same.
+    """
+
+    def __init__(self, part: FunctionalPart) -> None:
+        super().__init__()
+        self._part = part
+        self._execution: Execution | None = None
+        self._since_s = 0.0
+        self._lock = threading.Lock()
+        part.watch(self._on_watch)
+
+    # --- what a skill adds -------------------------------------------------------------------------------------------
+
+    def switch_on(self, execution: Execution) -> None:
+        """Start the function; its answer goes to ``self.answer(execution)``."""
+        raise NotImplementedError
+
+    def switch_off(self) -> None:
+        """Stop the function."""
+        raise NotImplementedError
+
+    def heard_s(self) -> float | None:
+        """Return when the function was last heard of, None for never."""
+        raise NotImplementedError
+
+    def decide(self, silent_s: float) -> Verdict | None:
+        """Say whether the execution ends after this silence."""
+        raise NotImplementedError
+
+    # --- hooks -------------------------------------------------------------------------------------------------------
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Switch the function on and begin to listen."""
+        with self._lock:
+            self._execution, self._since_s = execution, self._part.now_s
+        self.switch_on(execution)
+
+    def progress(self, execution: Execution) -> float:
+        """Return 1 when the function was heard of since the start, else 0."""
+        heard_s = self.heard_s()
+        return 1.0 if execution is self._execution and heard_s is not None and heard_s > self._since_s else 0.0
+
+    def on_interrupt(self, execution: Execution) -> None:
+        """Switch the function off."""
+        if self._forget(execution):
+            self.switch_off()
+
+    # --- what the functional layer says ------------------------------------------------------------------------------
+
+    def answer(self, execution: Execution, answer: Answer) -> None:
+        """Take the answer to switching on."""
+        if not answer.accepted and self._forget(execution):
+            execution.terminate("ABORTED", f"refused: {answer.reason}")
+
+    def _on_watch(self) -> None:
+        execution = self._execution
+        if execution is None:
+            return
+        heard_s = self.heard_s()
+        verdict = self.decide(self._part.now_s - max(self._since_s, self._since_s if heard_s is None else heard_s))
+        if verdict is not None and self._forget(execution):
+            self.switch_off()
+            execution.terminate(verdict.result, verdict.message)
+
+    def _forget(self, execution: Execution) -> bool:
+        """Tell whether this execution was the one that is watched, and watch no more."""
+        with self._lock:
+            mine = self._execution is execution
+            self._execution = None if mine else self._execution
+        return mine
