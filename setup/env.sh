@@ -25,6 +25,10 @@ case "$1" in
     export CMAKE_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export LD_LIBRARY_PATH="$_alula_install/lib"
     export PYTHONPATH="$_alula_install/$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support"
+    # colcon links Python packages to their sources (--symlink-install) by hooks of its setup files, which take a second to source.
+    for _alula_package in "$ALULA_ROOT"/ros2_ws/src/*/setup.py "$ALULA_ROOT"/bridge/*/setup.py "$ALULA_STATE"/generated/*/setup.py; do
+      PYTHONPATH="$PYTHONPATH:${_alula_package%/setup.py}"
+    done
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
     export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
     # 64 MB shared-memory segments: the default of 512 kB loses images and makes them slow.
@@ -33,4 +37,4 @@ case "$1" in
     ;;
   *) echo "env.sh: the world is 1 or 2, not '$1'" >&2; return 2 ;;
 esac
-unset _alula_path _alula_install _alula_site
+unset _alula_path _alula_install _alula_site _alula_package
