@@ -1,0 +1,78 @@
+"""The command: ``ros_bridge --config FILE [--stats FILE]``, alone or started by roslaunch."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+from ros_bridge import two_worlds
+from ros_bridge.config import load_config
+from ros_bridge.errors import BridgeError
+
+logger = logging.getLogger("ros_bridge")
+
+EXIT_OK, EXIT_FAILED, EXIT_CONFIG = 0, 1, 2
+DEFAULT_MASTER = "http://127.0.0.1:11311"
+LOOPBACK = ("http://127.0.0.1", "http://localhost")
+
+
+def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the command line; what roslaunch adds (``__name:=``, ``__log:=``, remappings) is rospy's business."""
+    parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
+    parser.add_argument("--config", type=Path, action="append", required=True, help="what to bridge (YAML); several files are read as one")
+    parser.add_argument("--stats", type=Path, help="write figures of all routes to this JSON file, every 2 s and at the end")
+    return parser.parse_args([argument for argument in arguments if ":=" not in argument])
+
+
+def set_up_logging() -> None:
+    """Log to standard error; rospy's logging set-up leaves it alone."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("[%(levelname)s] ros_bridge: %(message)s"))
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
+
+
+def set_up_ros1_environment() -> str:
+    """Fill in what the ROS 2 world does not set: the master, and loopback as our address if the master is there. Return the master."""
+    master_uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
+    if master_uri.startswith(LOOPBACK) and "ROS_HOSTNAME" not in os.environ:
+        os.environ.setdefault("ROS_IP", "127.0.0.1")
+    return master_uri
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the bridge until SIGINT or SIGTERM; return 0, or 1 if a type or a world is missing, or 2 if the configuration is wrong."""
+    set_up_logging()
+    options = parse_arguments(arguments)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        config = load_config(options.config)
+    except BridgeError as error:
+        logger.error("%s", error)
+        return EXIT_CONFIG
+    try:
+        two_worlds.import_ros1()
+        from ros_bridge.session import run_session
+
+        run_session(config, options.stats, stop, set_up_ros1_environment())
+    except BridgeError as error:
+        logger.error("%s", error)
+        return EXIT_FAILED
+    return EXIT_OK
+
+
+def entry() -> None:
+    """Run as a program. rospy leaves threads that sleep up to 32 s and that Python would wait for, so the process ends itself."""
+    code = main(sys.argv[1:])
+    sys.stderr.flush()
+    sys.stdout.flush()
+    os._exit(code)

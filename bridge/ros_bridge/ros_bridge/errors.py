@@ -1,0 +1,31 @@
+"""What can go wrong in the bridge, each with a message that names the value, the place and the remedy."""
+
+from __future__ import annotations
+
+
+class BridgeError(Exception):
+    """Root of all errors of this package."""
+
+
+class ConfigError(BridgeError):
+    """A configuration can't be used; the message begins with ``file:line``."""
+
+
+class WorldError(BridgeError):
+    """One of the two ROS worlds can't be imported."""
+
+
+class TypeUnknownError(BridgeError):
+    """A message or service type has no definition in one of the worlds, or none that both could have."""
+
+
+class TypeDiffersError(BridgeError):
+    """ROS 1 and ROS 2 lay out a type of the same name differently."""
+
+
+class CallError(BridgeError):
+    """A service call across the bridge got no answer; the message is meant for the caller."""
+
+
+class CallTimeoutError(CallError):
+    """The time that the configuration gives a service call is over."""

@@ -1,0 +1,186 @@
+"""Services: a bridge a service, one class for each side that the server can be on. Every call ends within its time.
+
+What a caller gets when there is no answer: in ROS 1 a service error with the reason. ROS 2 knows no such error: a response with
+a flag ``accepted`` or ``success`` gets it false and the reason in ``reason`` or ``message``; one without gets no response, so the
+caller's own timeout ends its wait (and the bridge's log says why).
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rclpy.serialization import deserialize_message, serialize_message
+
+from ros_bridge import raw
+from ros_bridge.config import ServiceRoute, World
+from ros_bridge.errors import CallError, CallTimeoutError
+from ros_bridge.ros1_call import POLL_S, Deadline, Ros1Service
+from ros_bridge.topics import interface_class
+
+import rospy  # isort: skip - after ros_bridge.raw, which fetches it
+import rosgraph  # isort: skip
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from ros_bridge.conversion import ServiceType
+    from ros_bridge.raw import RawMessage
+    from ros_bridge.stats import RouteStats
+
+logger = logging.getLogger("ros_bridge")
+
+CONCURRENT_CALLS = 4  # of one service towards ROS 1, each in a thread
+WAITING_CALLS = 32  # of one service; more are refused at once
+FLAGS = ("accepted", "success")
+TEXTS = ("reason", "message")
+
+
+class ServiceBridge(Protocol):
+    """What the node needs of a bridged service."""
+
+    def close(self) -> None:
+        """End the service and the calls under way."""
+
+
+class Ros2Server:
+    """A service whose server lives in ROS 2, offered in ROS 1. rospy gives each caller a thread; it waits here for the answer."""
+
+    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node, stats: RouteStats) -> None:
+        """Offer the service; calls are answered as soon as the node is spun."""
+        self._route = route
+        self._type = service
+        self._stats = stats
+        self._ros2_class = interface_class(route.type_name, "srv")
+        self._closed = threading.Event()
+        self._client = node.create_client(self._ros2_class, route.ros2_name)
+        self._raw_service = raw.service_class(service)
+        self._service = rospy.Service(route.ros1_name, self._raw_service, self._handle)
+
+    def _handle(self, request: RawMessage) -> RawMessage:
+        start_ns = time.perf_counter_ns()
+        try:
+            response = self._call(bytes(request.data))
+        except CallError as error:
+            self._stats.failed()
+            raise rospy.ServiceException(f"{self._route.ros1_name} by the bridge: {error}") from error
+        self._stats.crossed(time.perf_counter_ns() - start_ns)
+        answer: RawMessage = self._raw_service._response_class(response)  # noqa: SLF001 - rospy's attribute
+        return answer
+
+    def _call(self, ros1_request: bytes) -> memoryview:
+        """Call the server in ROS 2 with a serialized request; return the serialized response."""
+        deadline = Deadline.after(self._route.timeout_s)
+        request = deserialize_message(self._type.request.to_cdr(ros1_request), self._ros2_class.Request)
+        self._wait_for_server(deadline)
+        answered = threading.Event()
+        future = self._client.call_async(request)
+        future.add_done_callback(lambda _: answered.set())
+        try:
+            while not answered.wait(min(POLL_S, deadline.remaining_s("the server in ROS 2 has not answered"))):
+                self._require_alive()
+        finally:
+            self._client.remove_pending_request(future)
+        return self._type.response.to_ros1(serialize_message(future.result()))
+
+    def _wait_for_server(self, deadline: Deadline) -> None:
+        while not self._client.service_is_ready():
+            if self._closed.wait(min(POLL_S, deadline.remaining_s(f"no server for {self._route.ros2_name} in ROS 2"))):
+                raise CallError("the bridge is shutting down")
+
+    def _require_alive(self) -> None:
+        if self._closed.is_set():
+            raise CallError("the bridge is shutting down")
+        if not self._client.service_is_ready():
+            raise CallError("the server in ROS 2 ended in the call")
+
+    def close(self) -> None:
+        """Withdraw the service; callers get an error."""
+        self._closed.set()
+        self._service.shutdown()
+
+
+class _LaterResponse:
+    """Stands for a response that a thread will send."""
+
+    def __init__(self, request: Any) -> None:
+        self.request = request
+
+
+class Ros1Server:
+    """A service whose server lives in ROS 1, offered in ROS 2. The executor only takes the request; threads wait for the answer."""
+
+    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node, stats: RouteStats) -> None:
+        """Offer the service; calls are taken as soon as the node is spun."""
+        self._route = route
+        self._type = service
+        self._stats = stats
+        self._ros2_class = interface_class(route.type_name, "srv")
+        self._link = Ros1Service(route.ros1_name, service.md5sum, master_uri=rosgraph.get_master_uri(), caller_id=rospy.get_caller_id())
+        self._threads = ThreadPoolExecutor(CONCURRENT_CALLS, thread_name_prefix=route.ros2_name)
+        self._vacancies = threading.Semaphore(CONCURRENT_CALLS + WAITING_CALLS)
+        self._service = node.create_service(self._ros2_class, route.ros2_name, self._take)
+        # rclpy sends what the callback returns at once, and a callback that awaits makes its executor poll without a pause.
+        # So the callback returns a stand-in, and its sending starts the call.
+        self._send = self._service.send_response
+        self._service.send_response = self._send_later
+
+    @staticmethod
+    def _take(request: Any, _response: Any) -> _LaterResponse:
+        return _LaterResponse(request)
+
+    def _send_later(self, later: _LaterResponse, header: Any) -> None:
+        deadline = Deadline.after(self._route.timeout_s)
+        if self._vacancies.acquire(blocking=False):
+            self._threads.submit(self._answer, later.request, header, deadline)
+        else:
+            self._refuse(header, CallError(f"the bridge has {CONCURRENT_CALLS + WAITING_CALLS} calls of this service waiting"))
+
+    def _answer(self, request: Any, header: Any, deadline: Deadline) -> None:
+        start_ns = time.perf_counter_ns()
+        try:
+            ros1_request = self._type.request.to_ros1(serialize_message(request))
+            ros1_response = self._link.call(ros1_request, deadline)
+            response = deserialize_message(self._type.response.to_cdr(ros1_response), self._ros2_class.Response)
+            self._send(response, header)
+            self._stats.crossed(time.perf_counter_ns() - start_ns)
+        except CallError as error:
+            self._refuse(header, error)
+        except Exception as error:  # noqa: BLE001 - an answer that can't be read must not leave the caller without one
+            self._refuse(header, CallError(f"{type(error).__name__}: {error}"))
+        finally:
+            self._vacancies.release()
+
+    def _refuse(self, header: Any, error: CallError) -> None:
+        self._stats.failed()
+        reason = f"{self._route.ros2_name} by the bridge: {error}"
+        kind = "timed out" if isinstance(error, CallTimeoutError) else "failed"
+        logger.warning("call %s: %s", kind, reason)
+        response = refusal(self._ros2_class.Response, reason)
+        if response is not None:
+            self._send(response, header)
+
+    def close(self) -> None:
+        """End the calls under way; their callers get refusals."""
+        self._link.close()
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+
+def refusal(response_class: Any, reason: str) -> Any | None:
+    """Return a response that says no, and why, in the fields that the type has for it; None when it has no flag."""
+    response = response_class()
+    kinds = response_class.get_fields_and_field_types()
+    flag = next((name for name in FLAGS if kinds.get(name) == "boolean"), None)
+    if flag is None:
+        return None
+    setattr(response, flag, False)
+    text = next((name for name in TEXTS if kinds.get(name) == "string"), None)
+    if text is not None:
+        setattr(response, text, reason)
+    return response
+
+
+KINDS: dict[World, type[Ros2Server | Ros1Server]] = {World.ROS1: Ros1Server, World.ROS2: Ros2Server}

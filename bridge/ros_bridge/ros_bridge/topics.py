@@ -1,0 +1,143 @@
+"""Topics: a route a class, one for each direction. Bytes go in on one side and out on the other, in the thread that brought them.
+
+No message waits inside the bridge: from ROS 1 the queue is the connection's socket, of which each read keeps the newest ``depth``
+messages; towards ROS 1 each subscriber has a queue of ``depth`` messages and a thread of its own, so one that does not
+read loses its oldest messages and holds up nobody.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import time
+from typing import TYPE_CHECKING, Any
+
+from ros_bridge import raw
+from ros_bridge.config import Direction, Reliability, TopicRoute
+from ros_bridge.errors import TypeUnknownError
+
+import rospy  # isort: skip - after ros_bridge.raw, which fetches it
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from ros_bridge.conversion import MessageType
+    from ros_bridge.raw import ArrivingMessage
+    from ros_bridge.stats import RouteStats
+
+logger = logging.getLogger("ros_bridge")
+
+RECEIVE_BUFFER_BYTES = 262_144  # rospy's read size; its default of 64 kB makes 57 reads of an image
+RELIABILITY = {Reliability.RELIABLE: ReliabilityPolicy.RELIABLE, Reliability.BEST_EFFORT: ReliabilityPolicy.BEST_EFFORT}
+
+
+def interface_class(package_and_name: str, kind: str) -> Any:
+    """Return ROS 2's class of a message (kind ``msg``) or service (``srv``); rclpy takes the type support from it.
+
+    Raises:
+        TypeUnknownError: It is not installed.
+    """
+    package, name = package_and_name.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), name)
+    except (ImportError, AttributeError) as error:
+        raise TypeUnknownError(f"{package}/{kind}/{name} is not installed in the ROS 2 world: build or install {package}") from error
+
+
+def qos_profile(route: TopicRoute) -> QoSProfile:
+    """Return the quality of service of a route's ROS 2 end."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=route.depth,
+        reliability=RELIABILITY[route.reliability],
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if route.latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def complain(stats: RouteStats, name: str, error: Exception) -> None:
+    """Count a message that can't cross, and say so at the first and at every thousandth."""
+    number = stats.failed()
+    if number % 1000 == 1:
+        logger.error("%s: message %d that can't be converted: %s: %s", name, number, type(error).__name__, error)
+
+
+class Ros1ToRos2:
+    """A ROS 1 topic republished in ROS 2, in rospy's receiving thread of each connection."""
+
+    def __init__(self, route: TopicRoute, message: MessageType, node: Node, stats: RouteStats) -> None:
+        """Open both ends; messages flow from here on."""
+        self._name = route.ros1_name
+        self._depth = route.depth
+        self._to_cdr = message.to_cdr
+        self._stats = stats
+        self._publisher = node.create_publisher(interface_class(route.type_name, "msg"), route.ros2_name, qos_profile(route))
+        self._subscriber = rospy.Subscriber(
+            route.ros1_name,
+            raw.arriving_class(message),
+            self._forward,
+            buff_size=RECEIVE_BUFFER_BYTES,
+            tcp_nodelay=True,
+        )
+
+    def _forward(self, message: ArrivingMessage) -> None:
+        start_ns = time.perf_counter_ns()
+        if message.take() >= self._depth:
+            self._stats.dropped()
+            return
+        try:
+            self._publisher.publish(self._to_cdr(bytes(message.data)))
+        except Exception as error:  # noqa: BLE001 - whatever garbage a peer sends must not end the connection's thread
+            complain(self._stats, self._name, error)
+        else:
+            self._stats.crossed(time.perf_counter_ns() - start_ns)
+
+    def close(self) -> None:
+        """Stop receiving."""
+        self._subscriber.unregister()
+
+
+class Ros2ToRos1:
+    """A ROS 2 topic republished in ROS 1; the executor's thread only converts and hands over."""
+
+    def __init__(self, route: TopicRoute, message: MessageType, node: Node, stats: RouteStats) -> None:
+        """Open both ends; messages flow as soon as the node is spun."""
+        self._name = route.ros2_name
+        self._depth = route.depth
+        self._to_ros1 = message.to_ros1
+        self._stats = stats
+        self._seq = 0
+        self._raw_class = raw.message_class(message)
+        self._publisher = rospy.Publisher(route.ros1_name, self._raw_class, latch=route.latched, queue_size=route.depth, tcp_nodelay=True)
+        self._subscription = node.create_subscription(
+            interface_class(route.type_name, "msg"), route.ros2_name, self._forward, qos_profile(route), raw=True
+        )
+
+    def _forward(self, cdr: bytes) -> None:
+        start_ns = time.perf_counter_ns()
+        try:
+            self._seq += 1
+            message = self._raw_class(self._to_ros1(cdr, seq=self._seq))
+            self._count_drops()
+            self._publisher.publish(message)
+        except Exception as error:  # noqa: BLE001 - whatever garbage a peer sends must not end the executor's thread
+            complain(self._stats, self._name, error)
+        else:
+            self._stats.crossed(time.perf_counter_ns() - start_ns)
+
+    def _count_drops(self) -> None:
+        """Count the connections whose queue is full: publishing now drops the oldest message of each."""
+        full = sum(len(connection._queue) >= self._depth for connection in self._publisher.impl.connections)  # noqa: SLF001
+        if full:
+            self._stats.dropped(full)
+
+    def close(self) -> None:
+        """Stop sending."""
+        self._publisher.unregister()
+
+
+TopicBridge = Ros1ToRos2 | Ros2ToRos1
+KINDS: dict[Direction, type[Ros1ToRos2 | Ros2ToRos1]] = {
+    Direction.ROS1_TO_ROS2: Ros1ToRos2,
+    Direction.ROS2_TO_ROS1: Ros2ToRos1,
+}
