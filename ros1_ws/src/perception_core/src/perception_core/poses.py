@@ -1,0 +1,88 @@
+"""Where the vehicle was at a moment: a short memory of poses, interpolated."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+NS = 1_000_000_000
+
+
+class PoseUnavailableError(LookupError):
+    """No pose is known near enough to the asked moment."""
+
+
+@dataclass(frozen=True)
+class Poses:
+    """K poses of the vehicle in the map: ``rotation`` (K, 3, 3) base_link to map, ``position`` (K, 3) in metres."""
+
+    rotation: NDArray[np.float64]
+    position: NDArray[np.float64]
+
+    def matrix(self, index: int = 0) -> NDArray[np.float64]:
+        """Return one pose as T_map_base, (4, 4)."""
+        transform = np.eye(4)
+        transform[:3, :3] = self.rotation[index]
+        transform[:3, 3] = self.position[index]
+        return transform
+
+
+class PoseBuffer:
+    """Remember the last seconds of poses; thread-safe.
+
+    Between two poses the position is interpolated linearly and the attitude on the great arc. Outside of what is known the
+    nearest pose is taken, but only up to ``tolerance_s`` away from it: a vehicle at 1.5 m/s moves 0.2 m in 0.15 s.
+    """
+
+    def __init__(self, *, keep_s: float = 3.0, tolerance_s: float = 0.15) -> None:
+        self._keep_ns = int(keep_s * NS)
+        self._tolerance_ns = int(tolerance_s * NS)
+        self._rows: deque[tuple[int, tuple[float, ...]]] = deque()
+        self._lock = Lock()
+
+    def add(self, stamp_ns: int, position_m: Sequence[float], quat_xyzw: Sequence[float]) -> None:
+        """Remember a pose; time that jumps backwards (a restarted clock) clears the memory."""
+        with self._lock:
+            if self._rows and stamp_ns <= self._rows[-1][0]:
+                self._rows.clear()
+            self._rows.append((stamp_ns, (*position_m, *quat_xyzw)))
+            while self._rows[0][0] < stamp_ns - self._keep_ns:
+                self._rows.popleft()
+
+    def at(self, stamps_ns: Sequence[int]) -> Poses:
+        """Return the poses at these moments, in any order; raise PoseUnavailableError when one of them is out of reach."""
+        with self._lock:
+            rows = list(self._rows)
+        if not rows:
+            raise PoseUnavailableError("no pose was received yet: is the guidance running?")
+        wanted = np.asarray(stamps_ns, dtype=np.int64)
+        self._check_reach(int(wanted.min()), int(wanted.max()), rows[0][0], rows[-1][0])
+        known = np.array([stamp for stamp, _ in rows], dtype=np.int64)
+        first = max(0, int(np.searchsorted(known, wanted.min(), side="right")) - 1)
+        last = min(len(rows), int(np.searchsorted(known, wanted.max(), side="left")) + 1)
+        values = np.array([row for _, row in rows[first:last]])
+        return _interpolate(known[first:last], values, wanted)
+
+    def _check_reach(self, first_ns: int, last_ns: int, oldest_ns: int, newest_ns: int) -> None:
+        gap_ns = max(oldest_ns - first_ns, last_ns - newest_ns)
+        if gap_ns > self._tolerance_ns:
+            raise PoseUnavailableError(f"the nearest known pose is {gap_ns / NS:.2f} s away, more than {self._tolerance_ns / NS:.2f} s")
+
+
+def _interpolate(known_ns: NDArray[np.int64], values: NDArray[np.float64], wanted_ns: NDArray[np.int64]) -> Poses:
+    known_s = (known_ns - known_ns[0]) / NS
+    wanted_s = np.clip((wanted_ns - known_ns[0]) / NS, 0.0, known_s[-1])
+    attitude = Rotation.from_quat(values[:, 3:])
+    rotations = Slerp(known_s, attitude)(wanted_s) if len(known_s) > 1 else Rotation.concatenate([attitude] * len(wanted_s))
+    position = np.stack([np.interp(wanted_s, known_s, values[:, axis]) for axis in range(3)], axis=1)
+    return Poses(rotation=rotations.as_matrix(), position=position)

@@ -1,0 +1,40 @@
+"""A node's private parameters as a frozen dataclass: defaults in code, types checked, unknown names refused."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, TypeVar
+
+import rospy
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    Settings = TypeVar("Settings", bound=DataclassInstance)
+
+
+class SettingsError(ValueError):
+    """A parameter is unknown or of the wrong type."""
+
+
+def read_settings(defaults: Settings) -> Settings:
+    """Return the defaults with what the parameter server has under the node's name; raise SettingsError."""
+    return override(defaults, rospy.get_param("~", {}))
+
+
+def override(defaults: Settings, given: dict[str, object]) -> Settings:
+    """Return the defaults with these values; an int serves where a float is expected."""
+    known = {field.name: getattr(defaults, field.name) for field in fields(defaults)}
+    unknown = sorted(given.keys() - known.keys())
+    if unknown:
+        raise SettingsError(f"unknown parameter ~{unknown[0]}; known: {', '.join(sorted(known))}")
+    checked = {name: _checked(name, value, known[name]) for name, value in given.items()}
+    return replace(defaults, **checked)
+
+
+def _checked(name: str, value: object, default: object) -> object:
+    if isinstance(default, float) and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if type(value) is not type(default):
+        raise SettingsError(f"~{name} is {value!r}, expected a {type(default).__name__} like {default!r}")
+    return value

@@ -1,0 +1,54 @@
+"""What the perception nodes know of the vehicle: its poses, its motion, and where its sensors are mounted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseStamped
+from tf2_msgs.msg import TFMessage
+from uav_msgs.msg import GuidanceState
+
+from perception_core.corridor import Motion
+from perception_core.poses import PoseBuffer
+from perception_core.ros.conversions import matrix_of_transform
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+POSES_KEPT_S = 3.0
+
+
+class Vehicle:
+    """Listen to the guidance and to ``/tf_static``; the attributes are always the latest."""
+
+    def __init__(self) -> None:
+        self.poses = PoseBuffer(keep_s=POSES_KEPT_S)
+        self.motion = Motion()
+        self._mounts: dict[str, NDArray[np.float64]] = {}
+        self._subscribers = [
+            rospy.Subscriber("/uav_guidance/pose", PoseStamped, self._on_pose, queue_size=50, tcp_nodelay=True),
+            rospy.Subscriber("/uav_guidance/state", GuidanceState, self._on_state, queue_size=1, tcp_nodelay=True),
+            rospy.Subscriber("/tf_static", TFMessage, self._on_static, queue_size=10),
+        ]
+
+    def mount(self, frame: str) -> NDArray[np.float64]:
+        """Return T_base_sensor, (4, 4); raise LookupError while ``/tf_static`` has not told it."""
+        if frame not in self._mounts:
+            raise LookupError(f"/tf_static has no transform from base_link to {frame!r} (known: {sorted(self._mounts)})")
+        return self._mounts[frame]
+
+    def _on_pose(self, message: PoseStamped) -> None:
+        p, q = message.pose.position, message.pose.orientation
+        self.poses.add(message.header.stamp.to_nsec(), (p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+
+    def _on_state(self, message: GuidanceState) -> None:
+        v, t = message.velocity_enu_m_s, message.target_enu_m
+        target = (t.x, t.y, t.z) if message.reference == "position" else None
+        self.motion = Motion(velocity_enu_m_s=(v.x, v.y, v.z), target_enu_m=target)
+
+    def _on_static(self, message: TFMessage) -> None:
+        for item in message.transforms:
+            if item.header.frame_id.lstrip("/") == "base_link":
+                self._mounts[item.child_frame_id.lstrip("/")] = matrix_of_transform(item.transform)

@@ -1,0 +1,162 @@
+"""The neighbours of a perception node on a live ROS graph, on a clock that the test moves."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import rospy
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from skillset_interfaces.msg import ResourceState, ResourceStates
+from skillset_interfaces.srv import Transition, TransitionResponse
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+from uav_msgs.msg import GuidanceState, SensorHealth
+
+from perception_core.poses import NS
+from perception_core.ros import cloud_message
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+    import numpy as np
+    from numpy.typing import NDArray
+    from skillset_interfaces.srv import TransitionRequest
+
+STEP_NS = 20_000_000
+STEP_WALL_S = 0.004
+SENSOR_STEPS = 5
+FX, BASELINE_M, CX, CY = 240.0, 0.12, 240.0, 135.0
+# Rotation from the optical frame (z forward, x right) to base_link (x forward, y left).
+OPTICAL = Quaternion(-0.5, 0.5, -0.5, 0.5)
+
+
+@dataclass(frozen=True)
+class Report:
+    """One extern transition that the node asked for."""
+
+    at_ns: int
+    resource: str
+    to: str
+
+
+class FakeFlight:
+    """A context: simulated time, a hovering vehicle at ``position``, its sensors' mounts, and the skillset ``perception``.
+
+    ``at_10_hz`` is called with the stamp whenever the sensors measure; it publishes what the test wants seen.
+    """
+
+    def __init__(self, node: str, *, height_m: float = 2.0) -> None:
+        self.node = node
+        self.now_ns = 100 * NS
+        self.position = [0.0, 0.0, height_m]
+        self.velocity = [0.0, 0.0, 0.0]
+        self.target: tuple[float, float, float] | None = None
+        self.at_10_hz: Callable[[int], None] = lambda _stamp_ns: None
+        self.reports: list[Report] = []
+        self.health: list[SensorHealth] = []
+        self._states = {"zed_status": "UNKNOWN", "lidar_status": "UNKNOWN"}
+        self._steps = 0
+
+    def __enter__(self) -> FakeFlight:
+        """Go on simulated time and advertise everything."""
+        self._sim_time_before = rospy.get_param("/use_sim_time", None)
+        rospy.set_param("/use_sim_time", True)
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
+        self._pose = rospy.Publisher("/uav_guidance/pose", PoseStamped, queue_size=100)
+        self._state = rospy.Publisher("/uav_guidance/state", GuidanceState, queue_size=10)
+        self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        self._images = {side: rospy.Publisher(f"/zed/{side}/image_raw", Image, queue_size=10) for side in ("left", "right")}
+        self._infos = {side: rospy.Publisher(f"/zed/{side}/camera_info", CameraInfo, queue_size=10) for side in ("left", "right")}
+        self._cloud = rospy.Publisher("/lidar/points", PointCloud2, queue_size=10)
+        self._resources = rospy.Publisher("/perception/resource_states", ResourceStates, queue_size=10, latch=True)
+        self._transition = rospy.Service("/perception/transition", Transition, self._on_transition)
+        self._listener = rospy.Subscriber(f"/{self.node}/health", SensorHealth, self.health.append)
+        self._static.publish(_mounts())
+        self._publish_resources()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Take everything back, the node's parameters too."""
+        self._transition.shutdown("the test is over")
+        self._listener.unregister()
+        for publisher in (
+            *(self._clock, self._pose, self._state, self._static, self._cloud, self._resources),
+            *(*self._images.values(), *self._infos.values()),
+        ):
+            publisher.unregister()
+        if rospy.has_param(f"/{self.node}"):
+            rospy.delete_param(f"/{self.node}")
+        if self._sim_time_before is None:
+            rospy.delete_param("/use_sim_time")
+        else:
+            rospy.set_param("/use_sim_time", self._sim_time_before)
+
+    def connected(self) -> bool:
+        """Whether the node listens to the clock and to the guidance, and its health is heard."""
+        return bool(self._clock.get_num_connections() and self._pose.get_num_connections() and self._listener.get_num_connections())
+
+    def run(self, seconds: float, *, until: Callable[[], bool] = lambda: False) -> bool:
+        """Let simulated time pass, at most so much, and return whether the condition came true.
+
+        Time goes at most five times as fast as the wall clock, that the node can follow.
+        """
+        end_ns = self.now_ns + int(seconds * NS)
+        pace = threading.Event()
+        while self.now_ns < end_ns and not until():
+            self._step()
+            pace.wait(STEP_WALL_S)
+        return until()
+
+    def _step(self) -> None:
+        self.now_ns += STEP_NS
+        self._steps += 1
+        for axis in range(3):
+            self.position[axis] += self.velocity[axis] * STEP_NS / NS
+        stamp = rospy.Time(self.now_ns // NS, self.now_ns % NS)
+        self._clock.publish(Clock(clock=stamp))
+        pose = PoseStamped(header=Header(stamp=stamp, frame_id="map"))
+        pose.pose.position, pose.pose.orientation = Point(*self.position), Quaternion(0.0, 0.0, 0.0, 1.0)
+        self._pose.publish(pose)
+        state = GuidanceState(header=Header(stamp=stamp), position_enu_m=Point(*self.position), velocity_enu_m_s=Vector3(*self.velocity))
+        if self.target is not None:
+            state.reference, state.target_enu_m = "position", Point(*self.target)
+        self._state.publish(state)
+        if self._steps % SENSOR_STEPS == 0:
+            self.at_10_hz(self.now_ns)
+
+    def publish_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8]) -> None:
+        """Publish one image and its camera_info."""
+        header = Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id=f"zed_{side}")
+        height, width = image.shape
+        shift = -FX * BASELINE_M if side == "right" else 0.0
+        self._infos[side].publish(
+            CameraInfo(header=header, height=height, width=width, P=[FX, 0.0, CX, shift, 0.0, FX, CY, 0.0, 0.0, 0.0, 1.0, 0.0])
+        )
+        self._images[side].publish(Image(header=header, height=height, width=width, encoding="mono8", step=width, data=image.tobytes()))
+
+    def publish_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
+        """Publish one cloud of the LiDAR, whose frame is base_link's moved up by 0.1 m."""
+        self._cloud.publish(cloud_message(Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="lidar"), points))
+
+    def _on_transition(self, request: TransitionRequest) -> TransitionResponse:
+        self.reports.append(Report(self.now_ns, request.resource, request.to))
+        self._states[request.resource] = request.to
+        self._publish_resources()
+        return TransitionResponse(accepted=True, reason="", state=request.to)
+
+    def _publish_resources(self) -> None:
+        resources = [ResourceState(name=name, state=state) for name, state in self._states.items()]
+        self._resources.publish(ResourceStates(skillset="perception", resources=resources))
+
+
+def _mounts() -> TFMessage:
+    zed = TransformStamped(header=Header(frame_id="base_link"), child_frame_id="zed_left")
+    zed.transform.translation, zed.transform.rotation = Vector3(0.3, BASELINE_M / 2, 0.0), OPTICAL
+    lidar = TransformStamped(header=Header(frame_id="base_link"), child_frame_id="lidar")
+    lidar.transform.translation, lidar.transform.rotation = Vector3(0.0, 0.0, 0.1), Quaternion(0.0, 0.0, 0.0, 1.0)
+    return TFMessage(transforms=[zed, lidar])
