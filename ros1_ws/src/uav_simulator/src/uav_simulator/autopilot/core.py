@@ -1,0 +1,355 @@
+"""The autopilot proper, without any protocol: modes, arming, take-off, landing, failsafes, and the flight that follows from them.
+
+Frames: ENU and FLU. Times: simulated seconds since the clock began; the autopilot has had power for longer (``boot_before_s``).
+The numbers in brackets are those of the observed behaviours of ArduCopter that each method reproduces.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from uav_simulator.autopilot.estimator import READY_AFTER_S, Estimator
+from uav_simulator.autopilot.navigator import Goal, Navigator
+from uav_simulator.autopilot.params import Parameters
+from uav_simulator.autopilot.setpoint import RawSetpoint, read_setpoint
+from uav_simulator.autopilot.types import LandedState, Mode, Notice, Result, Severity, SystemStatus, Text
+from uav_simulator.frames import Vec3, wrap_pi
+from uav_simulator.vehicle.airframe import Airframe
+from uav_simulator.vehicle.controller import Gains, PositionLoop
+from uav_simulator.vehicle.hexacopter import Hexacopter
+
+SPOOL_UP_S = 2.4
+TOUCH_DOWN_S = 1.0  # of standing before the landing is believed
+DISARM_AFTER_LANDING_S = 0.5
+SLOW_LANDING_BELOW_M = 10.0
+NOT_ARMABLE = (Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE)
+FORCE_MAGIC = 21196.0  # param2 of MAV_CMD_COMPONENT_ARM_DISARM
+
+
+@dataclass
+class Takeoff:
+    """A take-off under way: the height to reach above the origin, when it was accepted, whether it has lifted off."""
+
+    height_m: float
+    accepted_s: float
+    lifted: bool = False
+
+
+class Autopilot:
+    """Flies a hexacopter; ``step`` every 20 ms."""
+
+    def __init__(self, vehicle: Hexacopter, airframe: Airframe, *, seed: int, boot_before_s: float) -> None:
+        self._vehicle = vehicle
+        self._boot_before_s = boot_before_s
+        self.params = Parameters()
+        self._estimator = Estimator(seed)
+        self.estimate = self._estimator.step(vehicle.body, 0.0)
+        self._position_loop = PositionLoop(airframe, Gains())
+        self._hover_n = airframe.hover_thrust_n
+        self._navigator = Navigator(self.params)
+        self.now_s = 0.0
+        self.mode = Mode.STABILIZE
+        self.armed = False
+        self.landed = True
+        self.home: Vec3 | None = None
+        self.rc_lost = False
+        self.gcs_lost = False
+        self.flown_s = 0.0
+        self._gcs_heard_s: float | None = None
+        self._takeoff: Takeoff | None = None
+        self._landed_since_s = 0.0
+        self._standing_s = 0.0
+        self._rtl_over_home_s: float | None = None
+        self._texts: list[Text] = []
+        self._notices: list[Notice] = []
+        if self.ready:
+            self.home = self.estimate.position
+
+    # --- what a client can see ---------------------------------------------------------------------------------------
+
+    @property
+    def boot_s(self) -> float:
+        """Return the seconds since power-up."""
+        return self.now_s + self._boot_before_s
+
+    @property
+    def ready(self) -> bool:
+        """Return whether the pre-arm checks pass: the estimator has settled and has a position [4]."""
+        return self.boot_s >= READY_AFTER_S
+
+    @property
+    def landed_state(self) -> LandedState:
+        """Return MAV_LANDED_STATE [8]."""
+        if self.landed:
+            return LandedState.ON_GROUND
+        if self.mode is Mode.LAND or (self.mode is Mode.RTL and self._rtl_over_home_s is not None):
+            return LandedState.LANDING
+        return LandedState.TAKING_OFF if self._takeoff else LandedState.IN_AIR
+
+    @property
+    def system_status(self) -> SystemStatus:
+        """Return MAV_STATE: critical as long as a failsafe's cause lasts [10]."""
+        if self.rc_lost or self.gcs_lost:
+            return SystemStatus.CRITICAL
+        return SystemStatus.STANDBY if self.landed else SystemStatus.ACTIVE
+
+    @property
+    def goal(self) -> Goal:
+        """Return where the autopilot is flying to."""
+        return self._navigator.goal
+
+    @property
+    def yaw_target_rad(self) -> float:
+        """Return the heading of the moving reference."""
+        return self._navigator.yaw_rad
+
+    def take_texts(self) -> list[Text]:
+        """Return the texts since the last call."""
+        texts, self._texts = self._texts, []
+        return texts
+
+    def take_notices(self) -> list[Notice]:
+        """Return the notices since the last call."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    # --- commands ----------------------------------------------------------------------------------------------------
+
+    def set_mode(self, number: int) -> Result:
+        """Change the mode: a client's wish or the pilot's switch, the autopilot makes no difference [3, 11]."""
+        if number not in [m.value for m in Mode]:
+            return self._refused(f"No such mode {number}")
+        mode = Mode(number)
+        if mode is Mode.AUTO:
+            return self._refused("Mode change to AUTO failed: init failed")
+        if mode is not self.mode:
+            self._enter(mode)
+        return Result.ACCEPTED
+
+    def arm(self, *, force: bool = False) -> Result:
+        """Arm, and make this place home [4, 9]."""
+        if self.armed:
+            return Result.ACCEPTED
+        if not self.ready and not force:
+            self._say(Severity.CRITICAL, "Arm: AHRS: EKF3 not started")
+            return self._refused("Arm: Need Position Estimate")
+        if self.mode in NOT_ARMABLE:
+            return self._refused(f"Arm: {self.mode.name} mode not armable")
+        self._say(Severity.INFO, "Arming motors")
+        self.armed = True
+        self._landed_since_s = self.now_s
+        self._set_home()
+        self._notices.append(Notice.HEARTBEAT)
+        return Result.ACCEPTED
+
+    def disarm(self, *, force: bool = False) -> Result:
+        """Stop the motors; in the air only by force [4]."""
+        if not self.armed:
+            return Result.ACCEPTED
+        if not self.landed and not force:
+            return self._refused("Disarm: vehicle is flying")
+        self._say(Severity.INFO, "Disarming motors")
+        self.armed = False
+        self._takeoff = None
+        self._notices.append(Notice.HEARTBEAT)
+        return Result.ACCEPTED
+
+    def take_off(self, height_m: float) -> Result:
+        """Begin a take-off to a height above home [5]."""
+        home_z = self.home[2] if self.home else 0.0
+        target = home_z + height_m
+        if not self.armed or self.mode is not Mode.GUIDED or not self.landed:
+            return self._refused("Takeoff: vehicle must be armed, in GUIDED and on the ground")
+        if not math.isfinite(target) or target <= self.estimate.position[2]:
+            return self._refused("Takeoff: height must be above the vehicle")
+        self._takeoff = Takeoff(target, self.now_s)
+        return Result.ACCEPTED
+
+    def condition_yaw(self, yaw_rad: float, *, relative: bool, turn: int, speed_rad_s: float) -> Result:
+        """Turn the nose (counter-clockwise from east; ``turn`` 1 counter-clockwise, -1 clockwise, 0 the shorter way) [7]."""
+        nav = self._navigator
+        if speed_rad_s > 0.0:
+            nav.yaw_speed_rad_s = min(speed_rad_s, math.radians(self.params["ATC_SLEW_YAW"] / 100.0))
+        nav.look(wrap_pi(nav.yaw_rad + yaw_rad) if relative else yaw_rad, turn=turn)
+        return Result.ACCEPTED
+
+    def change_speed(self, axis: str, speed_m_s: float) -> Result:
+        """Limit the speed `horizontal`, `up` or `down` until the mode is entered again."""
+        if not speed_m_s > 0.0:
+            return Result.DENIED
+        self._navigator.speeds_m_s[axis] = speed_m_s
+        return Result.ACCEPTED
+
+    def setpoint(self, raw: RawSetpoint) -> None:
+        """Follow a setpoint, or don't, without a word [5, 6, 7, 11]."""
+        if self.mode is not Mode.GUIDED or not self.armed:
+            return
+        self._takeoff = None
+        if self.landed:
+            return
+        nav = self._navigator
+        setpoint = read_setpoint(raw, self.estimate)
+        if setpoint is None:
+            nav.stop()
+            nav.hold_yaw()
+            return
+        p = setpoint.position
+        expires_s = math.inf if setpoint.velocity is None else self.now_s + self.params["GUID_TIMEOUT"]
+        nav.goal = Goal((p[0], p[1]) if p else None, p[2] if p else None, setpoint.velocity or (0.0, 0.0, 0.0), expires_s)
+        if setpoint.yaw_rad is not None:
+            nav.look(setpoint.yaw_rad)
+        elif setpoint.yaw_rate_rad_s is not None:
+            nav.yaw_rate = setpoint.yaw_rate_rad_s
+        else:
+            nav.look_along_travel()
+
+    # --- what happens to it ------------------------------------------------------------------------------------------
+
+    def hear_gcs(self) -> None:
+        """Note a heartbeat of the ground station [10]."""
+        self._gcs_heard_s = self.now_s
+        if self.gcs_lost:
+            self.gcs_lost = False
+            self._say(Severity.WARNING, "GCS Failsafe Cleared")
+
+    def set_rc(self, *, lost: bool) -> None:
+        """Lose or regain the remote control: RTL, which stays when it comes back [10]."""
+        if lost and not self.rc_lost and self.params["FS_THR_ENABLE"]:
+            self._say(Severity.WARNING, "Radio Failsafe")
+            self._failsafe()
+        self.rc_lost = lost
+
+    def yaw_stick(self, rate_rad_s: float) -> None:
+        """Turn by the pilot's stick until it is centred, 0 [11]."""
+        self._navigator.yaw_stick_rad_s = rate_rad_s
+        if rate_rad_s == 0.0 and self._navigator.yaw_target is not None:
+            self._navigator.look(wrap_pi(self._navigator.yaw_target))
+
+    def step(self, now_s: float, dt_s: float) -> None:
+        """Decide and set the vehicle's targets for the next period."""
+        was_ready = self.ready
+        self.now_s = now_s
+        self.estimate = self._estimator.step(self._vehicle.body, dt_s)
+        if self.ready and not was_ready:
+            self._notices.append(Notice.ORIGIN)
+            self._set_home()
+        self._watch_gcs()
+        self._progress_takeoff()
+        self._progress_rtl()
+        self._watch_touch_down(dt_s)
+        self._watch_disarm()
+        self._fly(now_s, dt_s)
+
+    # --- inside ------------------------------------------------------------------------------------------------------
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self._texts.append(Text(severity, text))
+
+    def _refused(self, text: str) -> Result:
+        self._say(Severity.CRITICAL, text)
+        return Result.FAILED
+
+    def _set_home(self) -> None:
+        self.home = self.estimate.position
+        self._notices.append(Notice.HOME)
+
+    def _enter(self, mode: Mode) -> None:
+        """Enter a mode: hold, and whatever the mode adds."""
+        self.mode = mode
+        self._notices.append(Notice.HEARTBEAT)
+        self._takeoff = None
+        self._rtl_over_home_s = None
+        nav = self._navigator
+        nav.reset_speeds()
+        nav.hold_yaw()
+        nav.stop()
+        if mode is Mode.LAND:
+            self._descend()
+        if mode is Mode.RTL and self.home:
+            nav.goal.z = max(self.estimate.position[2], self.home[2] + self.params["RTL_ALT"] / 100.0)
+
+    def _descend(self) -> None:
+        height = self.estimate.position[2] - (self.home[2] if self.home else 0.0)
+        speed = self.params["LAND_SPEED"] if height < SLOW_LANDING_BELOW_M else self.params["WPNAV_SPEED_DN"]
+        goal = self._navigator.goal
+        goal.z, goal.velocity = None, (0.0, 0.0, -speed / 100.0)
+
+    def _failsafe(self) -> None:
+        if not self.armed:
+            return
+        if self.landed:
+            self.disarm()
+        elif self.mode is not Mode.LAND:
+            self.set_mode(Mode.RTL)
+
+    def _watch_gcs(self) -> None:
+        heard = self._gcs_heard_s
+        if not self.params["FS_GCS_ENABLE"] or heard is None or self.gcs_lost or not self.armed:
+            return
+        if self.now_s - heard > self.params["FS_GCS_TIMEOUT"]:
+            self.gcs_lost = True
+            self._say(Severity.WARNING, "GCS Failsafe")
+            self._failsafe()
+
+    def _progress_takeoff(self) -> None:
+        """Spool up, lift off, and end the take-off at its height [5]."""
+        takeoff, nav = self._takeoff, self._navigator
+        if takeoff is None:
+            return
+        if not takeoff.lifted and self.now_s - takeoff.accepted_s >= SPOOL_UP_S:
+            takeoff.lifted, self.landed = True, False
+            self._position_loop.restart()
+            nav.restart(self.estimate)
+            nav.goal.z = takeoff.height_m
+        if takeoff.lifted and self.estimate.position[2] > takeoff.height_m - 0.1 and abs(self.estimate.velocity[2]) < 0.3:
+            self._takeoff = None
+
+    def _progress_rtl(self) -> None:
+        """Climb, go home, wait above it, descend."""
+        if self.mode is not Mode.RTL or self.landed or self.home is None:
+            return
+        nav, p = self._navigator, self.estimate.position
+        if self._rtl_over_home_s is not None:
+            if self.now_s - self._rtl_over_home_s > self.params["RTL_LOIT_TIME"] / 1000.0:
+                self._descend()
+        elif nav.goal.z is not None and p[2] > nav.goal.z - 0.2:
+            nav.goal.xy = (self.home[0], self.home[1])
+            if math.dist(p[:2], self.home[:2]) < 0.5:
+                self._rtl_over_home_s = self.now_s
+
+    def _watch_touch_down(self, dt_s: float) -> None:
+        """Believe a landing after standing for a while at low thrust; not during a take-off [8]."""
+        body, target = self._vehicle.body, self._vehicle.target
+        pressed = target is None or target.thrust_n < 0.9 * self._hover_n
+        if self.landed or self._takeoff or not body.on_ground or not pressed:
+            self._standing_s = 0.0
+            return
+        self._navigator.keep_above(self.estimate.position[2] - 0.5)
+        self._standing_s += dt_s
+        if self._standing_s >= TOUCH_DOWN_S:
+            self.landed = True
+            self._landed_since_s = self.now_s
+            self._position_loop.restart()
+
+    def _watch_disarm(self) -> None:
+        """Disarm after a landing by LAND or RTL, or after a while on the ground [4, 8]."""
+        if not self.armed or not self.landed or self._takeoff:
+            return
+        landing = self.mode in {Mode.LAND, Mode.RTL}
+        delay = DISARM_AFTER_LANDING_S if landing else self.params["DISARM_DELAY"]
+        if self.now_s - self._landed_since_s >= delay:
+            self.disarm()
+
+    def _fly(self, now_s: float, dt_s: float) -> None:
+        if not self.armed or self.landed:
+            self._vehicle.target = None
+            if not self.armed and not self.landed:
+                self.landed = self._vehicle.body.on_ground  # fallen after a forced disarm
+            if self.landed:
+                self._navigator.restart(self.estimate)
+            return
+        self.flown_s += dt_s
+        reference = self._navigator.step(now_s, dt_s)
+        reference = replace(reference, yaw_rad=reference.yaw_rad - self.estimate.yaw_error_rad)
+        self._vehicle.target = self._position_loop.step(reference, self.estimate.position, self.estimate.velocity, dt_s)

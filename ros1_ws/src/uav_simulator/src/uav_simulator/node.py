@@ -1,0 +1,139 @@
+"""The simulator's node: steps simulated time, in lockstep with those who work for it, and publishes what happens."""
+
+from __future__ import annotations
+
+import json
+import queue
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import rospy
+from geometry_msgs.msg import PoseStamped
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
+
+from uav_simulator import ros_messages
+from uav_simulator.autopilot.tcp_link import TcpLink
+from uav_simulator.drivers import Drivers
+from uav_simulator.errors import ConfigError, SimulatorError
+from uav_simulator.pacing import Pacer, header_stamp_s
+from uav_simulator.pilot_hooks import apply_pilot_word
+from uav_simulator.sensors.faults import parse_faults
+from uav_simulator.settings import Settings, settings_from_params
+from uav_simulator.simulation import TICK_S, Simulation
+from uav_simulator.world.config import load_world_config
+from uav_simulator.world.ply import write_mesh
+
+POSE_PERIOD_NS = 50_000_000
+STATE_PERIOD_NS = 1_000_000_000
+WAIT_S = 0.002  # longest nap while time stands still; MAVLink wakes it
+CATCH_UP_S = 0.25  # a delay of more is not made up for
+
+
+class SimulatorNode:
+    """Wires the simulation to ROS and to a MAVLink client."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        config = load_world_config(Path(settings.world))
+        faults = parse_faults(settings.faults)
+        self._simulation = Simulation(config, seed=settings.seed, faults=faults, boot_before_s=settings.boot_before_s)
+        if settings.world_path:
+            write_mesh(Path(settings.world_path), self._simulation.world.vertices, self._simulation.world.triangles)
+        self._link = TcpLink(self._simulation.endpoint, settings.mavlink_port)
+        self._pacer = Pacer(limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
+        self._pilot_words: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._pose = rospy.Publisher("/sim/true_pose", PoseStamped, queue_size=5)
+        self._state = rospy.Publisher("/sim/state", String, queue_size=5, latch=True)
+        self._tf_static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        self._drivers = Drivers(self._simulation)
+        self._pose_due_ns = self._state_due_ns = 0
+        self._last_state = self._simulation.state
+        self._left_out: list[str] = []
+        rospy.set_param("~mavlink_port", self._link.port)
+        rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
+        rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
+        for topic in settings.pace_topics:
+            rospy.Subscriber(topic, rospy.AnyMsg, self._on_paced, callback_args=topic, tcp_nodelay=True)
+
+    def run(self) -> None:
+        """Step until ROS shuts down."""
+        self._tf_static.publish(ros_messages.static_transforms(0))
+        due = time.monotonic()
+        while not rospy.is_shutdown():
+            self._obey_pilot()
+            self._simulation.tick()
+            self._publish()
+            if self._settings.rate > 0.0:
+                due = max(due + TICK_S / self._settings.rate, time.monotonic() - CATCH_UP_S)
+            self._wait(due)
+        self._link.close()
+
+    def _wait(self, due: float) -> None:
+        """Serve the link until wall time and everybody's work have come far enough."""
+        while not rospy.is_shutdown():
+            now = time.monotonic()
+            held = not self._pacer.may_advance(self._simulation.now_s, now)
+            rest = max(due - now, WAIT_S if held else 0.0)
+            self._link.serve(rest)
+            if not held and rest <= 0.0:
+                break
+        self._tell_left_out()
+
+    def _publish(self) -> None:
+        """Publish the tick's clock, truth and measurements."""
+        simulation = self._simulation
+        self._link.serve()  # an answer to the new state may leave before the images are made
+        self._clock.publish(Clock(clock=ros_messages.ros_time(simulation.now_ns)))
+        if simulation.now_ns >= self._pose_due_ns:
+            self._pose_due_ns += POSE_PERIOD_NS
+            self._pose.publish(ros_messages.pose_stamped(simulation.pose, simulation.now_ns))
+        self._publish_state()
+        self._drivers.publish_due()
+
+    def _publish_state(self) -> None:
+        """Publish the state once a second, and at once when something other than time, way and clearance has changed."""
+        state = self._simulation.state
+        last = replace(self._last_state, t_s=state.t_s, distance_m=state.distance_m, min_clearance_m=state.min_clearance_m)
+        if self._simulation.now_ns >= self._state_due_ns or state != last:
+            self._state_due_ns = self._simulation.now_ns + STATE_PERIOD_NS
+            self._state.publish(String(json.dumps(asdict(state))))
+        self._last_state = state
+
+    def _obey_pilot(self) -> None:
+        while not self._pilot_words.empty():
+            try:
+                apply_pilot_word(self._pilot_words.get(), self._simulation.autopilot, self._simulation.endpoint)
+            except ConfigError as error:
+                rospy.logwarn(str(error))
+
+    def _on_set_sensor(self, request: SetSensorRequest) -> SetSensorResponse:
+        try:
+            self._simulation.sensors.set(request.sensor, request.mode, self._simulation.now_s)
+        except ConfigError as error:
+            return SetSensorResponse(accepted=False, reason=str(error))
+        return SetSensorResponse(accepted=True, reason="")
+
+    def _on_paced(self, message: rospy.AnyMsg, topic: str) -> None:
+        self._pacer.heard(topic, header_stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
+
+    def _tell_left_out(self) -> None:
+        left_out = self._pacer.left_out
+        for topic in set(left_out) - set(self._left_out):
+            rospy.logwarn(f"simulated time no longer waits for {topic}: silent for {self._settings.pace_patience_s} s")
+        self._left_out = left_out
+
+
+def main() -> None:
+    """Run the node until ROS ends it; a wrong parameter ends it with one line."""
+    rospy.init_node("uav_simulator")
+    try:
+        node = SimulatorNode(settings_from_params(rospy.get_param("~", {})))
+    except SimulatorError as error:
+        rospy.logfatal(str(error))
+        raise SystemExit(2) from error
+    node.run()

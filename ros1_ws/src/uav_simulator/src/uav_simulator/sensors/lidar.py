@@ -1,0 +1,63 @@
+"""A spinning LiDAR of 16 beams whose scan plane is across the direction of flight; each column is cast from the pose of its moment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_simulator.sensors.mounts import LIDAR
+from uav_simulator.sensors.pose_track import PoseTrack
+from uav_simulator.world.scene import NO_HIT, World
+
+Floats = NDArray[np.float64]
+POINT_DTYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("time", "<f4")])
+
+
+@dataclass(frozen=True)
+class LidarSpec:
+    """Beams evenly within +-15 degrees of the scan plane, 720 columns a turn, ten turns a second."""
+
+    beams: int = 16
+    half_angle_deg: float = 15.0
+    columns: int = 720
+    period_s: float = 0.1
+    min_range_m: float = 0.4
+    max_range_m: float = 25.0
+    noise_m: float = 0.02
+
+
+class Lidar:
+    """Scans a world along a track of poses."""
+
+    def __init__(self, world: World, seed: int, spec: LidarSpec | None = None) -> None:
+        self.spec = spec or LidarSpec()
+        self._world = world
+        self._rng = np.random.default_rng([seed, 5])
+        spec = self.spec
+        azimuth = np.arange(spec.columns) * (2.0 * math.pi / spec.columns)
+        elevation = np.radians(np.linspace(-spec.half_angle_deg, spec.half_angle_deg, spec.beams))
+        a, e = np.meshgrid(azimuth, elevation, indexing="ij")
+        self._directions = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis=-1)  # (columns, beams, 3), sensor
+        self._offsets_s = np.arange(spec.columns) * (spec.period_s / spec.columns)
+        self._body_directions = self._directions @ LIDAR.matrix.T
+
+    def scan(self, track: PoseTrack, start_s: float) -> NDArray[np.void]:
+        """Return the returns of the sweep that began at ``start_s``: POINT_DTYPE in the sensor's frame at each point's own time."""
+        positions, rotations = track.at(start_s + self._offsets_s)
+        rays = np.empty((*self._directions.shape[:2], 6), dtype=np.float32)
+        rays[..., :3] = (positions + rotations @ np.asarray(LIDAR.translation))[:, None, :]
+        rays[..., 3:] = np.einsum("cij,cbj->cbi", rotations, self._body_directions)
+        hits = self._world.cast(rays)
+        spec = self.spec
+        seen = (hits.triangle != NO_HIT) & (hits.range_m >= spec.min_range_m) & (hits.range_m <= spec.max_range_m)
+        triangles = hits.triangle[seen]
+        ranges = hits.range_m[seen] + self._rng.normal(0.0, spec.noise_m, len(triangles))
+        facing = np.abs(np.einsum("ij,ij->i", self._world.normals[triangles], rays[seen][:, 3:]))
+        points = np.empty(len(triangles), dtype=POINT_DTYPE)
+        points["x"], points["y"], points["z"] = (self._directions[seen] * ranges[:, None]).T
+        points["intensity"] = 255.0 * self._world.brightness[triangles] * facing
+        points["time"] = np.broadcast_to(self._offsets_s[:, None], seen.shape)[seen]
+        return points

@@ -1,0 +1,130 @@
+"""A rectified stereo pair of grey images.
+
+A ray is cast for each block of 2 x 2 pixels of both eyes, in one call; inside a block every pixel is met exactly with the plane
+of the block's triangle. That is a quarter of the rays at the price of outlines that are rough by a pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_simulator.sensors.mounts import STEREO_BASELINE_M, ZED_LEFT, ZED_RIGHT, rotation_matrix
+from uav_simulator.sensors.pose_track import Pose
+from uav_simulator.sensors.texture import GRAINS, layer, noise_tiles, surface_table
+from uav_simulator.world.scene import NO_HIT, World
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+Image = NDArray[np.uint8]
+
+SKY_M = 2000.0
+SKY_GREY = 190.0
+PIXEL_NOISE = 2.0  # grey values, standard deviation
+NOISE_BANK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """The intrinsics of both eyes: 480 x 270 pixels, 90 degrees across."""
+
+    width: int = 480
+    height: int = 270
+    focal_px: float = 240.0
+    baseline_m: float = STEREO_BASELINE_M
+
+    @property
+    def centre_px(self) -> tuple[float, float]:
+        """Return the principal point, the image's centre."""
+        return (self.width - 1) / 2.0, (self.height - 1) / 2.0
+
+
+class StereoPair:
+    """Renders what both eyes see from a pose."""
+
+    def __init__(self, world: World, seed: int, camera: Pinhole | None = None) -> None:
+        self.camera = camera or Pinhole()
+        self._world = world
+        self._table = surface_table(world, seed)
+        self._tiles = noise_tiles(seed)
+        self._rng = np.random.default_rng([seed, 3])
+        self._noise = np.random.default_rng([seed, 4]).normal(0.0, PIXEL_NOISE, NOISE_BANK).astype(np.float32)
+        cx, cy = self.camera.centre_px
+        x = (np.arange(0, self.camera.width, 2) + 0.5 - cx) / self.camera.focal_px
+        y = (np.arange(0, self.camera.height, 2) + 0.5 - cy) / self.camera.focal_px
+        self._x, self._y = x.astype(np.float32)[None, None, :], y.astype(np.float32)[None, :, None]
+        gx, gy = np.meshgrid(x, y)
+        self._rays_camera = np.stack([gx, gy, np.ones_like(gx)], axis=-1)
+
+    def render(self, pose: Pose) -> tuple[Image, Image]:
+        """Return the left and the right image, (height, width) uint8."""
+        r_map_body = rotation_matrix(pose.attitude)
+        r_map_camera = r_map_body @ ZED_LEFT.matrix
+        eyes = np.array([np.asarray(pose.position) + r_map_body @ np.asarray(m.translation) for m in (ZED_LEFT, ZED_RIGHT)])
+        index, depth = self._cast(r_map_camera, eyes)
+        grey = self._shade(index, depth, self._coefficients(r_map_camera, eyes))
+        start = int(self._rng.integers(0, NOISE_BANK - grey.size))
+        grey += self._noise[start : start + grey.size].reshape(grey.shape)
+        images = np.clip(grey, 0.0, 255.0).astype(np.uint8)
+        return images[0], images[1]
+
+    def _cast(self, r_map_camera: Floats, eyes: Floats) -> tuple[NDArray[np.intp], Floats32]:
+        """Return per eye and block the row in the coefficients and the depth (m), (2, height/2, width/2)."""
+        directions = self._rays_camera @ r_map_camera.T
+        rays = np.empty((2, *directions.shape[:2], 6), dtype=np.float32)
+        rays[..., :3] = eyes[:, None, None, :]
+        rays[..., 3:] = directions  # z of 1 in the camera: the hit's parameter is its depth
+        hits = self._world.cast(rays)
+        rows = len(self._table.grey) + 1
+        index = np.where(hits.triangle == NO_HIT, rows - 1, hits.triangle).astype(np.intp)
+        index[1] += rows
+        return index, np.minimum(hits.range_m, SKY_M)
+
+    def _coefficients(self, r_map_camera: Floats, eyes: Floats) -> Floats32:
+        """Return per eye and triangle, and a last row for the sky, the coefficients of depth and texture coordinates, (13, 2 rows).
+
+        With a pixel's direction d = (x, y, 1): depth = c / (n d), u = u0 + depth (a d), v = v0 + depth (b d).
+        """
+        t, world = self._table, self._world
+        parts = []
+        for eye in eyes:
+            columns = [
+                *(world.normals @ r_map_camera).T,
+                world.plane_offsets - world.normals @ eye,
+                *(t.axis_u @ r_map_camera).T,
+                t.axis_u @ eye + t.offset_u,
+                *(t.axis_v @ r_map_camera).T,
+                t.axis_v @ eye + t.offset_v,
+                t.grey,
+            ]
+            sky = np.array([0.0, 0.0, 1.0, SKY_M, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, SKY_GREY])
+            parts.append(np.concatenate([np.array(columns), sky[:, None]], axis=1))
+        return np.concatenate(parts, axis=1).astype(np.float32)
+
+    def _shade(self, index: NDArray[np.intp], depth: Floats32, table: Floats32) -> Floats32:
+        """Return both images as float32 grey values, (2, height, width)."""
+        shape = (2, self.camera.height, self.camera.width)
+        u, v, spread, grey = (np.empty(shape, dtype=np.float32) for _ in range(4))
+        nx, ny, nz, c, ax, ay, az, u0, bx, by, bz, v0, base = (np.take(column, index) for column in table)
+        low, high = 0.9 * depth, 1.1 * depth
+        half = 0.5 / self.camera.focal_px
+        for row in (0, 1):
+            for column in (0, 1):
+                x, y = self._x + half * (2 * column - 1), self._y + half * (2 * row - 1)
+                slope = nx * x + ny * y + nz
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    z = np.fmin(np.fmax(c / slope, low), high)
+                here = (slice(None), slice(row, None, 2), slice(column, None, 2))
+                u[here] = u0 + z * (ax * x + ay * y + az)
+                v[here] = v0 + z * (bx * x + by * y + bz)
+                # Metres of surface under one pixel, along the steeper direction.
+                spread[here] = z / (self.camera.focal_px * np.maximum(np.abs(slope), 0.02))
+                grey[here] = base
+        for eye in (0, 1):
+            for grain, tile in zip(GRAINS, self._tiles, strict=True):
+                weight = grain.contrast * np.clip(2.0 - spread[eye] / (1.5 * grain.texel_m), 0.0, 1.0)
+                sky_safe = np.abs(u[eye]) < 1e4
+                grey[eye] += weight * layer(tile, np.where(sky_safe, u[eye], 0.0), v[eye], grain)
+        return grey

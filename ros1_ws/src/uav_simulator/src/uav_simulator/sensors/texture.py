@@ -1,0 +1,77 @@
+"""What surfaces look like: noise of several grain sizes, fixed to the surface, the same for both eyes of the stereo pair.
+
+Each triangle has a plane of texture coordinates in metres; triangles of one plane share them, so that a wall is not cut along
+its diagonal. A grain that is finer than a pixel at some place is faded out there, for it would only flicker.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from uav_simulator.world.scene import World
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+TILE = 1024
+SUN = np.array([0.35, -0.55, 0.76])
+
+
+@dataclass(frozen=True)
+class Grain:
+    """One layer of noise: metres per texel and contrast in grey values."""
+
+    texel_m: float
+    contrast: float
+
+
+GRAINS = (Grain(0.025, 60.0), Grain(0.12, 50.0), Grain(0.7, 36.0))
+
+
+@dataclass(frozen=True)
+class SurfaceTable:
+    """Per triangle: two texture axes (M, 3) and offsets (M,) in metres, mean grey value (M,)."""
+
+    axis_u: Floats
+    axis_v: Floats
+    offset_u: Floats
+    offset_v: Floats
+    grey: Floats
+
+
+def surface_table(world: World, seed: int) -> SurfaceTable:
+    """Return texture planes and shades of a world's triangles."""
+    n = world.normals
+    upright = np.abs(n[:, 2]) < 0.9
+    up = np.where(upright[:, None], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
+    axis_u = np.cross(up, n)
+    axis_u /= np.linalg.norm(axis_u, axis=1, keepdims=True)
+    axis_v = np.cross(n, axis_u)
+    # The offset depends on the plane only, so triangles of one wall continue one another.
+    plane = np.round(np.column_stack([n, world.plane_offsets]), 3) @ np.array([12.9898, 78.233, 37.719, 53.117])
+    offset_u = np.modf(np.sin(plane + seed) * 43758.5453)[0] * 20.0
+    offset_v = np.modf(np.sin(plane * 1.7 + seed) * 24634.6345)[0] * 20.0
+    light = 0.55 + 0.45 * np.clip(n @ SUN, 0.0, 1.0)
+    return SurfaceTable(axis_u, axis_v, offset_u, offset_v, 255.0 * world.brightness * light)
+
+
+def noise_tiles(seed: int) -> list[NDArray[np.uint8]]:
+    """Return one tile of soft noise per grain, (1024, 1024) uint8, that joins itself at its edges."""
+    rng = np.random.default_rng([seed, 2])
+    tiles = []
+    for _ in GRAINS:
+        raw = rng.normal(size=(TILE, TILE)).astype(np.float32)
+        padded = cv2.copyMakeBorder(raw, 4, 4, 4, 4, cv2.BORDER_WRAP)
+        soft = cv2.GaussianBlur(padded, (0, 0), 0.9)[4:-4, 4:-4]
+        tiles.append(np.clip(128.0 + 60.0 * soft / soft.std(), 0.0, 255.0).astype(np.uint8))
+    return tiles
+
+
+def layer(tile: NDArray[np.uint8], u_m: Floats32, v_m: Floats32, grain: Grain) -> Floats32:
+    """Look a layer of noise up at texture coordinates in metres, (H, W) float32; -1..1."""
+    scale = 1.0 / grain.texel_m
+    grey = cv2.remap(tile, u_m * scale, v_m * scale, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return (grey.astype(np.float32) - 128.0) * (1.0 / 128.0)

@@ -1,0 +1,53 @@
+"""The node's parameters with their defaults; an unknown private parameter is an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from uav_simulator.errors import ConfigError
+
+PACKAGE = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Private parameters of the node."""
+
+    seed: int = 0
+    world: str = str(PACKAGE / "config" / "yard.yaml")  # description of the world
+    world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
+    faults: str = ""  # SENSOR[:MODE][@SECONDS after lift-off],...
+    mavlink_port: int = 5760  # on loopback; 0: any free one, told by /sim/state's neighbour ~mavlink_port
+    rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
+    pace_topics: tuple[str, ...] = ()  # topics of those who work for simulated time
+    pace_limit_s: float = 0.3
+    pace_patience_s: float = 2.0
+    boot_before_s: float = 60.0  # how long the autopilot has had power when the clock starts
+
+
+def settings_from_params(params: dict[str, Any]) -> Settings:
+    """Read and check parameters; raises ConfigError naming the wrong one."""
+    types = {f.name: type(getattr(Settings(), f.name)) for f in fields(Settings)}
+    unknown = sorted(set(params) - set(types))
+    if unknown:
+        raise ConfigError(f"unknown parameter ~{unknown[0]}; known are {', '.join(types)}")
+    values = {name: _converted(name, value, types[name]) for name, value in params.items()}
+    settings = Settings(**values)
+    for name in ("seed", "rate", "pace_limit_s", "pace_patience_s", "boot_before_s"):
+        if getattr(settings, name) < 0:
+            raise ConfigError(f"parameter ~{name}: {getattr(settings, name)} must not be negative")
+    return settings
+
+
+def _converted(name: str, value: Any, kind: type) -> Any:
+    """Return the value in its type; a list of topics may also come as words between commas or blanks."""
+    try:
+        if kind is tuple:
+            return tuple(value.replace(",", " ").split() if isinstance(value, str) else (str(v) for v in value))
+        if kind is int and (isinstance(value, bool) or float(value) != int(value)):
+            raise ValueError
+        return kind(value)
+    except (TypeError, ValueError):
+        raise ConfigError(f"parameter ~{name}: {value!r} is no {kind.__name__}") from None

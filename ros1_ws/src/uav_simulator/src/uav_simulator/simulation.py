@@ -1,0 +1,104 @@
+"""The whole simulation without ROS: a world, a vehicle with its autopilot in it, and the sensors that see it, on a clock of its own.
+
+One tick is 20 ms. Everything that varies is drawn from generators of the seed, each for one purpose, so the same seed and the
+same commands give the same flight, images and clouds.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from uav_simulator.autopilot.core import Autopilot
+from uav_simulator.autopilot.endpoint import Endpoint
+from uav_simulator.autopilot.types import LandedState
+from uav_simulator.contacts import ContactMonitor
+from uav_simulator.sensors.faults import Fault, SensorBoard
+from uav_simulator.sensors.imu import Imu
+from uav_simulator.sensors.lidar import Lidar
+from uav_simulator.sensors.pose_track import Pose, PoseTrack
+from uav_simulator.sensors.stereo import StereoPair
+from uav_simulator.vehicle.airframe import Airframe
+from uav_simulator.vehicle.hexacopter import Hexacopter
+from uav_simulator.vehicle.noise import Wind
+from uav_simulator.world.config import WorldConfig
+from uav_simulator.world.scene import World
+from uav_simulator.world.yard import build_parts
+
+TICK_NS = 20_000_000
+TICK_S = TICK_NS * 1e-9
+
+
+@dataclass(frozen=True)
+class State:
+    """What the simulator knows and nobody in the air does; times on the simulated clock."""
+
+    t_s: float
+    lift_off_s: float | None
+    collisions: int
+    min_clearance_m: float | None
+    distance_m: float
+    sensors: dict[str, str]
+    faults: list[dict[str, str | float]]
+
+
+class Simulation:
+    """Steps everything; who runs it decides when, and asks for the measurements it wants."""
+
+    def __init__(self, config: WorldConfig, *, seed: int, faults: list[Fault], boot_before_s: float) -> None:
+        airframe = Airframe()
+        self.now_ns = 0
+        self.world = World(build_parts(config, seed))
+        self.vehicle = Hexacopter(airframe, Wind(seed=seed), config.home, yaw_rad=0.0)
+        self.autopilot = Autopilot(self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s)
+        self.endpoint = Endpoint(self.autopilot)
+        self.stereo = StereoPair(self.world, seed)
+        self.lidar = Lidar(self.world, seed)
+        self.imu = Imu(seed)
+        self.sensors = SensorBoard(faults)
+        self.track = PoseTrack()
+        self._contacts = ContactMonitor(self.world, airframe.radius_m)
+        self.lift_off_s: float | None = None
+        self._distance_m = 0.0
+        self.track.add(self.pose)
+
+    @property
+    def now_s(self) -> float:
+        """Return the simulated time in seconds."""
+        return self.now_ns * 1e-9
+
+    @property
+    def pose(self) -> Pose:
+        """Return the true pose of this moment."""
+        return Pose(self.now_s, self.vehicle.body.position, self.vehicle.body.attitude)
+
+    def tick(self) -> None:
+        """Advance by 20 ms: the vehicle moves, the autopilot decides, contacts and faults are looked after."""
+        body = self.vehicle.body
+        before = body.position
+        self.vehicle.advance(TICK_S)
+        self.now_ns += TICK_NS
+        self.autopilot.step(self.now_s, TICK_S)
+        self.endpoint.step()
+        landed_state = self.autopilot.landed_state
+        if self.lift_off_s is None and landed_state is not LandedState.ON_GROUND:
+            self.lift_off_s = self.now_s
+        if landed_state is not LandedState.ON_GROUND:
+            self._distance_m += math.dist(before, body.position)
+        self._contacts.step(body, landed_state)
+        self.sensors.apply_due(self.now_s, self.lift_off_s)
+        self.track.add(self.pose)
+
+    @property
+    def state(self) -> State:
+        """Return the present state for ``/sim/state``."""
+        clearance = self._contacts.min_clearance_m
+        return State(
+            t_s=round(self.now_s, 3),
+            lift_off_s=None if self.lift_off_s is None else round(self.lift_off_s, 3),
+            collisions=self._contacts.collisions,
+            min_clearance_m=round(clearance, 3) if math.isfinite(clearance) else None,
+            distance_m=round(self._distance_m, 2),
+            sensors=self.sensors.modes,
+            faults=[{"sensor": r.sensor, "mode": r.mode.value, "t_s": round(r.t_s, 3)} for r in self.sensors.records],
+        )

@@ -1,0 +1,1 @@
+"""The hexacopter: rigid body, rotors, wind and the cascaded controller that flies it."""

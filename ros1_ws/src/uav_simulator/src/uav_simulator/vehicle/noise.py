@@ -1,0 +1,40 @@
+"""Slowly varying noise: a first-order Gauss-Markov process in three axes, seeded."""
+
+from __future__ import annotations
+
+import math
+import random
+
+from uav_simulator.frames import Vec3
+
+
+class SlowNoise:
+    """Three independent processes of standard deviation ``sigma`` and correlation time ``tau_s``, clipped at ``limit``."""
+
+    def __init__(self, *, sigma: float, tau_s: float, limit: float, seed: str) -> None:
+        self._sigma, self._tau_s, self._limit = sigma, tau_s, limit
+        self._random = random.Random(seed)  # noqa: S311 - a repeatable noise, not a secret
+        self.value: Vec3 = (0.0, 0.0, 0.0)
+
+    def step(self, dt_s: float) -> Vec3:
+        """Advance and return the new value."""
+        keep = math.exp(-dt_s / self._tau_s)
+        kick = self._sigma * math.sqrt(1.0 - keep * keep)
+        gauss, limit = self._random.gauss, self._limit
+        x, y, z = (max(-limit, min(limit, v * keep + gauss(0.0, kick))) for v in self.value)
+        self.value = (x, y, z)
+        return self.value
+
+
+class Wind:
+    """A mild mean wind with gusts, in map, m/s; its direction depends on the seed."""
+
+    def __init__(self, *, seed: int, mean_m_s: float = 1.0, gust_m_s: float = 0.5) -> None:
+        direction = random.Random(f"wind {seed}").uniform(-math.pi, math.pi)  # noqa: S311 - repeatable on purpose
+        self._mean = (mean_m_s * math.cos(direction), mean_m_s * math.sin(direction))
+        self._gusts = SlowNoise(sigma=gust_m_s, tau_s=1.5, limit=3.0 * gust_m_s, seed=f"gusts {seed}")
+
+    def step(self, dt_s: float) -> Vec3:
+        """Advance and return the wind; up and down it is a third as strong."""
+        x, y, z = self._gusts.step(dt_s)
+        return self._mean[0] + x, self._mean[1] + y, z / 3.0
