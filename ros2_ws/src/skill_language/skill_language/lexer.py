@@ -59,14 +59,21 @@ class Source:
             self._lines = self.text.split("\n")
         return self._lines[number - 1] if 0 < number <= len(self._lines) else ""
 
+    @property
+    def full(self) -> bool:
+        """So much is wrong that nobody wants to know more."""
+        return len(self.diagnostics) > MAX_ERRORS
+
     def span(self, token: Token) -> Span:
         """Return the place of a token."""
         return Span(self.file, token.line, token.column, token.column + max(1, len(token.text)))
 
     def report(self, code: str, message: str, span: Span, *, hint: str = "", expected: tuple[str, ...] = ()) -> None:
-        """Add an error, once for a place."""
-        if any(known.code == code and known.span == span for known in self.diagnostics[-MAX_ERRORS:]):
+        """Add an error, once for a place; ignore all that come after too many."""
+        if self.full or any(known.code == code and known.span == span for known in self.diagnostics):
             return
+        if len(self.diagnostics) == MAX_ERRORS:
+            code, message, hint, expected = "ALU107", f"more than {MAX_ERRORS} errors: not read further", "", ()
         self.diagnostics.append(Diagnostic(code, message, span, hint=hint, expected=expected, source_line=self.line(span.line)))
 
 
@@ -106,12 +113,11 @@ def tokenize(source: Source) -> list[Token]:
                 tokens[-1].comment = match.group()[2:].strip()
         elif group in {"bad", "open"}:
             _report_bad(source, match.group(), Span(source.file, line, column, column + len(match.group())), unclosed=group == "open")
-            if len(source.diagnostics) >= MAX_ERRORS:
-                source.report("ALU107", f"more than {MAX_ERRORS} errors: not read further", Span(source.file, line, column, column + 1))
+            if source.full:
                 break
         else:
             tokens.append(Token(Kind[str(group)], match.group(), line, column))
-    tokens.append(Token(Kind.END, "", line, len(text) - line_start + 1 if line == text.count("\n") + 1 else 1))
+    tokens.append(Token(Kind.END, "", line, len(text) - line_start + 1))
     return tokens
 
 

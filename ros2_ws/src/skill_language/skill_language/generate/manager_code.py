@@ -4,122 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from skill_language.generate.manager_templates import CLIENT, CLIENT_METHOD, HOOKS, HOOKS_CLASS, INPUTS, INPUTS_CLASS, TERMINATED
 from skill_language.generate.text import comment, fill, header, lines, packages
 from skill_language.model import Parameter, Result, Skill, Skillset
 from skill_language.robot import Robot
 from skill_language.ros_types import camel
 
 WIDTH = 140
-
-INPUTS = '''\
-"""What the skills of ``$skillset`` are called with.
-
-$header.
-"""
-
-from __future__ import annotations
-
-from dataclasses import dataclass
-$imports
-$classes
-'''
-
-INPUTS_CLASS = '''
-
-@dataclass(frozen=True, kw_only=True)
-class ${camel}Inputs:
-    """Inputs of the skill ``$skill``."""
-$fields'''
-
-HOOKS = '''\
-"""What the developer of a skill of ``$skillset`` writes: a class derived from the abstract one, for each skill.
-
-$header.
-"""
-
-from __future__ import annotations
-
-from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING
-
-from skill_runtime.hooks import SkillHooks
-
-from ${skillset}_managers.inputs import (
-$inputs
-)
-
-if TYPE_CHECKING:
-$imports    from skill_runtime.core.execution import Execution
-$classes
-
-
-ABSTRACT_HOOKS: dict[str, type[SkillHooks]] = {
-$table
-}
-"""The abstract class of each skill, by the skill's name."""
-'''
-
-HOOKS_CLASS = '''
-
-class Abstract${camel}Skill(SkillHooks, ABC):
-    """Hooks of the skill ``$skill``."""
-
-    skill = "$skill"
-    inputs_type = ${camel}Inputs
-
-    def validate(self, inputs: ${camel}Inputs) -> str:
-        """Return "" to accept the inputs, or why they are refused."""
-        return ""
-
-    @abstractmethod
-    def on_dispatch(self, execution: Execution) -> None:
-        """Start the function with ``execution.inputs``, a ${camel}Inputs; return soon."""
-
-    def progress(self, execution: Execution) -> float:
-        """Return how far the function is, 0 to 1$period."""
-        return super().progress(execution)
-
-    @abstractmethod
-    def on_interrupt(self, execution: Execution) -> None:
-        """Stop the function."""
-$results'''
-
-TERMINATED = '''
-$definition
-        """End the execution with the result $result$comment; False when it has ended already."""
-        return execution.terminate("$result", message=message, outputs=$outputs)
-'''
-
-CLIENT = '''\
-"""Calls the skills of ``$skillset`` by name, with typed inputs.
-
-$header.
-"""
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from skill_runtime.ros2.client import SkillsetClient
-
-if TYPE_CHECKING:
-$imports    from rclpy.node import Node
-    from skill_runtime.ros2.client import SkillHandle
-
-
-class ${camel}Client(SkillsetClient):
-    """The skillset ``$skillset`` as seen from a mission."""
-
-    def __init__(self, node: Node) -> None:
-        super().__init__(node, "$skillset")
-$methods
-'''
-
-CLIENT_METHOD = '''
-$definition
-        """Start ``$skill``; results: $results."""
-$start
-'''
+"""Longest line of generated code, the formatter's setting of this tree."""
 
 
 def inputs_module(robot: Robot, skillset: Skillset) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from skill_language.lexer import MAX_ERRORS, Kind, Source, Token, tokenize
+from skill_language.lexer import Kind, Source, Token, tokenize
 from skill_language.model import Span
 
 
@@ -107,13 +107,15 @@ class Cursor:
             except SyntaxFault:
                 self._skip_to_end(outer, minimum=before)
                 return
-            if len(self.source.diagnostics) >= MAX_ERRORS:
+            if self.source.full:
                 self._index = len(self._tokens) - 1
                 return
 
     def _missing_end(self, opening: Token) -> None:
-        before = "the file ends" if self.at_end else f"{self.here.shown} begins"
-        message = f"the block opened in line {opening.line} has no `}}` before {before}"
+        if self.at_end:
+            self.source.report("ALU104", "this block has no `}` before the file ends", self.source.span(opening))
+            return
+        message = f"the block opened in line {opening.line} has no `}}` before {self.here.shown} begins"
         self.source.report("ALU104", message, self.source.span(self.here), hint="close the block with `}`")
 
     def _skip_to_end(self, outer: Callable[[], bool], *, minimum: int) -> None:

@@ -8,7 +8,6 @@ the other way; `interrupt { apply = effect }` says what an interruption changes;
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 
 from skill_language.errors import nearest
 from skill_language.lexer import Kind, Token, number
@@ -29,24 +28,10 @@ from skill_language.model import (
 )
 from skill_language.paper.conditions import condition
 from skill_language.paper.cursor import Cursor, starts_block, starts_member
+from skill_language.paper.skill_parts import SkillParts
 
 BLOCKS = ("progress", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
 MEMBERS = ("type", "data", "resource", "skill")
-
-
-@dataclass
-class _Parts:
-    """What was read of a skill so far; an effect that is referred to has its name only until ``build``."""
-
-    inputs: list[Parameter] = field(default_factory=list)
-    outputs: list[Parameter] = field(default_factory=list)
-    effects: list[Effect] = field(default_factory=list)
-    preconditions: list[Precondition] = field(default_factory=list)
-    start: Effect = NO_EFFECT
-    invariants: list[Invariant] = field(default_factory=list)
-    progress: Progress | None = None
-    interrupt: Interrupt = field(default_factory=Interrupt)
-    results: list[Result] = field(default_factory=list)
 
 
 def read_skill(cursor: Cursor) -> Skill:
@@ -55,7 +40,7 @@ def read_skill(cursor: Cursor) -> Skill:
     name = cursor.name("the name of the skill")
     reader = _SkillReader(cursor)
     cursor.block(reader.member, lambda: starts_member(cursor, MEMBERS))
-    return reader.build(name)
+    return reader.parts.build(name, cursor.source)
 
 
 def ends_block(cursor: Cursor) -> bool:
@@ -69,7 +54,7 @@ class _SkillReader:
 
     def __init__(self, cursor: Cursor) -> None:
         self.cursor = cursor
-        self.parts = _Parts()
+        self.parts = SkillParts()
         self._seen: set[str] = set()
 
     def member(self) -> None:
@@ -86,7 +71,9 @@ class _SkillReader:
             case "output":
                 self._block(lambda: parts.outputs.append(read_parameter(self.cursor, "an output")))
             case "effect":
+                before = len(self.cursor.source.diagnostics)
                 self._block(self._effect)
+                parts.effects_complete &= len(self.cursor.source.diagnostics) == before
             case "precondition":
                 self._block(self._precondition)
             case "invariant":
@@ -98,34 +85,6 @@ class _SkillReader:
             case _:
                 hint = nearest(word.text, BLOCKS) if word.kind is Kind.NAME else ""
                 raise self.cursor.fail(*(f"`{block}`" for block in BLOCKS), "`}`", hint=hint if hint.startswith("did") else "")
-
-    def build(self, name: Token) -> Skill:
-        """Put the parts together, with every effect that is referred to filled in."""
-        parts, named = self.parts, {effect.name: effect for effect in reversed(self.parts.effects)}
-
-        def resolve(reference: Effect) -> Effect:
-            if not reference.name:
-                return reference
-            if reference.name in named:
-                return replace(named[reference.name], span=reference.span)
-            message = f"skill `{name.text}` has no effect `{reference.name}`"
-            hint = nearest(reference.name, named) or "define it in the skill's `effect` block"
-            self.cursor.source.report("ALU204", message, reference.span, hint=hint)
-            return reference
-
-        return Skill(
-            name=name.text,
-            inputs=tuple(parts.inputs),
-            outputs=tuple(parts.outputs),
-            effects=tuple(parts.effects),
-            preconditions=tuple(parts.preconditions),
-            start=resolve(parts.start),
-            invariants=tuple(replace(i, effect=resolve(i.effect)) for i in parts.invariants),
-            progress=parts.progress,
-            interrupt=replace(parts.interrupt, effect=resolve(parts.interrupt.effect)),
-            results=tuple(replace(r, effect=resolve(r.effect)) for r in parts.results),
-            span=self.cursor.span(name),
-        )
 
     # --- blocks ---------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,141 @@
+"""What rules share: whether conditions and effects lead somewhere, whether names are free, and how a finding is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+from skill_language import ros_types
+from skill_language.errors import Diagnostic, Severity, nearest, quoted
+from skill_language.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, Skillset, Span, atoms
+
+
+class Named(Protocol):
+    """An element of the model with a name and a place."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
+
+    @property
+    def span(self) -> Span:
+        """Where it is defined."""
+        ...
+
+
+def condition_findings(skillset: Skillset, condition: Expression, where: str, *, data_allowed: bool) -> Iterator[Diagnostic]:
+    """Yield what is wrong with the resources, states and data that a condition asks; ``where`` names the condition."""
+    resources = {resource.name: resource for resource in skillset.resources}
+    for atom in atoms(condition):
+        if isinstance(atom, ResourceIs):
+            if atom.resource not in resources:
+                yield _unknown_resource(skillset, atom.resource, atom.span)
+            elif atom.state not in resources[atom.resource].states:
+                yield unknown_state(resources[atom.resource], atom.state, atom.span)
+        elif isinstance(atom, DataIs):
+            if not data_allowed:
+                hint = "let the functional layer report it as a state of a resource"
+                yield error("ALU213", f"{where} asks data `{atom.data}`; only preconditions may", atom.span, hint=hint)
+            yield from _data(skillset, atom)
+
+
+def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
+    types = {data.name: data.type for data in skillset.data}
+    if atom.data not in types:
+        message = f"skillset `{skillset.name}` has no data `{atom.data}`"
+        yield error("ALU206", message, atom.span, hint=nearest(atom.data, types))
+        return
+    if isinstance(atom.value, bool | str) and atom.comparison not in {Comparison.EQ, Comparison.NE}:
+        kind = "a truth value" if isinstance(atom.value, bool) else "a text"
+        yield error("ALU214", f"`{atom.comparison.value}` doesn't compare {kind}; use == or !=", atom.span)
+    python = ros_types.PRIMITIVES.get(types[atom.data])
+    if python is None:
+        return
+    if atom.path:
+        message = f"data `{atom.data}` is a {types[atom.data]} and has no field `{'.'.join(atom.path)}`"
+        yield error("ALU214", message, atom.span)
+    elif (python in {"int", "float"}) != isinstance(atom.value, float) or (python == "str") != isinstance(atom.value, str):
+        yield error("ALU214", f"data `{atom.data}` is a {types[atom.data]} and can't be compared with {atom.value!r}", atom.span)
+
+
+def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> Iterator[Diagnostic]:
+    """Yield what is wrong with an effect; with ``any_arrow`` it may take extern arrows, too."""
+    resources = {resource.name: resource for resource in skillset.resources}
+    seen: set[str] = set()
+    for change in effect.assignments:
+        if change.resource in seen:
+            yield error("ALU212", f"effect `{effect.name}` sets `{change.resource}` twice", change.span)
+        seen.add(change.resource)
+        resource = resources.get(change.resource)
+        if resource is None:
+            yield _unknown_resource(skillset, change.resource, change.span)
+        elif change.target not in resource.states:
+            yield unknown_state(resource, change.target, change.span)
+        else:
+            yield from _arrow(effect, resource, change.target, change.span, any_arrow=any_arrow)
+
+
+def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_arrow: bool) -> Iterator[Diagnostic]:
+    arrows = [arrow for arrow in resource.transitions if arrow.target == target]
+    if any(any_arrow or not arrow.extern for arrow in arrows):
+        return
+    name = f"effect `{effect.name}`" if effect.name else "the effect"
+    if arrows:
+        message = f"{name} would take `{resource.name}` to `{target}`, but only the functional layer may (every arrow there is extern)"
+        hint = f"add an arrow without `extern` to resource `{resource.name}` if skills are to take it"
+        yield error("ALU210", message, span, hint=hint)
+        return
+    targets = dict.fromkeys(arrow.target for arrow in resource.transitions if not arrow.extern)
+    hint = f"skills can take it to {quoted(list(targets))}" if targets else f"add `STATE -> {target}` to resource `{resource.name}`"
+    yield error("ALU209", f"{name} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
+
+
+def _unknown_resource(skillset: Skillset, name: str, span: Span) -> Diagnostic:
+    known = [resource.name for resource in skillset.resources]
+    return error("ALU202", f"skillset `{skillset.name}` has no resource `{name}`", span, hint=nearest(name, known))
+
+
+def unknown_state(resource: Resource, state: str, span: Span) -> Diagnostic:
+    """Return the finding that a resource has no such state."""
+    return error("ALU203", f"resource `{resource.name}` has no state `{state}`", span, hint=nearest(state, resource.states))
+
+
+def duplicates(what: str, elements: Sequence[Named]) -> Iterator[Diagnostic]:
+    """Yield a finding for every element that has the name of an earlier one."""
+    first: dict[str, Named] = {}
+    for element in elements:
+        if not element.name:
+            continue
+        if element.name in first:
+            at = first[element.name].span
+            hint = f"it is defined in line {at.line} first" if at.line else ""
+            yield error("ALU201", f"{what} `{element.name}` is defined twice", element.span, hint=hint)
+        first.setdefault(element.name, element)
+
+
+def one_in_code(what: str, elements: Sequence[Named], code_name: Callable[[str], str]) -> Iterator[Diagnostic]:
+    """Yield a finding for every element whose name becomes another one's in generated code."""
+    first: dict[str, str] = {}
+    for element in elements:
+        other = first.setdefault(code_name(element.name), element.name)
+        if other != element.name:
+            message = f"{what}s `{other}` and `{element.name}` are both `{code_name(element.name)}` in generated code"
+            yield error("ALU217", message, element.span)
+
+
+def ros_name(what: str, element: Named) -> Iterator[Diagnostic]:
+    """Yield a finding when ROS does not allow an element's name for a field or topic."""
+    if not ros_types.is_field_name(element.name):
+        hint = "ROS wants a-z, 0-9 and single _, a letter first, no word of Python"
+        yield error("ALU216", f"`{element.name}` can't be the name of a ROS {what}", element.span, hint=hint)
+
+
+def error(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
+    """Return an error."""
+    return Diagnostic(code, message, span, hint=hint)
+
+
+def warning(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
+    """Return a warning."""
+    return Diagnostic(code, message, span, Severity.WARNING, hint)

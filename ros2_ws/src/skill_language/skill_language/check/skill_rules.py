@@ -1,0 +1,97 @@
+"""Rules about one skill: its names, what its conditions and effects lead to, and the names that generated code needs."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from skill_language.check.references import condition_findings, duplicates, effect_findings, error, ros_name, warning
+from skill_language.errors import Diagnostic
+from skill_language.model import NO_EFFECT, Effect, Skill, Skillset
+
+
+def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    yield from duplicates("effect", skill.effects)
+    yield from duplicates("precondition", skill.preconditions)
+    yield from duplicates("invariant", skill.invariants)
+    yield from duplicates("result", skill.results)
+    yield from duplicates("input", skill.inputs)
+    yield from duplicates("output", skill.outputs)
+    shared = {resource.name: "resource" for resource in skillset.resources} | {data.name: "data" for data in skillset.data}
+    for parameter in (*skill.inputs, *skill.outputs):
+        if parameter.name in shared:
+            message = f"`{parameter.name}` of `{skill.name}` has the name of a {shared[parameter.name]}, and hides it from no condition"
+            yield warning("ALU304", message, parameter.span, hint="conditions speak of resources and data, never of inputs")
+    for output in skill.outputs:
+        if any(output.name == given.name for given in skill.inputs):
+            yield error("ALU201", f"`{output.name}` is an input and an output of `{skill.name}`", output.span)
+
+
+def _interface_names(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    if skill.name in CLIENT_NAMES or keyword.iskeyword(skill.name):
+        yield error("ALU215", f"the generated client needs the name `{skill.name}` for itself; name the skill otherwise", skill.span)
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", skill.name):
+        hint = "a skill's name begins with a letter, and has single _ between letters and digits"
+        yield error("ALU216", f"skill `{skill.name}` can't be the name of a ROS action", skill.span, hint=hint)
+    for parameter in (*skill.inputs, *skill.outputs):
+        yield from ros_name("field", parameter)
+    for output in skill.outputs:
+        if output.name in RESULT_FIELDS:
+            message = f"the generated action needs the field `{output.name}` for itself; name the output otherwise"
+            yield error("ALU215", message, output.span)
+    for given in skill.inputs:
+        if given.name in INPUT_NAMES:
+            yield error("ALU215", f"generated code needs the name `{given.name}` for itself; name the input otherwise", given.span)
+
+
+def _conditions(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    for precondition in skill.preconditions:
+        yield from condition_findings(skillset, precondition.condition, f"precondition `{precondition.name}`", data_allowed=True)
+    for invariant in skill.invariants:
+        yield from condition_findings(skillset, invariant.condition, f"invariant `{invariant.name}`", data_allowed=False)
+    yield from condition_findings(skillset, skill.interrupt.postcondition, "the interruption's postcondition", data_allowed=False)
+    for result in skill.results:
+        yield from condition_findings(skillset, result.postcondition, f"the postcondition of `{result.name}`", data_allowed=False)
+
+
+def _effects(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    used = _used_effects(skill)
+    defined = {effect.name for effect in skill.effects}
+    for effect in (*skill.effects, *(e for e in used if e.name not in defined)):
+        yield from effect_findings(skillset, effect, any_arrow=False)
+    names = {effect.name for effect in used}
+    for effect in skill.effects:
+        if effect.name not in names:
+            yield warning("ALU301", f"effect `{effect.name}` of `{skill.name}` is never used", effect.span)
+
+
+def _ends(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    if not skill.results:
+        hint = "add a `result { ... }` block with at least one result"
+        yield error("ALU218", f"skill `{skill.name}` has no result", skill.span, hint=hint)
+
+
+SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
+    _skill_names,
+    _interface_names,
+    _conditions,
+    _effects,
+    _ends,
+)
+
+RESULT_FIELDS = frozenset({"outcome", "result", "message", "progress"})
+"""Fields of the generated action's result and feedback that every skill has."""
+
+INPUT_NAMES = frozenset({"self", "skill"})
+"""Names that the client's methods have already."""
+
+CLIENT_NAMES = frozenset({"start", "resources", "wait_ready", "on_change", "node", "describe", "model", "skillset", "close", "get_data"})
+"""Attributes of the generic client that a method named like a skill would hide."""
+
+
+def _used_effects(skill: Skill) -> list[Effect]:
+    used = [skill.start, skill.interrupt.effect]
+    used += [invariant.effect for invariant in skill.invariants]
+    used += [result.effect for result in skill.results]
+    return [effect for effect in used if effect != NO_EFFECT]

@@ -1,0 +1,120 @@
+"""Rules about a skillset as a whole: its names, resources, types and periods."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from skill_language import ros_types
+from skill_language.check.references import (
+    condition_findings,
+    duplicates,
+    effect_findings,
+    error,
+    one_in_code,
+    ros_name,
+    unknown_state,
+    warning,
+)
+from skill_language.errors import Diagnostic, nearest
+from skill_language.model import Data, Parameter, Resource, Skillset
+
+
+def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:
+    yield from duplicates("resource", skillset.resources)
+    yield from duplicates("data", skillset.data)
+    yield from duplicates("skill", skillset.skills)
+    yield from duplicates("event", skillset.events)
+    yield from duplicates("parameter", skillset.parameters)
+    for index, name in enumerate(skillset.types):
+        if name in skillset.types[:index]:
+            yield error("ALU201", f"type `{name}` is declared twice", skillset.span)
+    yield from one_in_code("skill", skillset.skills, ros_types.camel)
+    if not ros_types.is_package_name(skillset.name):
+        hint = "a ROS name has a-z, 0-9 and single _, and begins with a letter"
+        yield error("ALU216", f"`{skillset.name}` can't be the name of a ROS package", skillset.span, hint=hint)
+    for data in skillset.data:
+        yield from ros_name("data", data)
+
+
+def _resources(skillset: Skillset) -> Iterator[Diagnostic]:
+    for resource in skillset.resources:
+        yield from _states(resource)
+        yield from _initial(resource)
+        yield from _reach(resource)
+
+
+def _states(resource: Resource) -> Iterator[Diagnostic]:
+    for index, state in enumerate(resource.states):
+        if state in resource.states[:index]:
+            yield error("ALU201", f"state `{state}` of `{resource.name}` is listed twice", resource.span)
+    seen: set[tuple[str, str, bool]] = set()
+    for arrow in resource.transitions:
+        for state in dict.fromkeys((arrow.source, arrow.target)):
+            if state not in resource.states:
+                yield unknown_state(resource, state, arrow.span)
+        key = (arrow.source, arrow.target, arrow.extern)
+        if key in seen:
+            yield error("ALU201", f"the arrow `{arrow.source} -> {arrow.target}` of `{resource.name}` is given twice", arrow.span)
+        seen.add(key)
+
+
+def _initial(resource: Resource) -> Iterator[Diagnostic]:
+    ends = {state for arrow in resource.transitions for state in (arrow.source, arrow.target)}
+    if not resource.initial:
+        hint = f"add `initial {resource.states[0]}`" if resource.states else "add `initial STATE`"
+        yield error("ALU207", f"resource `{resource.name}` has no initial state", resource.span, hint=hint)
+    elif resource.initial not in resource.states or (ends and resource.initial not in ends):
+        message = f"the initial state `{resource.initial}` of `{resource.name}` has no arrow"
+        yield error("ALU208", message, resource.span, hint=nearest(resource.initial, ends))
+
+
+def _reach(resource: Resource) -> Iterator[Diagnostic]:
+    if not resource.initial or resource.initial not in resource.states:
+        return
+    reached, todo = {resource.initial}, [resource.initial]
+    while todo:
+        source = todo.pop()
+        following = {arrow.target for arrow in resource.transitions if arrow.source == source} - reached
+        reached |= following
+        todo += following
+    for state in resource.states:
+        if state not in reached:
+            message = f"state `{state}` of `{resource.name}` can't be reached from `{resource.initial}`"
+            yield warning("ALU302", message, resource.span)
+
+
+def _types(skillset: Skillset) -> Iterator[Diagnostic]:
+    used: set[str] = set()
+    typed: list[Data | Parameter] = [*skillset.data, *skillset.parameters]
+    for skill in skillset.skills:
+        typed += [*skill.inputs, *skill.outputs, *skill.parameters]
+    for element in typed:
+        used.add(element.type)
+        if element.type not in skillset.types and element.type not in ros_types.PRIMITIVES:
+            hint = nearest(element.type, [*skillset.types, *ros_types.PRIMITIVES])
+            hint = hint if hint.startswith("did") else f"declare it with `type {element.type}`"
+            yield error("ALU205", f"unknown type `{element.type}`", element.span, hint=hint)
+    for name in skillset.types:
+        if name not in used:
+            yield warning("ALU303", f"type `{name}` is never used", skillset.span)
+
+
+def _periods(skillset: Skillset) -> Iterator[Diagnostic]:
+    for data in skillset.data:
+        if data.period_s is not None and data.period_s <= 0:
+            yield error("ALU211", f"the period of data `{data.name}` is {data.period_s:g} s; it must be positive", data.span)
+    for skill in skillset.skills:
+        progress = skill.progress
+        if progress and progress.period_s <= 0:
+            message = f"the progress period of `{skill.name}` is {progress.period_s:g} s; it must be positive"
+            yield error("ALU211", message, progress.span)
+
+
+def _events(skillset: Skillset) -> Iterator[Diagnostic]:
+    for event in skillset.events:
+        yield from condition_findings(skillset, event.guard, f"the guard of `{event.name}`", data_allowed=False)
+        # What happens by itself may take any arrow: it speaks for the functional layer.
+        yield from effect_findings(skillset, event.effect, any_arrow=True)
+
+
+RULES: Sequence[Callable[[Skillset], Iterable[Diagnostic]]] = (_skillset_names, _resources, _types, _periods, _events)

@@ -1,0 +1,128 @@
+"""Whatever stands in a file: a model or a LanguageError, soon."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_skill_language_listings import LISTING_2, LISTING_3
+
+from skill_language.check import check
+from skill_language.errors import LanguageError
+from skill_language.lexer import MAX_ERRORS
+from skill_language.load import load_skillset
+from skill_language.paper import parse
+
+WHOLE = f"skillset navigation {{ type Point data p: Point period = 1 {LISTING_2} {LISTING_3} }}"
+PIECES = [
+    "{",
+    "}",
+    "(",
+    ")",
+    ":",
+    "=",
+    "==",
+    "->",
+    "=>",
+    "not",
+    "and",
+    "skill",
+    "resource",
+    "data",
+    "initial",
+    '"',
+    "//",
+    "0.5",
+    "1e999",
+    "é",
+    "\0",
+    "\n",
+]
+
+
+def read(text: str) -> None:
+    """Read and check; a LanguageError must be sound: at least one finding, places inside of the text, text to show."""
+    try:
+        check(parse(text, "x"))
+    except LanguageError as error:
+        assert 0 < len(error.diagnostics) <= MAX_ERRORS + 1
+        for finding in error.diagnostics:
+            assert finding.span.line <= text.count("\n") + 1
+            assert finding.message
+            assert finding.render()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(max_size=200))
+def test_any_text(text):
+    read(text)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.sampled_from([*PIECES, *WHOLE.split()]), max_size=120).map(" ".join))
+def test_any_row_of_words(text):
+    read("skillset s { " + text)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(0, len(WHOLE)), st.integers(0, 30), st.sampled_from(["", *PIECES]))
+def test_a_model_with_something_cut_out_or_put_in(place, length, piece):
+    read(WHOLE[:place] + piece + WHOLE[place + length :])
+
+
+def test_what_is_cut_is_found():
+    """Each single token of the listings is needed, except where the rest still is a model."""
+    unharmed = []
+    tokens = WHOLE.split(" ")
+    for index, token in enumerate(tokens):
+        if token.strip() in {"{", "}", "->", ":", "="}:
+            text = " ".join(tokens[:index] + tokens[index + 1 :])
+            try:
+                parse(text)
+            except LanguageError:
+                continue
+            unharmed.append((index, token))
+    assert unharmed == []
+
+
+@pytest.mark.parametrize("opening", ["(", "not ", "a == B => ", "not (", "resource = ("])
+def test_deep_nesting_is_an_error(opening):
+    with pytest.raises(LanguageError) as caught:
+        parse("skillset s { skill f { precondition { p: resource = (" + opening * 30_000)
+    assert {finding.code for finding in caught.value.diagnostics} <= {"ALU103", "ALU104", "ALU105"}
+    if opening != "resource = (":
+        assert caught.value.diagnostics[-1].code == "ALU105" or caught.value.diagnostics[0].code in {"ALU104", "ALU105"}
+
+
+def test_deep_blocks_are_an_error():
+    with pytest.raises(LanguageError):
+        parse("skillset s { skill f { effect { a " + "{ " * 100_000)
+
+
+def test_many_operands_are_none():
+    text = "skillset s { skill f { precondition { p: resource = (" + " and ".join(["a == B"] * 20_000) + ") } } }"
+    assert len(parse(text).skill("f").preconditions[0].condition.operands) == 20_000
+
+
+@pytest.mark.parametrize("junk", ["\x00\xff\x01", "a ", "$ ", "{(", '"', "skillset s {", "// x\n"])
+def test_five_megabytes_of_junk_take_no_time(tmp_path, junk):
+    path = tmp_path / "junk.skill"
+    path.write_bytes((junk * (5_000_000 // len(junk))).encode("latin-1"))
+    start = time.monotonic()
+    with pytest.raises(LanguageError) as caught:
+        load_skillset(path)
+    assert time.monotonic() - start < 1.0
+    assert len(caught.value.diagnostics) == 1
+    assert caught.value.diagnostics[0].code == "ALU003"
+
+
+@pytest.mark.parametrize("junk", ["\x00\x01", "a ", "$ ", "{(", '"\n', "skillset s {", "}"])
+def test_the_largest_text_that_is_read_takes_seconds_at_most(junk):
+    text = "skillset s {" + junk * (999_000 // len(junk))
+    start = time.monotonic()
+    with pytest.raises(LanguageError) as caught:
+        parse(text)
+    assert time.monotonic() - start < 10.0
+    assert len(caught.value.diagnostics) <= MAX_ERRORS + 1

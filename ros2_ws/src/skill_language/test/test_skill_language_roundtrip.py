@@ -1,0 +1,89 @@
+"""A model survives being printed and read, and being written as JSON and read."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from skill_language_strategies import skillsets
+
+from skill_language.errors import LanguageError
+from skill_language.json_form import from_json, to_json
+from skill_language.model import Comparison, DataIs, Event, Precondition, Result, ResultKind, Skill, Skillset
+from skill_language.paper import parse
+from skill_language.printer import NotInThisNotationError, print_skillset
+
+SLOW = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+@SLOW
+@given(skillsets)
+def test_what_is_printed_reads_back(skillset):
+    text = print_skillset(skillset)
+    again = parse(text, "x.skill")
+    assert again == skillset
+    # `==` takes 1.0 for True; their texts differ.
+    assert repr_without_places(again) == repr_without_places(skillset)
+    assert print_skillset(again) == text
+
+
+@SLOW
+@given(skillsets)
+def test_json_reads_back(skillset):
+    text = to_json(skillset)
+    assert repr_without_places(from_json(text)) == repr_without_places(skillset)
+    assert to_json(from_json(text)) == text
+    assert "span" not in json.loads(text)
+
+
+def repr_without_places(skillset):
+    return repr(json.loads(to_json(skillset)))
+
+
+def test_json_keeps_what_only_the_other_notation_says():
+    condition = DataIs("d", (), Comparison.EQ, value=True)
+    skill = Skill("f", preconditions=(Precondition("p", condition),), results=(Result("R", ResultKind.FAILURE),))
+    skillset = Skillset("s", events=(Event("e"),), skills=(skill,))
+    again = from_json(to_json(skillset))
+    assert again == skillset
+    assert again.skills[0].preconditions[0].condition.value is True
+
+
+def test_what_the_notation_has_no_words_for_is_refused():
+    skill = Skill("f", results=(Result("R", ResultKind.SUCCESS),))
+    with pytest.raises(NotInThisNotationError, match="event e, success R of f"):
+        print_skillset(Skillset("s", events=(Event("e"),), skills=(skill,)))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "Expecting value"),
+        ("[]", "skillset should be an object, not []"),
+        ('{"name": 3}', "skillset.name should be str, not 3"),
+        ("{}", "skillset should be an object with `name`"),
+        ('{"name": "s", "colour": 1}', "skillset should be an object with the fields name, types"),
+        (
+            '{"name": "s", "skills": [{"name": "f", "progress": {"period_s": true}}]}',
+            "skillset.skills[0].progress.period_s should be float, not True",
+        ),
+        ('{"name": "s", "skills": [{"name": "f", "progress": {"period_s": NaN}}]}', "period_s should be float, not nan"),
+        ('{"name": "s", "skills": [{"name": "f", "results": [{"name": "R", "kind": "x"}]}]}', "one of result, success, failure"),
+        (
+            '{"name": "s", "skills": [{"name": "f", "preconditions": [{"name": "p", "condition": {"is": []}}]}]}',
+            'a condition with "is" one of',
+        ),
+        ("[" * 100_000, "nested too deeply"),
+        (
+            '{"name": "s", "events": [{"name": "e", "guard": ' + '{"is": "not", "operand": ' * 300 + "1" + "}" * 300 + "}]}",
+            "nested less deeply",
+        ),
+    ],
+)
+def test_json_that_is_no_model(text, told):
+    with pytest.raises(LanguageError) as caught:
+        from_json(text)
+    (finding,) = caught.value.diagnostics
+    assert finding.code == "ALU004"
+    assert told in finding.message
