@@ -1,0 +1,429 @@
+"""Runs one skillset: takes the steps of ``semantics`` one after another and calls the hooks between them.
+
+All changes go through one lock; hooks and the listener are never called while it is held, so a hook may end, interrupt
+or start whatever it likes. Events are queued under the lock in the order of the steps and delivered by one thread at a
+time; a thread that finds another delivering leaves its events to it.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import traceback
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from skill_language.model import Skillset
+from skill_runtime.core import semantics
+from skill_runtime.core.conditions import Data
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, Listener, TransitionEvent
+from skill_runtime.core.execution import Execution, ExecutionState
+from skill_runtime.core.semantics import Change, Entered, Running, Step
+from skill_runtime.hooks import SkillHooks
+
+_LOG = logging.getLogger(__name__)
+Job = Callable[[], None]
+
+
+@dataclass(frozen=True)
+class ResourceStatus:
+    """A resource at one moment; ``previous`` is empty and ``stamp_ns`` that of the engine's start before the first transition."""
+
+    state: str
+    previous: str
+    stamp_ns: int
+
+
+@dataclass(frozen=True)
+class TransitionReply:
+    """Answer to an extern transition; ``state`` is the resource's state afterwards, empty when there is no such resource."""
+
+    accepted: bool
+    reason: str
+    state: str
+
+
+@dataclass
+class _Entry:
+    """What the engine keeps of an execution that has not ended or whose hooks are not through."""
+
+    execution: Execution
+    key: Running
+    dispatching: bool = False
+    stop_hook: str = ""
+    """The one hook that stops the function, once it is decided on; called at once, or after ``on_dispatch`` has returned."""
+
+
+def run_at_once(job: Job) -> None:
+    """Run a job in the calling thread."""
+    job()
+
+
+def log_error(text: str) -> None:
+    """Tell of an error that has no execution to end."""
+    _LOG.error(text)
+
+
+class SkillsetEngine:
+    """The managers of one skillset without ROS: resources, executions, hooks.
+
+    Args:
+        skillset: the model.
+        clock_ns: the mission clock, nanoseconds.
+        hooks: one a skill.
+        listener: gets the events of each step.
+        data: fresh values by name, for preconditions; a name that is missing has no fresh value.
+        defer: runs a stop hook that a step of somebody else has made necessary; by default in the thread of that step.
+        on_error: gets one text for each error that no execution can carry.
+
+    Raises:
+        UnsupportedModelError: the model can't be executed.
+        SkillRuntimeError: a skill has no hooks, or hooks have no skill.
+    """
+
+    def __init__(
+        self,
+        skillset: Skillset,
+        clock_ns: Callable[[], int],
+        hooks: Mapping[str, SkillHooks],
+        listener: Listener,
+        *,
+        data: Data | None = None,
+        defer: Callable[[Job], None] = run_at_once,
+        on_error: Callable[[str], None] = log_error,
+    ) -> None:
+        semantics.check_supported(skillset)
+        _check_hooks(skillset, hooks)
+        self.skillset = skillset
+        self._clock_ns = clock_ns
+        self._hooks = dict(hooks)
+        self._listener = listener
+        self._data: Data = {} if data is None else data
+        self._defer = defer
+        self._on_error = on_error
+        self._lock = threading.Lock()
+        self._situation = semantics.initial(skillset)
+        born_ns = clock_ns()
+        self._resources = {name: ResourceStatus(state, "", born_ns) for name, state in self._situation.states.items()}
+        self._entries: dict[str, _Entry] = {}
+        self._sequence = 0
+        self._closed = ""
+        self._outbox: deque[tuple[EngineEvent, ...]] = deque()
+        self._delivering = False
+
+    # --- what others ask for -----------------------------------------------------------------------------------------
+
+    def request(self, skill: str, inputs: object, *, execution_id: str = "") -> Execution:
+        """Ask for a skill; return when it has ended or its ``on_dispatch`` has returned.
+
+        Several executions of one skill may run if its preconditions allow; ``execution_id`` (default: counted) must be
+        unused among those that have not ended.
+
+        Raises:
+            KeyError: there is no such skill.
+            SkillRuntimeError: the id is in use.
+        """
+        self.skillset.skill(skill)
+        entry = self._register(skill, inputs, execution_id)
+        self._deliver()
+        if self._validated(entry):
+            self._start(entry)
+        return entry.execution
+
+    def transition(self, resource: str, to: str) -> TransitionReply:
+        """Take an extern transition, or say why not."""
+        with self._lock:
+            reason = semantics.extern_refusal(self.skillset, self._situation, resource, to)
+            stops = [] if reason else self._commit(semantics.transition(self.skillset, self._situation, resource, to))
+            reply = TransitionReply(not reason, reason, self._situation.states.get(resource, ""))
+        self._after_step(stops)
+        return reply
+
+    def interrupt(self, execution_id: str, message: str = "") -> bool:
+        """Interrupt an execution: ``on_interrupt``, then the step. False when it has ended or is not known.
+
+        While ``validate`` runs, it ends at once and never starts; while ``on_dispatch`` runs, the rest follows after it.
+        """
+        with self._lock:
+            entry = self._entries.get(execution_id)
+            if entry is None or entry.execution.done:
+                return False
+            requested = entry.execution.state is ExecutionState.REQUESTED
+            now = not (requested or entry.dispatching or entry.stop_hook)
+            if requested:
+                self._end_request(entry, ExecutionState.INTERRUPTED, message or "interrupted before it started")
+            elif not entry.stop_hook:
+                entry.stop_hook = "on_interrupt"
+        self._deliver()
+        if now:
+            self._stop(entry)
+        return True
+
+    def terminate(self, execution_id: str, result: str, message: str = "", outputs: Mapping[str, object] | None = None) -> bool:
+        """End a running execution with a result of the model; False when it is not running (any more)."""
+        values = dict(outputs or {})
+        with self._lock:
+            entry = self._entries.get(execution_id)
+            if entry is None or entry.execution.state is not ExecutionState.RUNNING:
+                return False
+            unknown = self._unknown_output(entry, values)
+            if unknown:
+                step = semantics.fail(self.skillset, self._situation, entry.key, unknown)
+            else:
+                entry.execution.outputs.update(values)
+                step = semantics.terminate(self.skillset, self._situation, entry.key, result, message)
+            stops = self._commit(step, by_itself=entry)
+        self._after_step(stops)
+        return True
+
+    def fail(self, execution_id: str, message: str) -> bool:
+        """End an execution as FAILED; False when it has ended or is not known."""
+        with self._lock:
+            entry = self._entries.get(execution_id)
+            if entry is None or entry.execution.done:
+                return False
+            stops: list[_Entry] = []
+            if entry.execution.state is ExecutionState.REQUESTED:
+                self._end_request(entry, ExecutionState.FAILED, message)
+            else:
+                stops = self._commit(semantics.fail(self.skillset, self._situation, entry.key, message))
+        self._after_step(stops)
+        return True
+
+    def set_outputs(self, execution_id: str, outputs: Mapping[str, object]) -> None:
+        """Keep outputs of a running execution; unknown names end it as FAILED."""
+        values = dict(outputs)
+        with self._lock:
+            entry = self._entries.get(execution_id)
+            if entry is None or entry.execution.state is not ExecutionState.RUNNING:
+                return
+            unknown = self._unknown_output(entry, values)
+            if not unknown:
+                entry.execution.outputs.update(values)
+        if unknown:
+            self.fail(execution_id, unknown)
+
+    def progress(self, execution_id: str) -> float | None:
+        """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running."""
+        with self._lock:
+            entry = self._entries.get(execution_id)
+            if entry is None or entry.execution.state is not ExecutionState.RUNNING:
+                return None
+            execution = entry.execution
+            if entry.dispatching or entry.stop_hook:
+                return execution.progress
+        try:
+            value = min(1.0, max(0.0, float(self._hooks[execution.skill].progress(execution))))
+        except Exception as error:  # noqa: BLE001 - whatever a hook raises ends its execution only
+            self._hook_raised(entry, "progress", error)
+            return None
+        execution.progress = value
+        return None if execution.done else value
+
+    def close(self, message: str) -> None:
+        """Fail whatever runs, for ``message``, and refuse all later requests for the same reason."""
+        with self._lock:
+            self._closed = message
+            unfinished = list(self._entries)
+        for execution_id in unfinished:
+            self.fail(execution_id, message)
+
+    @property
+    def resources(self) -> dict[str, ResourceStatus]:
+        """Return all resources at one moment."""
+        with self._lock:
+            return dict(self._resources)
+
+    @property
+    def executions(self) -> tuple[Execution, ...]:
+        """Return those that have not ended."""
+        with self._lock:
+            return tuple(entry.execution for entry in self._entries.values() if not entry.execution.done)
+
+    def execution(self, execution_id: str) -> Execution | None:
+        """Return one that has not ended, or None."""
+        with self._lock:
+            entry = self._entries.get(execution_id)
+        return None if entry is None or entry.execution.done else entry.execution
+
+    # --- a request's way ---------------------------------------------------------------------------------------------
+
+    def _register(self, skill: str, inputs: object, execution_id: str) -> _Entry:
+        with self._lock:
+            if not execution_id:
+                execution_id = str(self._sequence + 1)
+            if execution_id in self._entries:
+                raise SkillRuntimeError(f"skill {skill}: the execution id {execution_id} is in use")
+            entry = _Entry(Execution(self, execution_id, skill, inputs), Running(execution_id, skill))
+            self._entries[execution_id] = entry
+            self._outbox.append((self._entered(entry.execution),))
+            if self._closed:
+                self._end_request(entry, ExecutionState.NOT_VALIDATED, self._closed)
+        return entry
+
+    def _validated(self, entry: _Entry) -> bool:
+        """Call ``validate``; tell whether the request is still on."""
+        if entry.execution.done:
+            return False
+        try:
+            refusal = self._hooks[entry.execution.skill].validate(entry.execution.inputs)
+        except Exception as error:  # noqa: BLE001 - as in progress
+            self._hook_raised(entry, "validate", error)
+            return False
+        if refusal:
+            with self._lock:
+                if not entry.execution.done:
+                    self._end_request(entry, ExecutionState.NOT_VALIDATED, str(refusal))
+            self._deliver()
+        return not entry.execution.done
+
+    def _start(self, entry: _Entry) -> None:
+        """Take the start step and call ``on_dispatch``; then what was asked for meanwhile."""
+        data = dict(self._data)
+        with self._lock:
+            if entry.execution.done:
+                return
+            entry.dispatching = True
+            stops = self._commit(semantics.start(self.skillset, self._situation, entry.key, data))
+            started = entry.execution.state is ExecutionState.RUNNING
+            if not started:
+                # Also when its own invariant broke in the very step: nothing was dispatched, nothing is to be stopped.
+                self._entries.pop(entry.key.id, None)
+        self._after_step([other for other in stops if other is not entry])
+        if started:
+            self._call(entry, "on_dispatch")
+            with self._lock:
+                entry.dispatching = False
+                stop = bool(entry.stop_hook) and entry.execution.state is not ExecutionState.TERMINATED
+                self._forget_if_through(entry)
+            if stop:
+                self._stop(entry)
+
+    def _stop(self, entry: _Entry) -> None:
+        """Call the decided stop hook; after ``on_interrupt`` take the step of the interruption."""
+        self._call(entry, entry.stop_hook)
+        with self._lock:
+            stops: list[_Entry] = []
+            if entry.execution.state is ExecutionState.RUNNING:
+                stops = self._commit(semantics.interrupt(self.skillset, self._situation, entry.key), by_itself=entry)
+        self._after_step(stops)
+
+    # --- hooks -------------------------------------------------------------------------------------------------------
+
+    def _call(self, entry: _Entry, name: str) -> None:
+        hooks = self._hooks[entry.execution.skill]
+        try:
+            getattr(hooks, name)(entry.execution)
+        except Exception as error:  # noqa: BLE001 - as in progress
+            self._hook_raised(entry, name, error)
+
+    def _hook_raised(self, entry: _Entry, hook: str, error: Exception) -> None:
+        """End the execution as FAILED with the last line of the traceback."""
+        last_line = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
+        self._on_error(f"{entry.execution}: {hook} raised\n{''.join(traceback.format_exception(error))}")
+        self.fail(entry.key.id, f"{hook} raised {last_line}")
+
+    # --- steps, with the lock held -----------------------------------------------------------------------------------
+
+    def _commit(self, step: Step, *, by_itself: _Entry | None = None) -> list[_Entry]:
+        """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
+        self._situation = step.situation
+        events: list[EngineEvent] = []
+        stops: list[_Entry] = []
+        for happening in step.happenings:
+            if isinstance(happening, Change):
+                events.append(self._changed(happening))
+                continue
+            entry = self._entries[happening.execution.id]
+            self._set_state(entry.execution, happening)
+            events.append(self._entered(entry.execution))
+            if entry.execution.done:
+                stopping = bool(entry.stop_hook) or entry is by_itself
+                if not stopping:
+                    failed = entry.execution.state is ExecutionState.FAILED
+                    entry.stop_hook = "on_failure" if failed else "on_violation"
+                    if not entry.dispatching:
+                        stops.append(entry)
+                self._forget_if_through(entry)
+        if events:
+            self._outbox.append(tuple(events))
+        return stops
+
+    def _end_request(self, entry: _Entry, state: ExecutionState, message: str) -> None:
+        """End an execution that never started."""
+        self._set_state(entry.execution, Entered(entry.key, state, "", message))
+        self._outbox.append((self._entered(entry.execution),))
+        self._forget_if_through(entry)
+
+    def _forget_if_through(self, entry: _Entry) -> None:
+        if entry.execution.done and not entry.dispatching:
+            self._entries.pop(entry.key.id, None)
+
+    @staticmethod
+    def _set_state(execution: Execution, entered: Entered) -> None:
+        execution.result = entered.result
+        execution.message = entered.message
+        execution.state = entered.state
+
+    def _unknown_output(self, entry: _Entry, outputs: Mapping[str, object]) -> str:
+        known = [output.name for output in self.skillset.skill(entry.execution.skill).outputs]
+        unknown = [name for name in outputs if name not in known]
+        if not unknown:
+            return ""
+        return f"skill {entry.execution.skill} has no output {', '.join(unknown)}; it has {', '.join(known) or 'none'}"
+
+    def _changed(self, change: Change) -> TransitionEvent:
+        now_ns = self._clock_ns()
+        self._sequence += 1
+        self._resources[change.resource] = ResourceStatus(change.target, change.source, now_ns)
+        return TransitionEvent(self._sequence, now_ns, change.resource, change.source, change.target, change.cause)
+
+    def _entered(self, execution: Execution) -> ExecutionEvent:
+        self._sequence += 1
+        return ExecutionEvent(
+            sequence=self._sequence,
+            stamp_ns=self._clock_ns(),
+            skill=execution.skill,
+            id=execution.id,
+            state=execution.state,
+            result=execution.result,
+            message=execution.message,
+            inputs=execution.inputs,
+            outputs=dict(execution.outputs),
+        )
+
+    # --- after a step, without the lock ------------------------------------------------------------------------------
+
+    def _after_step(self, stops: list[_Entry]) -> None:
+        """Deliver events, then have the functions of broken executions stopped."""
+        self._deliver()
+        for entry in stops:
+            self._defer(lambda entry=entry: self._call(entry, entry.stop_hook))  # type: ignore[misc]
+
+    def _deliver(self) -> None:
+        """Give queued events to the listener, unless another thread is at it."""
+        while True:
+            with self._lock:
+                if self._delivering or not self._outbox:
+                    return
+                self._delivering = True
+                events = self._outbox.popleft()
+            try:
+                self._listener(events)
+            except Exception as error:  # noqa: BLE001 - a listener must not stop the managers
+                self._on_error(f"the listener raised {''.join(traceback.format_exception(error))}")
+            finally:
+                with self._lock:
+                    self._delivering = False
+
+
+def _check_hooks(skillset: Skillset, hooks: Mapping[str, SkillHooks]) -> None:
+    skills = [skill.name for skill in skillset.skills]
+    missing = [name for name in skills if name not in hooks]
+    surplus = [name for name in hooks if name not in skills]
+    if missing:
+        raise SkillRuntimeError(f"skillset {skillset.name}: no hooks for {', '.join(missing)}; the hooks factory must return one a skill")
+    if surplus:
+        raise SkillRuntimeError(f"skillset {skillset.name} has no skill {', '.join(surplus)}; it has {', '.join(skills)}")

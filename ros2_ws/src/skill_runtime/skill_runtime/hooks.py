@@ -1,0 +1,49 @@
+"""What the developer of a skill writes: a class of hooks a skill (paper, Listing 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from skill_runtime.core.execution import Execution
+
+
+class SkillHooks:
+    """Base of all hooks; every method may be overridden, ``on_dispatch`` should be.
+
+    Order of calls for one execution: ``validate``, ``on_dispatch``, any number of ``progress``, then at most one of
+    ``on_interrupt``, ``on_violation``, ``on_failure``. The last never overtakes ``on_dispatch``, and none of them is called
+    after ``execution.terminate`` was accepted. Hooks of different executions may run at the same time in different threads.
+    A hook that raises ends its execution as FAILED.
+    """
+
+    inputs_type: ClassVar[type | None] = None
+    """Class made from the inputs by keyword; None makes a ``SimpleNamespace``."""
+
+    def make_inputs(self, values: Mapping[str, object]) -> object:
+        """Make what ``validate`` gets and ``execution.inputs`` holds from the values by name."""
+        return SimpleNamespace(**values) if self.inputs_type is None else self.inputs_type(**values)
+
+    def validate(self, inputs: object) -> str:  # noqa: ARG002
+        """Return "" to accept the request, or why it is refused. Called first; changes nothing; may wait a bounded time."""
+        return ""
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Start the function. Called once, after the start effect was applied; returns soon."""
+
+    def progress(self, execution: Execution) -> float:
+        """Return how far the function is, 0 to 1. Called every period of the model while RUNNING; must not wait."""
+        return execution.progress
+
+    def on_interrupt(self, execution: Execution) -> None:
+        """Stop the function. Called when an interruption is asked for, before the interrupt effect is applied."""
+
+    def on_violation(self, execution: Execution) -> None:
+        """Stop the function. Called after a broken invariant has ended the execution; ``execution.result`` names it."""
+        self.on_interrupt(execution)
+
+    def on_failure(self, execution: Execution) -> None:
+        """Stop the function. Called after the execution has ended as FAILED, ``execution.message`` says why."""
+        self.on_interrupt(execution)

@@ -1,0 +1,125 @@
+"""Between ROS messages and plain values."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+_FLOATS = {"double", "float"}
+_VECTOR_FIELDS = ["x", "y", "z"]
+
+
+def message_class(type_name: str) -> Any:
+    """Return the class of ``geometry_msgs/Point`` or ``geometry_msgs/msg/Point``; raise ImportError or AttributeError."""
+    package, name = type_name.split("/", maxsplit=1)[0], type_name.rsplit("/", maxsplit=1)[-1]
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def fields_of(message: Any) -> dict[str, str]:
+    """Return a message's (or its class's) fields with their types: ``{"height": "double", "target": "geometry_msgs/Point"}``."""
+    fields: dict[str, str] = message.get_fields_and_field_types()
+    return fields
+
+
+def values_of(message: Any) -> dict[str, object]:
+    """Return the values of a message's fields by name, not taken apart any further."""
+    return {name: getattr(message, name) for name in fields_of(message)}
+
+
+def to_plain(value: Any) -> Any:
+    """Return what ``json`` can write: messages, dataclasses and namespaces become dicts, NaN and infinities null."""
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: to_plain(part) for name, part in values_of(value).items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, SimpleNamespace):
+        return to_plain(vars(value))
+    if isinstance(value, Mapping):
+        return {str(name): to_plain(part) for name, part in value.items()}
+    if hasattr(value, "tolist"):
+        return to_plain(value.tolist())
+    if isinstance(value, bytes | bytearray):
+        return list(value)
+    if isinstance(value, Sequence | set):
+        return [to_plain(part) for part in value]
+    return str(value)
+
+
+def fill(message: Any, values: Mapping[str, object], place: str) -> Any:
+    """Set the named fields of a message from plain values; return it.
+
+    Numbers fit every numeric field that can hold them, a message or mapping fits a message, a sequence of three numbers
+    fits a message with x, y and z.
+
+    Raises:
+        ValueError: a name or a value does not fit; the message names ``place`` and the field.
+    """
+    fields = fields_of(message)
+    for name, value in values.items():
+        if name not in fields:
+            raise ValueError(f"{place} has no {name!r}; it has {', '.join(fields) or 'none'}")
+        setattr(message, name, _fitting(fields[name], value, f"{place}, {name}"))
+    return message
+
+
+def _fitting(kind: str, value: Any, place: str) -> Any:
+    """Return the value as the field's Python type."""
+    if kind in _FLOATS:
+        return float(_number(value, kind, place))
+    if kind.startswith(("int", "uint")) and "[" not in kind:
+        return _integer(kind, value, place)
+    if kind == "boolean":
+        return _of_type(bool, kind, value, place)
+    if kind == "string":
+        return _of_type(str, kind, value, place)
+    if kind.startswith("sequence<") or "[" in kind:
+        return _elements(kind, value, place)
+    return _message(kind, value, place)
+
+
+def _number(value: Any, kind: str, place: str) -> Any:
+    if isinstance(value, bool) or not hasattr(value, "__float__") or (hasattr(value, "shape") and value.shape):
+        raise ValueError(f"{place} takes a number ({kind}), not {value!r}")
+    return value
+
+
+def _integer(kind: str, value: Any, place: str) -> int:
+    bits = int(kind.removeprefix("u").removeprefix("int"))
+    low, high = (0, 2**bits - 1) if kind.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    number = _number(value, kind, place)
+    if int(number) != number or not low <= number <= high:
+        raise ValueError(f"{place} takes a whole number from {low} to {high} ({kind}), not {value!r}")
+    return int(number)
+
+
+def _of_type(wanted: type, kind: str, value: Any, place: str) -> Any:
+    if not isinstance(value, wanted):
+        raise ValueError(f"{place} takes a {kind}, not {value!r}")
+    return value
+
+
+def _elements(kind: str, value: Any, place: str) -> list[Any]:
+    inner = kind.removeprefix("sequence<").removesuffix(">").split(",")[0] if kind.startswith("sequence<") else kind.split("[", maxsplit=1)[0]
+    if isinstance(value, str | bytes) or not hasattr(value, "__iter__"):
+        raise ValueError(f"{place} takes a list ({kind}), not {value!r}")
+    return [_fitting(inner, element, f"{place}[{index}]") for index, element in enumerate(value)]
+
+
+def _message(kind: str, value: Any, place: str) -> Any:
+    wanted = message_class(kind)
+    if isinstance(value, wanted):
+        return value
+    if isinstance(value, Mapping):
+        return fill(wanted(), value, place)
+    vector = list(fields_of(wanted)) == _VECTOR_FIELDS
+    if vector and not isinstance(value, str) and hasattr(value, "__len__") and len(value) == len(_VECTOR_FIELDS):
+        return fill(wanted(), dict(zip(_VECTOR_FIELDS, value, strict=True)), place)
+    raise ValueError(f"{place} takes a {kind}{' or three numbers' if vector else ''}, not {value!r}")

@@ -1,0 +1,90 @@
+"""The data manager (paper, section 4.2): keeps what the functional layer publishes, and passes it on latched."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from skillset_interfaces.srv import GetData
+
+from skill_language.model import Data, Skillset
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.ros2.convert import message_class, to_plain
+from skill_runtime.ros2.names import LATCHED
+
+STALE_PERIODS = 3.0
+"""A value is stale when it is older than so many of the periods that the model promises."""
+
+
+QUEUE = 10
+DataBindings = Mapping[str, tuple[str, str]]
+"""Where each data comes from: topic of the functional layer and ROS 2 type, as the generated ``DATA_TOPICS``."""
+
+
+@dataclass(frozen=True)
+class _Received:
+    value: Any
+    stamp_ns: int
+
+
+class DataManager(Mapping[str, object]):
+    """The fresh values by name (a mapping, for preconditions), their topics and the service ``get_data``."""
+
+    def __init__(self, node: Node, skillset: Skillset, bindings: DataBindings) -> None:
+        missing = [data.name for data in skillset.data if data.name not in bindings]
+        if missing:
+            raise SkillRuntimeError(f"skillset {skillset.name}: no binding to a topic for data {', '.join(missing)}")
+        self._node = node
+        self._data = {data.name: data for data in skillset.data}
+        self._received: dict[str, _Received] = {}
+        self._lock = threading.Lock()
+        for name in self._data:
+            topic, type_name = bindings[name]
+            message_type = message_class(type_name)
+            publisher = node.create_publisher(message_type, f"{skillset.name}/data/{name}", LATCHED)
+            node.create_subscription(message_type, topic, self._receiver(name, publisher.publish), QoSProfile(depth=QUEUE))
+        node.create_service(GetData, f"{skillset.name}/get_data", self._answer)
+
+    def _receiver(self, name: str, publish: Callable[[Any], None]) -> Callable[[Any], None]:
+        def receive(message: Any) -> None:
+            with self._lock:
+                self._received[name] = _Received(message, self._now_ns())
+            publish(message)
+
+        return receive
+
+    def _now_ns(self) -> int:
+        now: int = self._node.get_clock().now().nanoseconds
+        return now
+
+    def _stale(self, data: Data, received: _Received) -> bool:
+        return data.period_s is not None and self._now_ns() - received.stamp_ns > STALE_PERIODS * data.period_s * 1e9
+
+    def _answer(self, request: Any, response: Any) -> Any:
+        data, received = self._data.get(request.name), self._received.get(request.name)
+        response.known = data is not None
+        if data is not None and received is not None:
+            response.received = True
+            response.stale = self._stale(data, received)
+            response.stamp_ns = received.stamp_ns
+            response.value_json = json.dumps(to_plain(received.value))
+        return response
+
+    def _fresh(self) -> dict[str, object]:
+        with self._lock:
+            received = dict(self._received)
+        return {name: value.value for name, value in received.items() if not self._stale(self._data[name], value)}
+
+    def __getitem__(self, name: str) -> object:
+        return self._fresh()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fresh())
+
+    def __len__(self) -> int:
+        return len(self._fresh())

@@ -1,0 +1,55 @@
+"""Names and qualities of service of the skillset interface, said once for managers and clients."""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+
+LIVELINESS_LEASE_S = 2.0
+"""Without a sign of life for so long (wall clock), a manager process is dead; DDS itself sends the signs."""
+
+LATCHED = QoSProfile(
+    depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+EVENTS = QoSProfile(
+    depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+ALIVE = QoSProfile(
+    depth=1,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    liveliness=LivelinessPolicy.AUTOMATIC,
+    liveliness_lease_duration=Duration(seconds=LIVELINESS_LEASE_S),
+)
+"""``LATCHED`` with signs of life, for ``resource_states``."""
+
+
+def camel(skill: str) -> str:
+    """Return the interface's name of a skill: ``goto_straight`` to ``GotoStraight``."""
+    return "".join(word[:1].upper() + word[1:] for word in skill.split("_"))
+
+
+def action_module(skillset: str) -> ModuleType:
+    """Import the generated actions of a skillset.
+
+    Raises:
+        ModuleNotFoundError: they were not built, or their place is not on the path.
+    """
+    return importlib.import_module(f"{skillset}_interfaces.action")
+
+
+def action_type(interfaces: ModuleType, skill: str) -> type:
+    """Return a skill's action from ``<skillset>_interfaces`` or its ``action`` module.
+
+    Raises:
+        AttributeError: it is not in it.
+    """
+    actions = interfaces if hasattr(interfaces, camel(skill)) else importlib.import_module(f"{interfaces.__name__}.action")
+    found = getattr(actions, camel(skill), None)
+    if not isinstance(found, type):
+        raise AttributeError(f"{interfaces.__name__} has no action {camel(skill)} for skill {skill}; generate and build it again")
+    return found
