@@ -58,6 +58,12 @@ def test_each_condition_of_the_start_counts(resource, state):
     assert len(unmet_conditions(clients(World(resources={**READY, resource: state})))) == 1
 
 
+def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():
+    skillsets = clients(World(resources=dict(READY)))
+    skillsets.mapping.ready = False
+    assert unmet_conditions(skillsets) == ["the skillset mapping can't be called"]
+
+
 def test_a_broken_zed_does_not_keep_the_mission_from_starting():
     world = World(resources={**READY, "zed_status": "BROKEN"}, broken={"zed"})
     director = make(world)

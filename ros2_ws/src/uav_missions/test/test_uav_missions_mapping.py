@@ -129,7 +129,7 @@ def test_losing_both_sensors_stops_and_lands_where_it_is():
     assert flight.world.resources["flight_status"] == "ON_GROUND"
     assert not flight.world.running()
     assert flight.blackboard.reason == (
-        "perception.zed_depthmap: RESOURCE_INVARIANT_VIOLATED zed_ok (zed_ok: zed_status is BROKEN); then perception.lidar_depthmap: NOT_READY sensor_ok"
+        "perception.zed_depthmap: RESOURCE_INVARIANT_VIOLATED zed_ok (zed_status is BROKEN); then perception.lidar_depthmap: NOT_READY sensor_ok"
     )
 
 
@@ -238,6 +238,19 @@ def test_when_the_pilot_takes_over_nothing_more_is_commanded():
     assert flight.world.starts()[commands:] == []
     assert not flight.world.running()
     assert "keep_sdk_authority" in flight.blackboard.reason
+
+
+def test_a_moment_without_authority_while_giving_up_is_not_taken_for_the_pilot():
+    flight = Flight(World())
+    flight.fly_until_running("goto_straight", 2)
+    flight.world.break_sensor("zed")
+    flight.world.break_sensor("lidar")
+    flight.world.resources["SDK_authority"] = "UNAVAILABLE"
+    resume_s = flight.world.now_s + 1.5
+    flight.fly(until=lambda: flight.world.now_s > resume_s)
+    flight.world.resources["SDK_authority"] = "AVAILABLE"
+    assert flight.fly() is Status.FAILURE
+    assert flight.world.starts()[-1] == "land"
 
 
 def test_a_landing_that_fails_is_tried_again():

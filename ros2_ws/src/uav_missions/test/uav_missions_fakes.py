@@ -162,6 +162,7 @@ class World:
 class FakeClient:
     skillset: str
     world: World
+    ready: bool = True
 
     @property
     def resources(self) -> dict[str, str]:

@@ -26,7 +26,8 @@ class Failure:
     def sentence(self) -> str:
         """Return what a person wants to read."""
         what = self.result if self.outcome == "TERMINATED" else " ".join(filter(None, (self.outcome, self.result)))
-        return f"{self.skill}: {what}" + (f" ({self.message})" if self.message else "")
+        why = self.message.removeprefix(f"{self.result}: ") if self.result else self.message
+        return f"{self.skill}: {what}" + (f" ({why})" if why else "")
 
 
 @dataclass

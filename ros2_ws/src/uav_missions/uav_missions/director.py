@@ -45,7 +45,7 @@ class End:
 def unmet_conditions(clients: Clients) -> list[str]:
     """Return what keeps the mission from starting, in words."""
     navigation, perception = clients.navigation.resources, clients.perception.resources
-    unmet = []
+    unmet = [f"the skillset {client.skillset} can't be called" for client in vars(clients).values() if not client.ready]
     if navigation.get("SDK_authority") != "AVAILABLE":
         unmet.append("the autopilot is not ours to command (SDK_authority)")
     if navigation.get("homepoint_status") != "VALID":
@@ -69,7 +69,8 @@ class Director:
         self._mission = mission
         self._clients = clients
         self._blackboard = blackboard
-        self._wait_until_s = blackboard.now_s + start_timeout_s
+        self._start_timeout_s = start_timeout_s
+        self._wait_until_s: float | None = None
         self._watch = TreeWatch(mission.root)
         self._abort_reason = ""
         self._landing: Behaviour | None = None
@@ -108,11 +109,13 @@ class Director:
     # --- phases ------------------------------------------------------------------------------------------------------
 
     def _wait(self) -> None:
-        unmet = unmet_conditions(self._clients)
+        unmet, now_s = unmet_conditions(self._clients), self._blackboard.now_s
+        if self._wait_until_s is None and now_s > 0.0:  # zero: the mission clock was not heard yet
+            self._wait_until_s = now_s + self._start_timeout_s
         if not unmet:
-            self.start_s = self._blackboard.now_s
+            self.start_s = now_s
             self._phase = self._fly
-        elif self._blackboard.now_s > self._wait_until_s:
+        elif self._wait_until_s is not None and now_s > self._wait_until_s:
             self.end = End(Outcome.NOT_STARTED, "; ".join(unmet))
 
     def _fly(self) -> None:

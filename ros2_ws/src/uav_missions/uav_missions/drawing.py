@@ -1,8 +1,8 @@
 """Draws a mission's tree as SVG, in the signs of the paper's Figures 6, 7 and 10.
 
 Skills are green, internal actions grey, a sequence is an arrow, a selector a question mark, a parallel a purple trapezium.
-The root is at the left, so that a tree with many leaves stays readable: a leaf a line. The frame and the mark at the right
-tell how each node ended.
+A node a line, children indented below their parent, top to bottom in the order in which they are ticked: so a deep tree with
+many leaves stays readable. The frame's colour and the words at the right tell how each node ended.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from html import escape
 
 from uav_missions.treeview import NodeView
 
-ROW_PX = 38
-BOX_PX = 26
-GAP_PX = 34
+ROW_PX = 31
+BOX_PX = 24
+INDENT_PX = 30
 LETTER_PX = 6.6
 MARGIN_PX = 16
 TITLE_PX = 34
@@ -36,7 +36,7 @@ LEGEND = ("skill", "action", "condition", "sequence", "selector", "parallel", "d
 
 
 class _Canvas:
-    """Collects shapes; a node's line is found after its children's."""
+    """Collects shapes, a line a node."""
 
     def __init__(self) -> None:
         self.parts: list[str] = []
@@ -44,41 +44,28 @@ class _Canvas:
         self.rows = 0
 
     def node(self, view: NodeView, x: float) -> float:
-        """Draw a node and what is below it; return the middle of its height."""
-        right = x + self._box_width(view)
-        middles = [self.node(child, right + GAP_PX) for child in view.children]
-        if not middles:
-            middles_y = TITLE_PX + MARGIN_PX + (self.rows + 0.5) * ROW_PX
-            self.rows += 1
-        else:
-            middles_y = (middles[0] + middles[-1]) / 2
-        for middle in middles:
-            self._edge(right, middles_y, right + GAP_PX, middle)
-        self._box(view, x, middles_y)
-        return middles_y
-
-    @staticmethod
-    def _box_width(view: NodeView) -> float:
-        return len(_label(view)) * LETTER_PX + 22
-
-    def _edge(self, x1: float, y1: float, x2: float, y2: float) -> None:
-        bend = (x1 + x2) / 2
-        self.parts.append(f"<path d='M{x1:.1f} {y1:.1f} H{bend:.1f} V{y2:.1f} H{x2:.1f}' fill='none' stroke='#888'/>")
+        """Draw a node and what is below it; return the middle of its line."""
+        y = TITLE_PX + MARGIN_PX + (self.rows + 0.5) * ROW_PX
+        self.rows += 1
+        self._box(view, x, y)
+        stem = x + INDENT_PX / 2
+        for child in view.children:
+            child_y = self.node(child, x + INDENT_PX)
+            self.parts.append(f"<path d='M{stem:.1f} {y + BOX_PX / 2:.1f} V{child_y:.1f} H{x + INDENT_PX:.1f}' fill='none' stroke='#999'/>")
+        return y
 
     def _box(self, view: NodeView, x: float, y: float) -> None:
-        width, stroke = self._box_width(view), STROKES[view.status]
-        top = y - BOX_PX / 2
+        label, note, stroke = _label(view), _note(view), STROKES[view.status]
+        width = len(label) * LETTER_PX + 22
         style = f"fill='{FILLS[view.kind]}' stroke='{stroke}' stroke-width='{1 if view.status == 'INVALID' else 2}'"
-        title = f"<title>{escape(' '.join(filter(None, (view.skill or view.name, view.status, view.message))))}</title>"
-        self.parts.append(f"<g>{title}{_shape(view.kind)(x, top, width, style)}")
+        hint = " ".join(filter(None, (view.skill or view.name, view.status, view.message)))
         ink = "#9a9a9a" if view.status == "INVALID" else "#111"
-        self.parts.append(f"<text x='{x + width / 2:.1f}' y='{y + 4:.1f}' text-anchor='middle' fill='{ink}'>{escape(_label(view))}</text></g>")
-        right = x + width
-        if not view.children:
-            note = _note(view)
-            self.parts.append(f"<text x='{right + 8:.1f}' y='{y + 4:.1f}' fill='{stroke}'>{escape(note)}</text>")
-            right += 8 + len(note) * LETTER_PX
-        self.width = max(self.width, right)
+        self.parts += (
+            f"<g><title>{escape(hint)}</title>{_shape(view.kind)(x, y - BOX_PX / 2, width, style)}",
+            f"<text x='{x + width / 2:.1f}' y='{y + 4:.1f}' text-anchor='middle' fill='{ink}'>{escape(label)}</text></g>",
+            f"<text x='{x + width + 10:.1f}' y='{y + 4:.1f}' fill='{stroke}'>{escape(note)}</text>",
+        )
+        self.width = max(self.width, x + width + 10 + len(note) * LETTER_PX)
 
 
 def _label(view: NodeView) -> str:

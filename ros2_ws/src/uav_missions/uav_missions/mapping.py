@@ -137,7 +137,8 @@ class MappingMission:
         on_ground = Stays("stays on the ground", self._on_ground, settings.settle_s, blackboard=self._blackboard)
         down = Selector("come down", memory=True, children=[on_ground, land])
         stop = Sequence("stop and land", memory=True, children=[FailureIsSuccess("if it can", hover), down])
-        pilot = Check("the pilot has control", lambda: not self._obeys())
+        # For a while: a navigation that was started anew does not know yet that the vehicle is ours.
+        pilot = Stays("the pilot has control", lambda: not self._obeys(), settings.settle_s, blackboard=self._blackboard)
         return Selector("land where it is", memory=True, children=[pilot, stop])
 
     # --- parts -------------------------------------------------------------------------------------------------------

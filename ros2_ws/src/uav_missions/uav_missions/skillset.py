@@ -57,6 +57,11 @@ class Client(Protocol):
         ...
 
     @property
+    def ready(self) -> bool:
+        """Tell whether it can be called."""
+        ...
+
+    @property
     def resources(self) -> Mapping[str, str]:
         """State of every resource."""
         ...

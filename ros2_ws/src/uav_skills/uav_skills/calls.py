@@ -53,12 +53,12 @@ class _Call:
     service: Service
     request: object
     reply: Reply
-    asked_s: float
+    turn_s: float  # since when nothing before it holds it back
     sent_s: float | None = None
     future: Any = None
 
     def overdue(self, now_s: float) -> bool:
-        return now_s - self.asked_s > THERE_WITHIN_S if self.sent_s is None else now_s - self.sent_s > ANSWERED_WITHIN_S
+        return now_s - self.turn_s > THERE_WITHIN_S if self.sent_s is None else now_s - self.sent_s > ANSWERED_WITHIN_S
 
     def holds_back(self, now_s: float) -> bool:
         return self.sent_s is None or now_s - self.sent_s < ARRIVED_AFTER_S
@@ -110,14 +110,16 @@ class CallQueue:
             self._follow(call)
 
     def _send(self, now_s: float) -> list[_Call]:
-        sent = []
+        sent: list[_Call] = []
+        held_back = False
         for call in self._calls:
-            if call.sent_s is None and call.service.service_is_ready():
+            if held_back:
+                call.turn_s = now_s
+            elif call.sent_s is None and call.service.service_is_ready():
                 call.sent_s = now_s
                 call.future = call.service.call_async(call.request)
                 sent.append(call)
-            if call.holds_back(now_s):
-                break
+            held_back = held_back or call.holds_back(now_s)
         return sent
 
     def _follow(self, call: _Call) -> None:

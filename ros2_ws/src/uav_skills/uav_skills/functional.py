@@ -20,29 +20,38 @@ from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Tak
 from uav_skills.calls import CallQueue, Reply, ignore_answer
 
 WATCH_PERIOD_S = 0.1
+LONGEST_STEP_S = 0.2
+MOTIONS = ("position", "heading")  # references that move the vehicle, and that may be stopped at any time
 LAST_FEW = QoSProfile(depth=10)
 
 
 class FunctionalPart:
-    """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard."""
+    """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard.
+
+    ``now_s`` is mission clock without its jumps: when the clock itself did not come through for a while (the bridge was started
+    anew), nothing else came either, and what was not heard meanwhile must not count as silent.
+    """
 
     def __init__(self, node: Node) -> None:
+        self.now_s = 0.0
         self._node = node
+        self._clock_s = self._read_clock_s()
         self._group = ReentrantCallbackGroup()
         self._calls = CallQueue(lambda: self.now_s)
         self._watchers: list[Callable[[], None]] = []
         node.create_timer(WATCH_PERIOD_S, self._watch, callback_group=self._group)
 
-    @property
-    def now_s(self) -> float:
-        """Mission clock."""
-        return int(self._node.get_clock().now().nanoseconds) / 1e9
-
     def watch(self, watcher: Callable[[], None]) -> None:
         """Call ``watcher`` ten times a second of mission clock."""
         self._watchers.append(watcher)
 
+    def _read_clock_s(self) -> float:
+        return int(self._node.get_clock().now().nanoseconds) / 1e9
+
     def _watch(self) -> None:
+        clock_s = self._read_clock_s()
+        self.now_s += min(max(clock_s - self._clock_s, 0.0), LONGEST_STEP_S)
+        self._clock_s = clock_s
         self._calls.tick()
         for watcher in self._watchers:
             watcher()
@@ -55,7 +64,10 @@ class FunctionalPart:
 
 
 class GuidanceApi(FunctionalPart):
-    """The guidance: references for position and heading, and what it says about following them."""
+    """The guidance: references for position and heading, and what it says about following them.
+
+    A motion that is under way when this begins was started by managers that are gone: nobody watches it, so it is stopped.
+    """
 
     def __init__(self, node: Node) -> None:
         super().__init__(node)
@@ -100,6 +112,8 @@ class GuidanceApi(FunctionalPart):
         self._calls.submit(self._land, Command.Request(), reply)
 
     def _on_state(self, state: GuidanceState) -> None:
+        if self.state is None and state.reference in MOTIONS:
+            self.hover()
         self.state = state
         for listener in self._listeners:
             listener(state)

@@ -193,18 +193,22 @@ class Land(GuidedSkill, AbstractLandSkill):
         return decisions.decide_landing(state, self.thresholds)
 
 
+HOOKS: dict[str, type[GuidedSkill]] = {
+    "takeoff": Takeoff,
+    "goto": Goto,
+    "goto_straight": GotoStraight,
+    "rotate_head": RotateHead,
+    "lock_head": LockHead,
+    "hover": Hover,
+    "land": Land,
+}
+
+
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills of the skillset."""
     guidance = GuidanceApi(node)
-    return {
-        "takeoff": Takeoff(guidance),
-        "goto": Goto(guidance),
-        "goto_straight": GotoStraight(guidance),
-        "rotate_head": RotateHead(guidance),
-        "lock_head": LockHead(guidance),
-        "hover": Hover(guidance),
-        "land": Land(guidance),
-    }
+    limits = checks.Limits(**{name: node.declare_parameter(name, value).value for name, value in vars(checks.DEFAULT_LIMITS).items()})
+    return {skill: hooks(guidance, limits) for skill, hooks in HOOKS.items()}
 
 
 def main_navigation() -> None:
