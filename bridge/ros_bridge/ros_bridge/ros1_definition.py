@@ -14,29 +14,12 @@ from dataclasses import dataclass
 
 from ros_bridge.errors import TypeUnknownError
 
-PRIMITIVES = frozenset(
-    [
-        "bool",
-        "int8",
-        "uint8",
-        "int16",
-        "uint16",
-        "int32",
-        "uint32",
-        "int64",
-        "uint64",
-        "float32",
-        "float64",
-        "string",
-        "time",
-        "duration",
-        "byte",
-        "char",
-    ],
-)
+NUMBERS = {f"{kind}int{bits}" for kind in ("", "u") for bits in (8, 16, 32, 64)} | {"float32", "float64"}
+PRIMITIVES = frozenset({*NUMBERS, "bool", "string", "time", "duration", "byte", "char"})
 # What ROS 2 calls the two primitives that it has made into messages.
 ROS2_TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
 SEPARATOR = "=" * 80
+CONSTANT = re.compile(r"(?P<base>\w+)\s+(?P<name>\w+)\s*=(?P<value>.*)")  # a string's value reaches to the end of the line, # included
 FIELD = re.compile(r"(?P<base>[A-Za-z][A-Za-z0-9_/]*)(?P<array>\[\d*\])?")
 
 
@@ -76,18 +59,12 @@ def parse_definition(type_name: str, text: str) -> Definition:
         code = line.split("#")[0].strip()
         if not code:
             continue
-        if "=" in code:
-            constants.append(_constant(line if code.split()[0] == "string" else code))
+        constant = CONSTANT.fullmatch(line.strip() if code.startswith("string ") else code)
+        if constant is not None:
+            constants.append(f"{constant['base']} {constant['name']}={constant['value'].strip()}")
         else:
             fields.append(_field(type_name, code))
     return Definition(type_name, text, tuple(constants), tuple(fields))
-
-
-def _constant(code: str) -> str:
-    """Return ``type name=value``; a string's value reaches to the end of the line, ``#`` included."""
-    declaration, value = code.strip().split("=", 1)
-    base, name = declaration.split()
-    return f"{base} {name}={value.strip()}"
 
 
 def _field(type_name: str, code: str) -> Field:

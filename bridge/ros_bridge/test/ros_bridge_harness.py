@@ -1,0 +1,135 @@
+"""Processes around the bridge for its live tests: a ROS master, the bridge itself, ROS 1 peers."""
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from xmlrpc.client import ServerProxy
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+WITHIN_S = 10.0
+
+
+def alula_root() -> Path:
+    return Path(os.environ["ALULA_ROOT"])
+
+
+def wait_until(condition: Callable[[], object], what: str, within_s: float = WITHIN_S) -> None:
+    end = time.monotonic() + within_s
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail(f"not within {within_s} s: {what}")
+        time.sleep(0.005)
+
+
+def end(process: subprocess.Popen, within_s: float = 5.0) -> float:
+    """Interrupt a process group, and return how many seconds it took to end."""
+    start = time.monotonic()
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGINT)
+        try:
+            process.wait(within_s)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+    return time.monotonic() - start
+
+
+class Master:
+    def __init__(self, port: int) -> None:
+        self.port = port
+        self.uri = f"http://127.0.0.1:{port}"
+        self.environment = {**os.environ, "ROS_MASTER_URI": self.uri, "ROS_IP": "127.0.0.1"}
+        self.process: subprocess.Popen | None = None
+
+    def start(self) -> None:
+        command = [str(alula_root() / "setup/in_ros1"), "rosmaster", "--core", "-p", str(self.port)]
+        self.process = subprocess.Popen(command, env=self.environment, start_new_session=True, stdout=subprocess.DEVNULL)
+        wait_until(self.answers, "the ROS master answers")
+
+    def answers(self) -> bool:
+        try:
+            ServerProxy(self.uri).getPid("/bridge_test")
+        except OSError:
+            return False
+        return True
+
+    def stop(self) -> None:
+        if self.process is not None:
+            end(self.process)
+
+
+class Lines:
+    """A process whose output is read line by line as it comes."""
+
+    def __init__(self, command: list[str], environment: dict[str, str], *, errors: bool) -> None:
+        self.process = subprocess.Popen(
+            command,
+            env=environment,
+            start_new_session=True,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL if errors else subprocess.PIPE,
+            stderr=subprocess.PIPE if errors else None,
+        )
+        self.lines: list[str] = []
+        self._stream = self.process.stderr if errors else self.process.stdout
+        self._fresh: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        for line in self._stream:
+            self.lines.append(line.rstrip("\n"))
+            self._fresh.put(line)
+
+    def next_line(self, within_s: float) -> str:
+        return self._fresh.get(timeout=within_s)
+
+
+class Ros1Peer(Lines):
+    def __init__(self, master: Master) -> None:
+        command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / "ros_bridge_ros1_peer.py")]
+        super().__init__(command, master.environment, errors=False)
+        self.expect("ready")
+
+    def do(self, command: str, **arguments: object) -> None:
+        self.process.stdin.write(json.dumps({"do": command, **arguments}) + "\n")
+        self.process.stdin.flush()
+
+    def expect(self, *kinds: str, within_s: float = WITHIN_S, **wanted: object) -> dict:
+        """Return the next event of one of the kinds that has the wanted values; others in between are passed over."""
+        deadline = time.monotonic() + within_s
+        while True:
+            try:
+                event = json.loads(self.next_line(max(deadline - time.monotonic(), 0.001)))
+            except queue.Empty:
+                pytest.fail(f"no {kinds} {wanted} from the ROS 1 peer within {within_s} s")
+            if event["event"] in kinds and all(event.get(key) == value for key, value in wanted.items()):
+                return event
+
+    def wait_connected(self, topic: str) -> None:
+        def connected() -> bool:
+            self.do("connections", topic=topic)
+            return self.expect("connections", topic=topic)["number"] > 0
+
+        wait_until(connected, f"somebody subscribes to {topic} in ROS 1")
+
+
+class BridgeProcess(Lines):
+    def __init__(self, master: Master, folder: Path, config: str) -> None:
+        folder.mkdir(exist_ok=True, parents=True)
+        (folder / "bridge.yaml").write_text(config)
+        self.stats_file = folder / "bridge_stats.json"
+        command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file)]
+        super().__init__([*command, "__log:=unused"], master.environment, errors=True)
+
+    def wait_running(self) -> None:
+        wait_until(lambda: any("bridging" in line for line in self.lines), f"the bridge runs: {self.lines}", 20.0)

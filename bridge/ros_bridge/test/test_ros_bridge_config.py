@@ -1,0 +1,102 @@
+"""Configuration errors name file, line, value and remedy; routes can't meet or go round in circles."""
+
+import re
+
+import pytest
+
+from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World, load_config, parse_config
+from ros_bridge.errors import ConfigError
+
+GOOD = """
+topics:
+  - {name: /clock, direction: ros1_to_ros2, type: rosgraph_msgs/Clock}
+  - ros1_name: /old
+    ros2_name: /new
+    direction: ros2_to_ros1
+    type: std_msgs/String
+    latched: true
+    depth: 1
+    reliability: best_effort
+services:
+  - {name: /uav_guidance/takeoff, server: ros1, type: uav_msgs/Takeoff, timeout_s: 2}
+"""
+
+
+def test_reads_all_keys_and_defaults():
+    config = parse_config(GOOD, "b.yaml")
+    assert config.topics == (
+        TopicRoute("/clock", "/clock", Direction.ROS1_TO_ROS2, "rosgraph_msgs/Clock", latched=False, depth=10),
+        TopicRoute("/old", "/new", Direction.ROS2_TO_ROS1, "std_msgs/String", latched=True, depth=1, reliability=Reliability.BEST_EFFORT),
+    )
+    assert config.services == (ServiceRoute("/uav_guidance/takeoff", "/uav_guidance/takeoff", World.ROS1, "uav_msgs/Takeoff", 2.0),)
+
+
+def test_empty_file_is_an_empty_configuration():
+    assert parse_config("", "b.yaml").topics == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("topcis: []", 1, ["unknown key 'topcis'", "topics, services"]),
+        ("topics: 3", 1, ["'topics' has to be a list"]),
+        ("topics:\n  - /clock", 2, ["expected keys and values"]),
+        ("topics:\n  - name: /a\n    directoin: x", 3, ["unknown key 'directoin'", "direction"]),
+        ("topics:\n  - {name: /a, direction: up, type: a/B}", 2, ["'up' is not one of ros1_to_ros2, ros2_to_ros1"]),
+        ("topics:\n  - {name: a, direction: ros1_to_ros2, type: a/B}", 2, ["'a' is not an absolute ROS name"]),
+        ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/msg/B}", 2, ["'a/msg/B' is not a type in ROS 1's form"]),
+        ("topics:\n  - {name: /a, direction: ros1_to_ros2}", 2, ["'type' is missing for /a"]),
+        ("topics:\n  - {direction: ros1_to_ros2, type: a/B}", 2, ["no name"]),
+        ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B,\n     depth: 0}", 3, ["depth: 0 is not a number of messages"]),
+        ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B, depth: true}", 2, ["depth: True is not"]),
+        ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B, latched: 1}", 2, ["latched: 1 is not true or false"]),
+        ("topics:\n  - {name: /a, name: /b}", 2, ["'name' is given twice"]),
+        ("services:\n  - {name: /a, server: ros3, type: a/B}", 2, ["'ros3' is not one of ros1, ros2"]),
+        ("services:\n  - {name: /a, server: ros1, type: a/B, timeout_s: -1}", 2, ["timeout_s: -1 is not a number of seconds"]),
+        ("services:\n  - {name: /a, server: ros1, type: a/B, depth: 1}", 2, ["unknown key 'depth'"]),
+        ("topics: [", 1, ["no YAML"]),
+    ],
+)
+def test_errors_name_place_value_and_remedy(text, line, words):
+    with pytest.raises(ConfigError, match=re.escape(f"b.yaml:{line}: ")) as caught:
+        parse_config(text, "b.yaml")
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_file_that_is_not_there(tmp_path):
+    with pytest.raises(ConfigError, match="can't be read"):
+        load_config([tmp_path / "none.yaml"])
+
+
+def route(source, target, direction):
+    one, two = (source, target) if direction == "ros1_to_ros2" else (target, source)
+    return f"  - {{ros1_name: {one}, ros2_name: {two}, direction: {direction}, type: std_msgs/String}}\n"
+
+
+@pytest.mark.parametrize(
+    "routes",
+    [
+        [("/a", "/a", "ros1_to_ros2"), ("/a", "/a", "ros2_to_ros1")],
+        [("/a", "/b", "ros1_to_ros2"), ("/b", "/c", "ros2_to_ros1"), ("/c", "/d", "ros1_to_ros2"), ("/d", "/a", "ros2_to_ros1")],
+    ],
+)
+def test_circles_are_refused(tmp_path, routes):
+    path = tmp_path / "b.yaml"
+    path.write_text("topics:\n" + "".join(route(*one) for one in routes))
+    with pytest.raises(ConfigError, match=r"circles: .*ros1:/a"):
+        load_config([path])
+
+
+def test_a_chain_that_does_not_close_is_no_circle(tmp_path):
+    path = tmp_path / "b.yaml"
+    path.write_text("topics:\n" + route("/a", "/b", "ros1_to_ros2") + route("/b", "/c", "ros2_to_ros1"))
+    assert len(load_config([path]).topics) == 2
+
+
+def test_two_routes_into_one_name_are_refused_over_several_files(tmp_path):
+    for name in ("a.yaml", "b.yaml"):
+        (tmp_path / name).write_text(f"topics:\n{route('/' + name[0], '/same', 'ros1_to_ros2')}")
+    assert len(load_config([tmp_path / "a.yaml"]).topics) == 1
+    with pytest.raises(ConfigError, match="/same: two routes lead there"):
+        load_config([tmp_path / "a.yaml", tmp_path / "b.yaml"])
