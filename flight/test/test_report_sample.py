@@ -115,11 +115,9 @@ class Log:
 
     def __init__(self) -> None:
         self.events: list[dict[str, Any]] = []
-        self._numbers: dict[str, int] = {}
 
     def _add(self, t_s: float, skillset: str, kind: int, **values: Any) -> None:
-        self._numbers[skillset] = number = self._numbers.get(skillset, 0) + 1
-        self.events.append({"stamp_s": LIFT_OFF_S + t_s, "sequence": number, "skillset": skillset, "kind": kind, **values})
+        self.events.append({"stamp_s": LIFT_OFF_S + t_s, "skillset": skillset, "kind": kind, **values})
 
     def skill(self, t_s: float, name: str, id_: str, state: str, **values: Any) -> None:
         """Add a change of an execution; ``name`` is skillset.skill, ``t_s`` counts from lift-off."""
@@ -134,6 +132,9 @@ class Log:
     def write(self, path: Path, *, tail: str = "") -> None:
         """Write ``events.jsonl`` in the order of time; ``tail`` is a last line without its end."""
         ordered = sorted(self.events, key=lambda event: event["stamp_s"])
+        numbers: dict[str, int] = {}
+        for event in ordered:
+            event["sequence"] = numbers[event["skillset"]] = numbers.get(event["skillset"], 0) + 1
         path.write_text("".join(json.dumps(event) + "\n" for event in ordered) + tail, encoding="utf-8")
 
 

@@ -1,9 +1,10 @@
 """How good a map is against the true surfaces: its error, and how much it holds of what was in reach.
 
-What was in reach depends on the planned route alone, never on what was flown: a surface patch is in reach if, from some
-point of the route, it lies within 10 m horizontally, nothing stands between, and it is not seen edge-on. 10 m is what
-one row of a survey is for: the LiDAR reaches 25 m, but there a sweep across the direction of flight meets the ground at
-a grazing angle, with gaps wider than the patches.
+What was in reach depends on the planned route alone, never on what was flown. A surface patch is in reach if, from some point
+of the route, it lies beside the leg (within 30 degrees of the plane across it), within 10 m horizontally, hidden by nothing
+and not seen edge-on. Beside, because a survey sweeps across its legs: what lies before the first point and behind the last
+is nobody's. 10 m, because that is what one leg is for: the LiDAR reaches 25 m, but there it meets the ground at a grazing
+angle, with gaps wider than the patches.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ from alula_flight.report.world import World
 PATCH_M = 0.25  # one sample for each square of this side
 SEED = 1
 REACH_M = 10.0  # horizontally
+BESIDE_DEG = 30.0  # from the plane across the leg
 LIDAR_RANGE_M = 25.0  # in space
 VIEWPOINT_STEP_M = 1.0
 GRAZING_DEG = 5.0  # flatter than this a patch is seen edge-on
 COVERED_WITHIN_M = 0.25
-SIGHT_TOLERANCE_M = 0.05
+SIGHT_TOLERANCE_M = 0.02
 ERROR_SAMPLE = 200_000  # points of the map whose distance is computed, evenly picked
 
 Floats = NDArray[np.float64]
@@ -96,13 +98,19 @@ def covered_by(points: Floats, patches: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(distance))
 
 
-def viewpoints(route: Floats) -> Floats:
-    """Return a point every metre along the route (at most; corners included), (N, 3)."""
-    legs = []
+def viewpoints(route: Floats) -> tuple[Floats, Floats]:
+    """Return points at most a metre apart along each leg, both ends included, and the leg's unit direction, (N, 3) each.
+
+    A route of one point has no direction: zeros, so that everything around lies beside it.
+    """
+    places, directions = [route[:1]], [np.zeros((1, 3))]
     for start, end in pairwise(route):
-        steps = max(1, int(np.ceil(np.linalg.norm(end - start) / VIEWPOINT_STEP_M)))
-        legs.append(start + np.linspace(0.0, 1.0, steps, endpoint=False)[:, None] * (end - start))
-    return np.concatenate([*legs, route[-1:]])
+        length = float(np.linalg.norm(end - start))
+        steps = max(1, int(np.ceil(length / VIEWPOINT_STEP_M)))
+        places.append(start + np.linspace(0.0, 1.0, steps + 1)[:, None] * (end - start))
+        directions.append(np.broadcast_to((end - start) / max(length, 1e-9), (steps + 1, 3)))
+    only_legs = slice(0 if len(route) == 1 else 1, None)
+    return np.concatenate(places[only_legs]), np.concatenate(directions[only_legs])
 
 
 def patches_in_reach(world: World, route: Floats) -> Floats:
@@ -110,19 +118,21 @@ def patches_in_reach(world: World, route: Floats) -> Floats:
     patches, normals = world.sample(PATCH_M, SEED)
     seen = np.zeros(len(patches), dtype=bool)
     columns = cKDTree(patches[:, :2])
-    for viewpoint in viewpoints(route):
+    for viewpoint, along in zip(*viewpoints(route), strict=True):
         near = np.asarray(columns.query_ball_point(viewpoint[:2], REACH_M), dtype=np.int64)
         near = near[~seen[near]]
-        seen[near[_visible(world, viewpoint, patches[near], normals[near])]] = True
+        seen[near[_visible(world, viewpoint, along, patches[near], normals[near])]] = True
     return np.asarray(patches[seen], dtype=np.float64)
 
 
-def _visible(world: World, viewpoint: Floats, patches: Floats, normals: Floats) -> NDArray[np.bool_]:
-    """Tell which patches are in the LiDAR's range, not edge-on, and hidden by nothing."""
+def _visible(world: World, viewpoint: Floats, along: Floats, patches: Floats, normals: Floats) -> NDArray[np.bool_]:
+    """Tell which patches are in the LiDAR's range, beside the leg, not edge-on, and hidden by nothing."""
     sight = patches - viewpoint
     distance = np.linalg.norm(sight, axis=1)
     direction = sight / np.maximum(distance, 1e-9)[:, None]
-    open_to = (distance < LIDAR_RANGE_M) & (np.abs((direction * normals).sum(axis=1)) > np.sin(np.radians(GRAZING_DEG)))
+    beside = np.abs(direction @ along) < np.sin(np.radians(BESIDE_DEG))
+    facing = np.abs((direction * normals).sum(axis=1)) > np.sin(np.radians(GRAZING_DEG))
+    open_to = (distance < LIDAR_RANGE_M) & beside & facing
     visible = np.zeros(len(patches), dtype=bool)
     visible[open_to] = world.first_hit_m(viewpoint, direction[open_to]) > distance[open_to] - SIGHT_TOLERANCE_M
     return visible

@@ -38,7 +38,8 @@ def encounter(track: Track | None, world: World | None, phases: Phases) -> Encou
     """Compute it from the true track (None: unknown)."""
     if track is None:
         return Encounter()
-    flown = track.between(phases.zero_s, np.inf if phases.touch_down_s is None else phases.touch_down_s)
+    down_s = np.inf if phases.touch_down_s is None else phases.touch_down_s
+    flown = track.between(phases.zero_s, np.nextafter(down_s, np.inf))
     distance_m = flown.length_m() if phases.lifted_off else 0.0
     if world is None or not phases.lifted_off:
         return Encounter(distance_m=distance_m)
