@@ -40,115 +40,52 @@ class Body:
     landed: int = 1
 
 
-class FakeAutopilot:
-    """Listen on a free loopback port; one client."""
+class FakeVehicle:
+    """The autopilot without its link: ``hear`` takes messages, ``send`` gets them, ``tick`` moves time on."""
 
-    def __init__(self, *, on_clock: Callable[[float], None], rate: float = 4.0, ready_s: float = 1.0, start_s: float = 100.0) -> None:
+    def __init__(self, send: Callable[[Any], None], *, ready_s: float = 1.0, start_s: float = 100.0) -> None:
         self.body = Body()
         self.transcript: list[tuple[Any, ...]] = []
         self.now_s = start_s
         self.refuse_arming = ""
+        self.deaf = False
         self.stuck = False
         self.setpoint: tuple[float, float, float, float] | None = None
         self.heartbeats_heard = 0
-        self._on_clock, self._rate = on_clock, rate
+        self._send = send
         self._ready_from_s = start_s + ready_s
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self._client: socket.socket | None = None
-        self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._intervals: dict[int, tuple[float, float]] = {}
         self._takeoff: tuple[float, float] | None = None
         self._climb_to: float | None = None
-        self._armed_s = self._touched_s = 0.0
-        self._heartbeat_s = 0.0
-        self._ended = threading.Event()
-        self._lock = threading.RLock()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    @property
-    def url(self) -> str:
-        return f"tcp:127.0.0.1:{self._listener.getsockname()[1]}"
+        self._late_text: tuple[float, str] | None = None
+        self._armed_s = self._touched_s = self._heartbeat_s = 0.0
 
     @property
     def enu(self) -> tuple[float, float, float]:
         north, east, down = self.body.place
         return (east, north, -down)
 
-    def start(self) -> None:
-        self._thread.start()
-
-    def close(self) -> None:
-        self._ended.set()
-        self._thread.join(2.0)
-        self.drop_client()
-        self._listener.close()
-
-    def drop_client(self) -> None:
-        with self._lock:
-            if self._client is not None:
-                self._client.close()
-            self._client = None
-            self._intervals.clear()
-
     def pilot(self, mode: int) -> None:
         """The pilot takes another mode."""
-        with self._lock:
-            self._change_mode(mode)
+        self._change_mode(mode)
 
-    # ---- the thread ----------------------------------------------------------------------------------------------------
+    def forget_streams(self) -> None:
+        self._intervals.clear()
 
-    def _run(self) -> None:
-        next_wall_s = time.monotonic()
-        while not self._ended.is_set():
-            next_wall_s = max(next_wall_s + TICK_S / self._rate, time.monotonic() - 0.1)
-            while (left_s := next_wall_s - time.monotonic()) > 0.0:
-                self._serve(left_s)
-            with self._lock:
-                self.now_s += TICK_S
-                self._move()
-                self._speak()
-            self._on_clock(self.now_s)
-
-    def _serve(self, wait_s: float) -> None:
-        client = self._client
-        ready, _, _ = select.select([client if client is not None else self._listener], [], [], wait_s)
-        if not ready:
-            return
-        with self._lock:
-            if client is None:
-                self._client, _ = self._listener.accept()
-                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
-                self._mav.robust_parsing = True
-                return
-            try:
-                data = client.recv(4096)
-            except OSError:
-                data = b""
-            if not data:
-                self.drop_client()
-                return
-            for message in self._mav.parse_buffer(data) or ():
-                self._hear(message)
-
-    def _send(self, message: Any) -> None:
-        if self._client is not None:
-            try:
-                self._client.sendall(message.pack(self._mav))
-                self._mav.seq = (self._mav.seq + 1) % 256
-            except OSError:
-                self.drop_client()
+    def tick(self) -> None:
+        self.now_s += TICK_S
+        self._move()
+        self._speak()
 
     # ---- what it hears -------------------------------------------------------------------------------------------------
 
-    def _hear(self, message: Any) -> None:
-        assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 191)
+    def hear(self, message: Any) -> None:
         kind = message.get_type()
         if kind == "HEARTBEAT":
             self.heartbeats_heard += 1
         elif kind == "SET_POSITION_TARGET_LOCAL_NED":
             self._hear_setpoint(message)
-        elif kind == "COMMAND_LONG":
+        elif kind == "COMMAND_LONG" and not self.deaf:
             result = self._obey(message)
             self._send(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, 1, 191))
 
@@ -158,7 +95,6 @@ class FakeAutopilot:
 
     def _hear_setpoint(self, message: Any) -> None:
         self._note("setpoints", hex(message.type_mask), self.body.landed)
-        self.last_setpoint_ned = (message.x, message.y, message.z, message.yaw)
         if self.body.mode != GUIDED or not self.body.armed or message.type_mask not in FOLLOWED_MASKS:
             return
         if self.body.landed == 1:
@@ -245,11 +181,12 @@ class FakeAutopilot:
 
     def _stand(self) -> None:
         body = self.body
-        if self._takeoff is not None and self.now_s >= self._takeoff[0]:
-            self._climb_to, self._takeoff, body.landed = self._takeoff[1], None, 3
-        elif (body.armed and body.mode == LAND and self.now_s > self._touched_s + LANDED_DISARM_S) or (
-            body.armed and self._takeoff is None and self.now_s > max(self._armed_s, self._touched_s) + GROUND_DISARM_S
-        ):
+        if self._takeoff is not None:
+            if self.now_s >= self._takeoff[0]:
+                self._climb_to, self._takeoff, body.landed = self._takeoff[1], None, 3
+            return
+        idle_since_s = max(self._armed_s, self._touched_s)
+        if self.now_s > (self._touched_s + LANDED_DISARM_S if body.mode == LAND else idle_since_s + GROUND_DISARM_S):
             body.armed = False
 
     def _to_setpoint(self, setpoint: tuple[float, float, float, float]) -> list[float]:
@@ -262,9 +199,6 @@ class FakeAutopilot:
         return [speed * part / distance if distance > 1e-6 else 0.0 for part in offset]
 
     # ---- what it says --------------------------------------------------------------------------------------------------
-
-    _late_text: tuple[float, str] | None = None
-    last_setpoint_ned: tuple[float, float, float, float] | None = None
 
     def _speak(self) -> None:
         if self.now_s - self._heartbeat_s >= 1.0:
@@ -298,3 +232,86 @@ class FakeAutopilot:
     def _send_home(self) -> None:
         # ArduPilot leaves the local fields at zero.
         self._send(mavlink.MAVLink_home_position_message(*HOME, 0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0))
+
+
+class FakeAutopilot(FakeVehicle):
+    """The vehicle behind a TCP port of loopback, for one client, on a clock that runs ``rate`` times as fast as the wall's."""
+
+    def __init__(self, *, on_clock: Callable[[float], None], rate: float = 4.0) -> None:
+        super().__init__(self._transmit)
+        self._on_clock, self._rate = on_clock, rate
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._client: socket.socket | None = None
+        self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._ended = threading.Event()
+        self._lock = threading.RLock()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    @property
+    def url(self) -> str:
+        return f"tcp:127.0.0.1:{self._listener.getsockname()[1]}"
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join(2.0)
+        self.drop_client()
+        self._listener.close()
+
+    def drop_client(self) -> None:
+        with self._lock:
+            if self._client is not None:
+                self._client.close()
+            self._client = None
+            self.forget_streams()
+
+    def pilot(self, mode: int) -> None:
+        with self._lock:
+            super().pilot(mode)
+
+    def _run(self) -> None:
+        next_wall_s = time.monotonic()
+        while not self._ended.is_set():
+            next_wall_s = max(next_wall_s + TICK_S / self._rate, time.monotonic() - 0.1)
+            while (left_s := next_wall_s - time.monotonic()) > 0.0:
+                self._serve(left_s)
+            with self._lock:
+                self.tick()
+            self._on_clock(self.now_s)
+
+    def _serve(self, wait_s: float) -> None:
+        client = self._client
+        try:
+            ready, _, _ = select.select([client if client is not None else self._listener], [], [], wait_s)
+            data = client.recv(4096) if ready and client is not None else None
+        except (OSError, ValueError):  # closed by another thread
+            data = b""
+        with self._lock:
+            if client is None:
+                self._accept()
+            elif data == b"":
+                self.drop_client()
+            for message in (self._mav.parse_buffer(data) if data else None) or ():
+                assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 191)
+                self.hear(message)
+
+    def _accept(self) -> None:
+        self._listener.settimeout(0.0)
+        try:
+            self._client, _ = self._listener.accept()
+        except BlockingIOError:
+            return
+        self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._mav.robust_parsing = True
+
+    def _transmit(self, message: Any) -> None:
+        if self._client is None:
+            return
+        try:
+            self._client.sendall(message.pack(self._mav))
+            self._mav.seq = (self._mav.seq + 1) % 256
+        except OSError:
+            self.drop_client()

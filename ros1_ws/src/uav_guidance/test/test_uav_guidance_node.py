@@ -55,6 +55,8 @@ class Bench:
         rospy.set_param("/use_sim_time", True)
         rospy.set_param("/uav_guidance", {"url": self.autopilot.url})
         self.node = self.run_node()
+        # The clock starts late, as it does when the simulator takes longer to come up than the node.
+        rospy.wait_for_service("/uav_guidance/check_fence", timeout=20.0)
         self.autopilot.start()
 
     def run_node(self) -> subprocess.Popen[bytes]:

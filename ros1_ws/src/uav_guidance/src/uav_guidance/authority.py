@@ -22,6 +22,7 @@ class Authority:
 
     held: bool = False
     _land_asked: bool = False
+    _land_seen: bool = False
     _start_settled: bool = False
 
     def ask_land(self) -> None:
@@ -34,8 +35,9 @@ class Authority:
 
     def update(self, vehicle: Vehicle, *, link: bool) -> Change:
         """Judge by the mode of the last heartbeat."""
-        if vehicle.mode not in {Mode.GUIDED, Mode.LAND}:
-            self._land_asked = False
+        self._land_seen |= self._land_asked and vehicle.mode == Mode.LAND
+        if vehicle.mode not in {Mode.GUIDED, Mode.LAND} or (self._land_seen and vehicle.mode != Mode.LAND):
+            self._land_asked = self._land_seen = False
         before = self.held
         self.held = link and (vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked))
         if self.held == before:

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from uav_guidance.authority import Authority, Change
-from uav_guidance.carrot import HeadingCarrot
 from uav_guidance.commands import Command, Procedure, arm, disarm, set_mode, take_off
-from uav_guidance.frames import wrap
-from uav_guidance.obstacles import ObstacleWatch, Sighting, Way
-from uav_guidance.references import Heading, Hold, Land, Reference, Takeoff, Travel, Turn
+from uav_guidance.follower import Course, Follower, Setpoint
+from uav_guidance.obstacles import Sighting
+from uav_guidance.references import Hold, Land, Reference, Takeoff, Travel, Turn
 from uav_guidance.requests import (
     AuthorityRequest,
     Decision,
@@ -34,41 +33,21 @@ from uav_guidance.requests import (
     require,
 )
 from uav_guidance.settings import Settings
-from uav_guidance.stillness import StillWatch
-from uav_guidance.vectors import Line, Vec3
+from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, Vehicle, mode_name, updated
 
-SETPOINT_PERIOD_S = 0.1
-LONGEST_STEP_S = 0.2  # after a pause of the clock or the link the carrot must not jump
 PREARM_PREFIX = "PreArm: "
 
 
 @dataclass(frozen=True)
-class Setpoint:
-    """Where the vehicle should be now, and its heading."""
-
-    position_enu_m: Vec3
-    yaw_rad: float
-
-
-@dataclass(frozen=True)
 class Report:
-    """What the guidance knows and does; the fields are those of uav_msgs/GuidanceState."""
+    """What the guidance knows and does."""
 
     vehicle: Vehicle
     link: bool
     authority: bool
-    reference: str
     reference_id: int
-    target_enu_m: Vec3
-    target_yaw_rad: float
-    remaining_enu_m: Vec3
-    drift_m: float
-    heading_error_rad: float
-    heading_locked: bool
-    still_s: float
-    obstacle_stop: bool
-    obstacle_m: float
+    course: Course
 
 
 class Guidance:
@@ -78,18 +57,10 @@ class Guidance:
         self.vehicle = Vehicle()
         self._settings = settings
         self._authority = Authority()
-        self._heading = Heading(HeadingCarrot(0.0))
-        self._obstacles = ObstacleWatch(settings)
-        self._still = StillWatch(reached_m=settings.reached_m, reached_rad=settings.reached_rad)
-        self._still_s = 0.0
-        self._reference: Reference | None = None
+        self._follower = Follower(settings)
         self._reference_id = 0
         self._procedure: Procedure | None = None
         self._start_procedure: Procedure | None = None
-        self._streaming = False
-        self._blocked = False
-        self._last_step_s: float | None = None
-        self._last_setpoint_s = -math.inf
         self._prearm_text = ""
         self._answers: dict[type[Request], Callable[[Any, float], Decision]] = {
             TakeoffRequest: self._take_off,
@@ -122,7 +93,7 @@ class Guidance:
 
     def on_obstacle(self, sighting: Sighting) -> None:
         """Take a sensor's word about the corridor ahead."""
-        self._obstacles.see(sighting)
+        self._follower.obstacles.see(sighting)
 
     def ask(self, request: Request, now_s: float) -> Decision:
         """Accept a request or refuse it with a reason; a refused one changes nothing."""
@@ -143,15 +114,12 @@ class Guidance:
 
     def step(self, now_s: float) -> list[Command | Setpoint]:
         """Go on to this time; return what has to be sent now. To be called at 20 Hz, and whenever something has come in."""
-        dt_s = 0.0 if self._last_step_s is None else min(max(now_s - self._last_step_s, 0.0), LONGEST_STEP_S)
-        self._last_step_s = now_s
         self._check_authority(now_s)
         self._take_authority_at_start(now_s)
         command = self._procedure.due(now_s) if self._procedure is not None else None
         self._drop_what_ended(now_s)
         self._adopt_hover(now_s)
-        setpoint = self._follow(now_s, dt_s)
-        self._measure_stillness(now_s)
+        setpoint = self._follower.step(self.vehicle, now_s, commanded=self._authority.held)
         return [item for item in (command, setpoint) if item is not None]
 
     def link(self, now_s: float) -> bool:
@@ -171,24 +139,12 @@ class Guidance:
 
     def report(self, now_s: float) -> Report:
         """Return what the guidance knows and does."""
-        place = self.vehicle.position_enu_m or Vec3()
-        reference = self._reference
-        line = Line(place, place) if reference is None else reference.line
         return Report(
             vehicle=self.vehicle,
             link=self.link(now_s),
             authority=self._authority.held,
-            reference=Reference.name if reference is None else reference.name,
             reference_id=self._reference_id,
-            target_enu_m=line.target,
-            target_yaw_rad=wrap(self.vehicle.yaw_rad + self._heading_error()),
-            remaining_enu_m=Vec3() if reference is None else reference.remaining(self.vehicle),
-            drift_m=line.distance(place),
-            heading_error_rad=self._heading_error(),
-            heading_locked=self._heading.locked,
-            still_s=self._still_s,
-            obstacle_stop=self._blocked,
-            obstacle_m=self._obstacles.nearest_m(now_s),
+            course=self._follower.course(self.vehicle, now_s),
         )
 
     # ---- requests ------------------------------------------------------------------------------------------------------
@@ -206,7 +162,7 @@ class Guidance:
         check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
         check_flying(self.vehicle)
         check_fence(request.target_enu_m, self.vehicle, self._settings)
-        require(not (request.along_travel and self._heading.locked), "the heading is locked: it can't turn into the travel")
+        require(not (request.along_travel and self._follower.heading.locked), "the heading is locked: it can't turn into the travel")
         reference = Travel(
             self._settings,
             target_enu_m=request.target_enu_m,
@@ -217,7 +173,7 @@ class Guidance:
 
     def _set_heading(self, request: HeadingRequest, now_s: float) -> Decision:
         if request.release:
-            self._heading.locked = False
+            self._follower.heading.locked = False
             return Decision(accepted=True, reference_id=self._reference_id)
         self._require_authority()
         require(math.isfinite(request.yaw_rad), f"yaw is {request.yaw_rad}: not a number")
@@ -225,21 +181,19 @@ class Guidance:
         check_flying(self.vehicle)
         if request.lock:
             return self._lock_heading(request, now_s)
-        require(not self._heading.locked, "the heading is locked")
+        require(not self._follower.heading.locked, "the heading is locked")
         return self._accept(Turn(self._settings, yaw_rad=request.yaw_rad, rate_rad_s=request.rate_rad_s), self._to_guided(), now_s)
 
     def _lock_heading(self, request: HeadingRequest, now_s: float) -> Decision:
         """Set the heading beside the reference, which goes on and keeps its id."""
         self._adopt_hover(now_s)
-        self._heading.locked = True
-        self._heading.carrot.turn(request.yaw_rad, request.rate_rad_s)
-        self._still.restart(now_s)
+        self._follower.lock_heading(request.yaw_rad, request.rate_rad_s, now_s)
         return Decision(accepted=True, reference_id=self._reference_id)
 
     def _hover(self, _request: HoverRequest, now_s: float) -> Decision:
         self._require_authority()
         if self.vehicle.on_ground:
-            require(isinstance(self._reference, Takeoff), "not in the air")
+            require(isinstance(self._follower.reference, Takeoff), "not in the air")
             return self._accept(Hold(self._settings), [disarm()], now_s)
         require(self.vehicle.off_ground, "the autopilot has not said whether it is in the air")
         require(self.vehicle.located, "the autopilot does not say where it is")
@@ -247,9 +201,9 @@ class Guidance:
 
     def _land(self, _request: LandRequest, now_s: float) -> Decision:
         self._require_authority()
-        require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._reference, Takeoff), "on the ground already")
+        require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._follower.reference, Takeoff), "on the ground already")
         self._authority.ask_land()
-        self._heading.locked = False
+        self._follower.heading.locked = False
         return self._accept(Land(), [] if self.vehicle.mode == Mode.LAND else [set_mode(Mode.LAND)], now_s)
 
     def _take_authority(self, _request: AuthorityRequest, now_s: float) -> Decision:
@@ -272,22 +226,13 @@ class Guidance:
         # Ids go on after a restart of the node: they begin at the mission clock's milliseconds.
         self._reference_id = max(self._reference_id + 1, int(now_s * 1000.0) & 0xFFFFFFF)
         self._run(Procedure(commands))
-        self._set_reference(reference, now_s)
+        self._follower.take(reference, self.vehicle, now_s)
         return Decision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
 
     def _run(self, procedure: Procedure) -> None:
         if self._procedure is not None:
             self._procedure.abort("another command came")
         self._procedure = procedure
-
-    def _set_reference(self, reference: Reference | None, now_s: float) -> None:
-        self._reference = reference
-        self._streaming = self._blocked = False
-        self._last_setpoint_s = -math.inf
-        self._obstacles.forget_hold()
-        self._still.restart(now_s)
-        if reference is not None:
-            reference.accept(self.vehicle, self._heading)
 
     # ---- at each step --------------------------------------------------------------------------------------------------
 
@@ -298,8 +243,8 @@ class Guidance:
         why = f"the vehicle went into {mode_name(self.vehicle.mode)}" if self.link(now_s) else "the link was lost"
         if self._procedure is not None:
             self._procedure.abort(f"authority lost: {why}")
-        self._heading.locked = False
-        self._set_reference(None, now_s)
+        self._follower.heading.locked = False
+        self._follower.take(None, self.vehicle, now_s)
 
     def _take_authority_at_start(self, now_s: float) -> None:
         """Take GUIDED once, when the vehicle stands ready on the ground; try again only if nobody answered."""
@@ -317,60 +262,17 @@ class Guidance:
         outcome = self._procedure.outcome if self._procedure is not None else None
         if outcome is not None and not outcome.accepted:
             self._procedure = None
-            if isinstance(self._reference, Land):
+            if isinstance(self._follower.reference, Land):
                 self._authority.land_refused()
-            if self._reference is not None and not self._streaming:
-                self._set_reference(None, now_s)
+            if self._follower.reference is not None and not self._follower.streaming:
+                self._follower.take(None, self.vehicle, now_s)
         elif outcome is not None:
             self._procedure = None
-        standing = self.vehicle.on_ground and not self.vehicle.armed
-        if standing and self._procedure is None and not isinstance(self._reference, Land | None):
-            self._set_reference(None, now_s)
+        if self._procedure is None and self._follower.over(self.vehicle):
+            self._follower.take(None, self.vehicle, now_s)
 
     def _adopt_hover(self, now_s: float) -> None:
         """Stay in place when there is the authority but no reference, in the air: after a restart, or given back by the pilot."""
         flying = self.vehicle.landed is Landed.IN_AIR and self.vehicle.located and self.vehicle.mode == Mode.GUIDED
-        if self._reference is None and self._authority.held and flying:
-            self._set_reference(Hold(self._settings), now_s)
-
-    def _follow(self, now_s: float, dt_s: float) -> Setpoint | None:
-        """Move the carrots and return a setpoint if one is due."""
-        reference, vehicle = self._reference, self.vehicle
-        if isinstance(reference, Takeoff) and not self._streaming:
-            reference.keep_to_home(vehicle.home_enu_m)
-        if reference is None or not self._may_stream(reference):
-            return None
-        if not self._streaming:
-            reference.start(vehicle, self._heading)
-            self._streaming = True
-        self._blocked = reference.travelling and self._obstacles.blocked(self._way(reference), now_s)
-        position = reference.setpoint(vehicle, blocked=self._blocked, dt_s=dt_s)
-        yaw_rad = self._heading.carrot.step(vehicle.yaw_rad, dt_s)
-        # The clock has steps of its own (20 ms in simulation): a tenth of a second may look a little shorter.
-        if now_s - self._last_setpoint_s < SETPOINT_PERIOD_S - 0.005:
-            return None
-        self._last_setpoint_s = now_s
-        return Setpoint(position, yaw_rad)
-
-    def _may_stream(self, reference: Reference) -> bool:
-        """Setpoints are for GUIDED only, and for a vehicle whose take-off they can't cancel."""
-        vehicle = self.vehicle
-        return self._authority.held and vehicle.mode == Mode.GUIDED and vehicle.located and vehicle.landed in reference.STREAMS_IN
-
-    def _way(self, reference: Reference) -> Way:
-        remaining = reference.remaining(self.vehicle)
-        ahead = self.vehicle.velocity_enu_m_s.dot(remaining) / remaining.norm if remaining.norm > 0.0 else 0.0
-        return Way(self.vehicle.position_enu_m or Vec3(), remaining, max(ahead, 0.0))
-
-    def _heading_error(self) -> float:
-        """Return the way to the heading's target, counter-clockwise positive; zero while the autopilot minds the heading itself."""
-        minded = (
-            self._reference is None or isinstance(self._reference, Land) or (isinstance(self._reference, Takeoff) and not self._streaming)
-        )
-        return 0.0 if minded else wrap(self._heading.carrot.target_rad - self.vehicle.yaw_rad)
-
-    def _measure_stillness(self, now_s: float) -> None:
-        if self._reference is None:
-            self._still.restart(now_s)
-        distance_m = 0.0 if self._reference is None else self._reference.remaining(self.vehicle).norm
-        self._still_s = self._still.step(distance_m=distance_m, heading_error_rad=self._heading_error(), now_s=now_s)
+        if self._follower.reference is None and self._authority.held and flying:
+            self._follower.take(Hold(self._settings), self.vehicle, now_s)

@@ -11,59 +11,22 @@ from typing import Any
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from uav_guidance.commands import Command
-from uav_guidance.frames import FOLLOW_POSITION_AND_YAW, ned_from_enu, yaw_ned_from_enu
-from uav_guidance.guidance import Setpoint
+from uav_guidance.encoding import COMPANION_COMPONENT, COMPANION_SYSTEM, from_autopilot_to_us
 
 log = logging.getLogger(__name__)
 
-AUTOPILOT_SYSTEM, AUTOPILOT_COMPONENT = 1, 1
-COMPANION_SYSTEM, COMPANION_COMPONENT = 1, 191
 READ_WAIT_S = 0.2
 FIRST_RETRY_S, LONGEST_RETRY_S = 0.2, 2.0
-
-# Nothing but heartbeats and texts comes unasked; these are asked for, by SET_MESSAGE_INTERVAL, on every link.
-STREAMS_HZ: dict[int, float] = {
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 10.0,
-    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 1.0,
-    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 0.5,
-}
-STREAM_PATIENCE_S = 2.5  # a stream not heard of for so long is asked for again
 
 
 class LinkClosedError(ConnectionError):
     """The other side closed the connection."""
 
 
-class StreamKeeper:
-    """Know which streams have to be asked for: all on a new link, later those that stay away (the autopilot may have restarted)."""
-
-    def __init__(self) -> None:
-        self._heard_s: dict[int, float] = {}
-
-    def forget(self) -> None:
-        """Begin anew, on a new connection."""
-        self._heard_s.clear()
-
-    def hear(self, message_id: int, now_s: float) -> None:
-        """Note that a message came."""
-        if message_id in STREAMS_HZ:
-            self._heard_s[message_id] = now_s
-
-    def due(self, now_s: float) -> list[int]:
-        """Return the messages to ask for now; they are not due again before their patience is over."""
-        missing = [number for number in STREAMS_HZ if abs(now_s - self._heard_s.get(number, -STREAM_PATIENCE_S)) >= STREAM_PATIENCE_S]
-        self._heard_s.update(dict.fromkeys(missing, now_s))
-        return missing
-
-
 class Link:
     """A MAVLink 2 connection to the autopilot (system and component 1/1), as its companion (1/191).
 
-    ``on_message`` and ``on_connect`` are called in the reader's thread; ``send_...`` may be called from any thread.
+    ``on_message`` and ``on_connect`` are called in the reader's thread; ``send`` may be called from any thread.
     """
 
     def __init__(self, url: str, baud: int, *, on_message: Callable[[Any], None], on_connect: Callable[[], None]) -> None:
@@ -84,52 +47,15 @@ class Link:
         self._ended.set()
         self._thread.join(2.0 * READ_WAIT_S + 1.0)
 
-    def send_heartbeat(self) -> None:
-        """Say that the companion lives."""
-        self._send(lambda mav: mav.heartbeat_encode(mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4))
-
-    def send_command(self, command: Command) -> None:
-        """Send a COMMAND_LONG."""
-        self._send(
-            lambda mav: mav.command_long_encode(
-                AUTOPILOT_SYSTEM, AUTOPILOT_COMPONENT, command.number, command.confirmation, *command.parameters
-            )
-        )
-
-    def send_setpoint(self, setpoint: Setpoint) -> None:
-        """Send position and yaw, relative to the EKF origin."""
-        ned = ned_from_enu(setpoint.position_enu_m)
-        yaw = yaw_ned_from_enu(setpoint.yaw_rad)
-        self._send(
-            lambda mav: mav.set_position_target_local_ned_encode(
-                0,
-                AUTOPILOT_SYSTEM,
-                AUTOPILOT_COMPONENT,
-                mavlink.MAV_FRAME_LOCAL_NED,
-                FOLLOW_POSITION_AND_YAW,
-                *(ned.x, ned.y, ned.z),
-                *(0.0,) * 6,
-                yaw,
-                0.0,
-            )
-        )
-
-    def ask_stream(self, message_id: int) -> None:
-        """Ask for a message at its rate."""
-        interval_us = 1e6 / STREAMS_HZ[message_id]
-        parameters = (float(message_id), interval_us, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.send_command(Command("message interval", mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, parameters))
-
-    def _send(self, encode: Callable[[Any], Any]) -> None:
-        """Send a message, or nothing when there is no connection: what matters is repeated."""
+    def send(self, message: Any) -> None:
+        """Send a message; without a connection it is lost, for what matters is repeated."""
         with self._sending:
             if self._mav is not None:
                 with contextlib.suppress(OSError):
-                    self._mav.send(encode(self._mav))
+                    self._mav.send(message)
 
     def _run(self) -> None:
-        retry_s = FIRST_RETRY_S
-        told = ""
+        retry_s, told = FIRST_RETRY_S, ""
         while not self._ended.is_set():
             try:
                 self._connect()
@@ -168,18 +94,9 @@ class Link:
                 continue
             data = self._port.recv(4096)
             for message in (self._mav.parse_buffer(data) if data else None) or ():
-                if _from_autopilot_to_us(message):
+                if from_autopilot_to_us(message):
                     self._on_message(message)
 
     @staticmethod
     def _closed() -> None:
         raise LinkClosedError("the connection was closed")
-
-
-def _from_autopilot_to_us(message: Any) -> bool:
-    """Tell the autopilot's own messages from those that it forwards, and our answers from other clients'."""
-    if (message.get_srcSystem(), message.get_srcComponent()) != (AUTOPILOT_SYSTEM, AUTOPILOT_COMPONENT):
-        return False
-    if message.get_type() != "COMMAND_ACK":
-        return True
-    return message.target_system in {0, COMPANION_SYSTEM} and message.target_component in {0, COMPANION_COMPONENT}

@@ -40,8 +40,8 @@ def sighting(message: Obstacle) -> Sighting:
 
 def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
     """Return the guidance's state as a message."""
-    vehicle, remaining = report.vehicle, report.remaining_enu_m
-    place, velocity, target = vehicle.position_enu_m or Vec3(), vehicle.velocity_enu_m_s, report.target_enu_m
+    vehicle, course, remaining = report.vehicle, report.course, report.course.remaining_enu_m
+    place, velocity, target = vehicle.position_enu_m or Vec3(), vehicle.velocity_enu_m_s, course.target_enu_m
     message = GuidanceState(
         link=report.link,
         ready=vehicle.ready,
@@ -53,19 +53,19 @@ def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
         position_enu_m=Point(place.x, place.y, place.z),
         velocity_enu_m_s=Vector3(velocity.x, velocity.y, velocity.z),
         yaw_rad=vehicle.yaw_rad,
-        reference=report.reference,
+        reference=course.reference,
         reference_id=report.reference_id,
         target_enu_m=Point(target.x, target.y, target.z),
-        target_yaw_rad=report.target_yaw_rad,
+        target_yaw_rad=course.target_yaw_rad,
         distance_to_go_m=remaining.norm,
         horizontal_to_go_m=remaining.horizontal,
         vertical_to_go_m=abs(remaining.z),
-        drift_m=report.drift_m,
-        heading_error_rad=report.heading_error_rad,
-        heading_locked=report.heading_locked,
-        still_s=report.still_s,
-        obstacle_stop=report.obstacle_stop,
-        obstacle_m=report.obstacle_m,
+        drift_m=course.drift_m,
+        heading_error_rad=course.heading_error_rad,
+        heading_locked=course.heading_locked,
+        still_s=course.still_s,
+        obstacle_stop=course.obstacle_stop,
+        obstacle_m=course.obstacle_m,
     )
     message.header.stamp = stamp
     message.header.frame_id = FRAME

@@ -30,11 +30,14 @@ from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
 from resource_reporter import ResourceReporter
 from uav_guidance import requests
-from uav_guidance.guidance import Guidance, Setpoint
-from uav_guidance.link import Link, StreamKeeper
+from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
+from uav_guidance.follower import Setpoint
+from uav_guidance.guidance import Guidance
+from uav_guidance.link import Link
 from uav_guidance.messages import pose_message, sighting, state_message, time_of, transform_message, vec3
 from uav_guidance.settings import Settings, SettingsError
 from uav_guidance.stamping import StampClock
+from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
 
 log = logging.getLogger(__name__)
@@ -170,9 +173,9 @@ class GuidanceNode:
         with self._changed:
             if abs(now_s - self._heartbeat_s) >= HEARTBEAT_PERIOD_S:
                 self._heartbeat_s = now_s
-                self._link.send_heartbeat()
+                self._link.send(heartbeat_message())
             for number in self._streams.due(now_s):
-                self._link.ask_stream(number)
+                self._link.send(interval_message(number, STREAMS_HZ[number]))
             self._advance()
             state = state_message(self._guidance.report(now_s), now)
         self._state.publish(state)
@@ -180,10 +183,7 @@ class GuidanceNode:
     def _advance(self) -> None:
         """Step the guidance to now and send what it says."""
         for item in self._guidance.step(_now_s()):
-            if isinstance(item, Setpoint):
-                self._link.send_setpoint(item)
-            else:
-                self._link.send_command(item)
+            self._link.send(setpoint_message(item) if isinstance(item, Setpoint) else command_message(item))
         self._report_resources()
         self._changed.notify_all()
 

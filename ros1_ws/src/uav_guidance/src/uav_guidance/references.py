@@ -167,7 +167,7 @@ class Travel(Reference):
             Line(start, self.line.target),
             speed_m_s=self._speed_m_s,
             accel_m_s2=self._settings.max_accel_m_s2,
-            lead_m=max(self._settings.carrot_lead_m, self._settings.carrot_lead_s * self._speed_m_s),
+            lead_m=self._settings.lead_m(self._speed_m_s),
             initial_speed_m_s=initial_speed_m_s,
         )
 

@@ -32,9 +32,9 @@ class Settings:
     max_accel_m_s2: float = 1.5
     """Of the carrot, and for planned braking."""
     carrot_lead_m: float = 1.0
-    """The carrot is at most so far ahead of the vehicle ..."""
-    carrot_lead_s: float = 1.0
-    """... or so many seconds at the speed of the reference, if that is more: the vehicle follows the carrot at that lag."""
+    """The carrot keeps its speed until it is so far ahead of the vehicle ..."""
+    carrot_lead_s: float = 0.8
+    """... or so many seconds at the speed of the reference, if that is more: a vehicle follows a moving setpoint with such a lag."""
 
     yaw_rate_rad_s: float = 0.7
     """At which the nose is turned into the travel."""
@@ -59,6 +59,10 @@ class Settings:
 
     link_lost_s: float = 2.0
     """Without heartbeat for so long the link counts as lost."""
+
+    def lead_m(self, speed_m_s: float) -> float:
+        """Return how far ahead of a vehicle that does not follow the carrot comes to rest."""
+        return max(self.carrot_lead_m, self.carrot_lead_s * speed_m_s) + speed_m_s**2 / (2.0 * self.max_accel_m_s2)
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -1,0 +1,125 @@
+"""The reporter on a live graph: at once, until it agrees, again after a restart, without ever blocking who reports."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+rospy = pytest.importorskip("rospy")
+
+from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
+from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
+
+from alula_testing.ros1 import wait_until  # noqa: E402
+from resource_reporter import ResourceReporter  # noqa: E402
+
+SKILLSET = "reported"
+ARROWS = {("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "BROKEN"), ("BROKEN", "OK")}
+
+
+class Skillset:
+    """A resource manager with one resource."""
+
+    def __init__(self) -> None:
+        self.state = "UNKNOWN"
+        self.calls: list[tuple[float, str]] = []
+        self.hangs: threading.Event | None = None
+        self._publisher = rospy.Publisher(f"/{SKILLSET}/resource_states", ResourceStates, queue_size=5, latch=True)
+        self._service: object = None
+        self.show()
+
+    def serve(self) -> None:
+        self._service = rospy.Service(f"/{SKILLSET}/transition", Transition, self._take)
+
+    def restart(self) -> None:
+        self._service.shutdown("restart")
+        self.state = "UNKNOWN"
+        self.serve()
+        self.show()
+
+    def show(self) -> None:
+        self._publisher.publish(ResourceStates(skillset=SKILLSET, resources=[ResourceState(name="zed_status", state=self.state)]))
+
+    def close(self) -> None:
+        if self._service is not None:
+            self._service.shutdown("end")
+        self._publisher.unregister()
+
+    def _take(self, request: TransitionRequest) -> TransitionResponse:
+        self.calls.append((time.monotonic(), request.to))
+        if self.hangs is not None:
+            self.hangs.wait(10.0)
+        if (self.state, request.to) not in ARROWS:
+            return TransitionResponse(False, f"no arrow from {self.state} to {request.to}", self.state)
+        self.state = request.to
+        self.show()
+        return TransitionResponse(True, "", self.state)
+
+
+@pytest.fixture
+def skillset(ros_master: str) -> Iterator[Skillset]:
+    skillset = Skillset()
+    yield skillset
+    skillset.close()
+
+
+@pytest.fixture
+def reporter(ros_master: str) -> Iterator[ResourceReporter]:
+    reporter = ResourceReporter(SKILLSET)
+    yield reporter
+    reporter.close()
+
+
+def becomes(skillset: Skillset, state: str) -> None:
+    wait_until(lambda: skillset.state == state, timeout_s=5.0, what=f"the resource is {state}")
+
+
+def test_reports_within_milliseconds_once_connected(skillset, reporter):
+    skillset.serve()
+    reporter.report("zed_status", "OK")
+    becomes(skillset, "OK")
+    latencies = []
+    for index in range(20):
+        state = "BROKEN" if index % 2 == 0 else "OK"
+        begin_s = time.monotonic()
+        reporter.report("zed_status", state)
+        returned_s = time.monotonic()
+        becomes(skillset, state)
+        latencies.append(skillset.calls[-1][0] - begin_s)
+        assert returned_s - begin_s < 0.05
+    assert sorted(latencies)[10] < 0.005
+    assert len(skillset.calls) == 21
+
+
+def test_a_service_that_appears_late_and_a_skillset_that_starts_anew_are_told(skillset, reporter):
+    reporter.report("zed_status", "BROKEN")
+    skillset.serve()
+    becomes(skillset, "BROKEN")
+    skillset.restart()
+    becomes(skillset, "BROKEN")
+
+
+def test_a_refused_state_does_not_stand_in_the_way_of_the_next(skillset, reporter):
+    skillset.serve()
+    reporter.report("zed_status", "OK")
+    becomes(skillset, "OK")
+    reporter.report("zed_status", "UNKNOWN")
+    wait_until(lambda: [to for _, to in skillset.calls].count("UNKNOWN") >= 3, timeout_s=5.0, what="it is tried again")
+    reporter.report("zed_status", "BROKEN")
+    becomes(skillset, "BROKEN")
+
+
+def test_a_hanging_service_blocks_nobody_for_long(skillset, reporter):
+    skillset.hangs = threading.Event()
+    skillset.serve()
+    reporter.report("zed_status", "OK")
+    wait_until(lambda: len(skillset.calls) == 1, timeout_s=5.0, what="it is called")
+    begin_s = time.monotonic()
+    reporter.report("zed_status", "BROKEN")
+    assert time.monotonic() - begin_s < 0.05
+    wait_until(lambda: len(skillset.calls) >= 2, timeout_s=4.0, what="it is called anew after two seconds")
+    skillset.hangs.set()
+    becomes(skillset, "BROKEN")
