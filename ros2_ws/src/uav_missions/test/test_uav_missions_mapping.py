@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
-from uav_missions.mapping import MappingMission
 from uav_missions_fakes import SQUARE, State, World, clients, make_blackboard
+
+from uav_missions.mapping import MappingMission
 
 
 class Flight:
@@ -129,7 +130,8 @@ def test_losing_both_sensors_stops_and_lands_where_it_is():
     assert flight.world.resources["flight_status"] == "ON_GROUND"
     assert not flight.world.running()
     assert flight.blackboard.reason == (
-        "perception.zed_depthmap: RESOURCE_INVARIANT_VIOLATED zed_ok (zed_status is BROKEN); then perception.lidar_depthmap: NOT_READY sensor_ok"
+        "perception.zed_depthmap: RESOURCE_INVARIANT_VIOLATED zed_ok (zed_status is BROKEN); "
+        "then perception.lidar_depthmap: NOT_READY sensor_ok"
     )
 
 

@@ -11,7 +11,7 @@ from py_trees.decorators import Decorator
 from uav_missions.blackboard import Blackboard
 
 
-class Until(Decorator):
+class Until(Decorator):  # type: ignore[misc]  # py_trees is seen untyped
     """Runs its child again and again until the condition holds after a success; fails with its child."""
 
     def __init__(self, name: str, child: Behaviour, condition: Callable[[], bool]) -> None:
@@ -25,7 +25,7 @@ class Until(Decorator):
         return Status.SUCCESS if self._condition() else Status.RUNNING
 
 
-class RetryAfter(Decorator):
+class RetryAfter(Decorator):  # type: ignore[misc]  # py_trees is seen untyped
     """Gives its child another chance, ``wait_s`` of mission clock after a failure that is ``worth_it``, ``chances`` in all."""
 
     def __init__(

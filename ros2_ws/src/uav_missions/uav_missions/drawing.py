@@ -20,7 +20,12 @@ MARGIN_PX = 16
 TITLE_PX = 34
 FONT = "font-family='DejaVu Sans, Helvetica, sans-serif'"
 
-SYMBOLS = {"sequence": "\N{RIGHTWARDS ARROW}", "selector": "?", "parallel": "\N{RIGHTWARDS PAIRED ARROWS}", "decorator": "\N{WHITE DIAMOND}"}
+SYMBOLS = {
+    "sequence": "\N{RIGHTWARDS ARROW}",
+    "selector": "?",
+    "parallel": "\N{RIGHTWARDS PAIRED ARROWS}",
+    "decorator": "\N{WHITE DIAMOND}",
+}
 FILLS = {
     "skill": "#b7e1b0",
     "action": "#d9d9d9",

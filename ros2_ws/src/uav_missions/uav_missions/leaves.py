@@ -20,7 +20,7 @@ def nothing_more(_blackboard: Blackboard) -> None:
     """Do nothing after a success."""
 
 
-class SkillLeaf(Behaviour):
+class SkillLeaf(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """One skill: started when the leaf is first ticked, watched, interrupted when the tree leaves it.
 
     RUNNING until the execution has ended; SUCCESS when it TERMINATED with a result in ``success``; else FAILURE, with a
@@ -95,7 +95,7 @@ class SkillLeaf(Behaviour):
         return True
 
 
-class WaypointWriter(Behaviour):
+class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """Writes the next waypoint of the route onto the blackboard (paper, Figure 10): SUCCESS while there are some.
 
     It writes the same one until it was reached, whichever branch flies there: a leg that one branch was interrupted on is
@@ -118,7 +118,7 @@ class WaypointWriter(Behaviour):
         return Status.SUCCESS
 
 
-class Do(Behaviour):
+class Do(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """Does something to the blackboard at once, and succeeds."""
 
     def __init__(self, name: str, action: Callable[[Blackboard], None], *, blackboard: Blackboard) -> None:
@@ -132,7 +132,7 @@ class Do(Behaviour):
         return Status.SUCCESS
 
 
-class Check(Behaviour):
+class Check(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """SUCCESS when the condition holds; otherwise FAILURE, or RUNNING until it does with ``wait``."""
 
     def __init__(self, name: str, condition: Callable[[], bool], *, wait: bool = False) -> None:
@@ -145,7 +145,7 @@ class Check(Behaviour):
         return Status.SUCCESS if self._condition() else self._otherwise
 
 
-class Stays(Behaviour):
+class Stays(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     """SUCCESS when the condition has held for a time of mission clock without a break, FAILURE as soon as it does not."""
 
     def __init__(self, name: str, condition: Callable[[], bool], duration_s: float, *, blackboard: Blackboard) -> None:

@@ -21,11 +21,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
-from skill_runtime.ros2 import SkillsetClient
 from skillset_interfaces.msg import Event
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
+from skill_runtime.ros2 import SkillsetClient
 from uav_missions.blackboard import Blackboard
 from uav_missions.director import EXIT_CODES, Director, End, Outcome
 from uav_missions.drawing import draw
@@ -65,7 +65,7 @@ class WakingClient:
         """Start an execution."""
         handle = self.client.start(skill, **inputs)
         handle.add_done_callback(lambda *_: self._wake())
-        return handle  # type: ignore[no-any-return]
+        return handle
 
 
 class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from uav_skills import checks, decisions
 from uav_skills.decisions import IN_AIR, ON_GROUND, Verdict
 

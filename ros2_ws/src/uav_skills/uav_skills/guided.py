@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from skill_runtime.hooks import SkillHooks
-
 from uav_skills.calls import Answer
 from uav_skills.checks import DEFAULT_LIMITS, Limits
 from uav_skills.decisions import DEFAULT_THRESHOLDS, Thresholds, Verdict, remaining_part, speaks_of
 
 if TYPE_CHECKING:
-    from skill_runtime.core.execution import Execution
     from uav_msgs.msg import GuidanceState
 
+    from skill_runtime.core.execution import Execution
     from uav_skills.functional import GuidanceApi
 
 AUTHORITY_INVARIANT = "keep_sdk_authority"
@@ -37,6 +36,11 @@ class Motion:
     followed_since_s: float | None = None
     initial: float = 0.0
     remaining: float = 0.0
+
+    @property
+    def inputs(self) -> Any:
+        """The skill's generated class of inputs."""
+        return self.execution.inputs
 
 
 class GuidedSkill(SkillHooks):

@@ -14,13 +14,13 @@ from uav_skills.watched import WatchedSkill
 
 if TYPE_CHECKING:
     from rclpy.node import Node
+
     from skill_runtime.core.execution import Execution
     from skill_runtime.hooks import SkillHooks
-
     from uav_skills.decisions import Verdict
 
 
-class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):
+class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[misc]  # generated
     """Register scans into the map until interrupted; then write it."""
 
     def __init__(self, mapping: MappingApi) -> None:

@@ -26,14 +26,15 @@ if TYPE_CHECKING:
     from geometry_msgs.msg import Point
     from navigation_managers.inputs import GotoInputs, GotoStraightInputs, HoverInputs, LockHeadInputs, RotateHeadInputs, TakeoffInputs
     from rclpy.node import Node
+    from uav_msgs.msg import GuidanceState
+
     from skill_runtime.core.execution import Execution
     from skill_runtime.hooks import SkillHooks
-    from uav_msgs.msg import GuidanceState
 
 LOCK_RATE_RAD_S = 0.6
 
 
-class Takeoff(GuidedSkill, AbstractTakeoffSkill):
+class Takeoff(GuidedSkill, AbstractTakeoffSkill):  # type: ignore[misc]  # generated
     """Climb to a height above home (paper, Listings 3 and 4)."""
 
     reference = "takeoff"
@@ -45,7 +46,7 @@ class Takeoff(GuidedSkill, AbstractTakeoffSkill):
 
     def send(self, motion: Motion) -> None:
         """Ask for the climb."""
-        inputs = motion.execution.inputs
+        inputs = motion.inputs
         self.guidance.takeoff(height_m=inputs.height, speed_m_s=inputs.speed, reply=functools.partial(self.answer, motion))
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
@@ -71,8 +72,8 @@ class _Flight(GuidedSkill):
 
     def send(self, motion: Motion) -> None:
         """Give the position reference."""
-        target: Point = motion.execution.inputs.target
-        speed_m_s, reply = motion.execution.inputs.speed, functools.partial(self.answer, motion)
+        target: Point = motion.inputs.target
+        speed_m_s, reply = motion.inputs.speed, functools.partial(self.answer, motion)
         self.guidance.set_position(target_enu_m=target, speed_m_s=speed_m_s, along_travel=self.along_travel, reply=reply)
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
@@ -80,17 +81,17 @@ class _Flight(GuidedSkill):
         return decisions.decide_goto(state, self.thresholds)
 
 
-class Goto(_Flight, AbstractGotoSkill):
+class Goto(_Flight, AbstractGotoSkill):  # type: ignore[misc]  # generated
     """Fly to a point and leave the heading alone."""
 
 
-class GotoStraight(_Flight, AbstractGotoStraightSkill):
+class GotoStraight(_Flight, AbstractGotoStraightSkill):  # type: ignore[misc]  # generated
     """Fly to a point with the nose along the travel."""
 
     along_travel = True
 
 
-class RotateHead(GuidedSkill, AbstractRotateHeadSkill):
+class RotateHead(GuidedSkill, AbstractRotateHeadSkill):  # type: ignore[misc]  # generated
     """Turn on the spot."""
 
     reference = "heading"
@@ -102,7 +103,7 @@ class RotateHead(GuidedSkill, AbstractRotateHeadSkill):
 
     def send(self, motion: Motion) -> None:
         """Give the heading reference."""
-        inputs, reply = motion.execution.inputs, functools.partial(self.answer, motion)
+        inputs, reply = motion.inputs, functools.partial(self.answer, motion)
         self.guidance.set_heading(heading_rad=inputs.heading, rate_rad_s=inputs.rate, lock=False, reply=reply)
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
@@ -114,7 +115,7 @@ class RotateHead(GuidedSkill, AbstractRotateHeadSkill):
         return abs(float(state.heading_error_rad))
 
 
-class LockHead(GuidedSkill, AbstractLockHeadSkill):
+class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # generated
     """Hold a heading while other skills move the vehicle, until interrupted."""
 
     def validate(self, inputs: LockHeadInputs) -> str:
@@ -123,7 +124,7 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):
 
     def send(self, motion: Motion) -> None:
         """Lock."""
-        heading_rad, reply = motion.execution.inputs.heading, functools.partial(self.answer, motion)
+        heading_rad, reply = motion.inputs.heading, functools.partial(self.answer, motion)
         self.guidance.set_heading(heading_rad=heading_rad, rate_rad_s=LOCK_RATE_RAD_S, lock=True, reply=reply)
 
     def stop(self) -> None:
@@ -147,7 +148,7 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):
             motion.followed_since_s = motion.followed_since_s or motion.heard_s
 
 
-class Hover(GuidedSkill, AbstractHoverSkill):
+class Hover(GuidedSkill, AbstractHoverSkill):  # type: ignore[misc]  # generated
     """Stay where the vehicle is for a while of mission clock."""
 
     reference = "hover"
@@ -163,21 +164,21 @@ class Hover(GuidedSkill, AbstractHoverSkill):
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
         """End after the duration."""
-        return decisions.decide_hover(self._hovered_s(motion), motion.execution.inputs.duration)
+        return decisions.decide_hover(self._hovered_s(motion), motion.inputs.duration)
 
     def progress(self, execution: Execution) -> float:
         """Tell how much of the time is over."""
         motion = self._motion
         if motion is None or motion.execution is not execution:
             return 0.0
-        return min(1.0, self._hovered_s(motion) / motion.execution.inputs.duration)
+        return min(1.0, self._hovered_s(motion) / float(motion.inputs.duration))
 
     @staticmethod
     def _hovered_s(motion: Motion) -> float:
         return 0.0 if motion.followed_since_s is None else motion.heard_s - motion.followed_since_s
 
 
-class Land(GuidedSkill, AbstractLandSkill):
+class Land(GuidedSkill, AbstractLandSkill):  # type: ignore[misc]  # generated
     """Land where the vehicle is. A landing that does not come lower goes on while the mission decides."""
 
     reference = "land"

@@ -6,8 +6,8 @@ import functools
 from typing import TYPE_CHECKING
 
 from perception_managers.hooks import AbstractLidarDepthmapSkill, AbstractZedDepthmapSkill
-from skill_runtime.hooks import SkillHooks
 
+from skill_runtime.hooks import SkillHooks
 from uav_skills.decisions import decide_watch
 from uav_skills.functional import DepthApi
 from uav_skills.serve import serve
@@ -15,8 +15,8 @@ from uav_skills.watched import WatchedSkill
 
 if TYPE_CHECKING:
     from rclpy.node import Node
-    from skill_runtime.core.execution import Execution
 
+    from skill_runtime.core.execution import Execution
     from uav_skills.decisions import Verdict
 
 
@@ -45,11 +45,11 @@ class _Depthmap(WatchedSkill):
         return decide_watch(silent_s, self._sensor)
 
 
-class ZedDepthmap(_Depthmap, AbstractZedDepthmapSkill):
+class ZedDepthmap(_Depthmap, AbstractZedDepthmapSkill):  # type: ignore[misc]  # generated
     """Depth map of the stereo camera."""
 
 
-class LidarDepthmap(_Depthmap, AbstractLidarDepthmapSkill):
+class LidarDepthmap(_Depthmap, AbstractLidarDepthmapSkill):  # type: ignore[misc]  # generated
     """Depth map of the LiDAR."""
 
 

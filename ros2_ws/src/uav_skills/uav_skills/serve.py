@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rclpy.node import Node
+
     from skill_runtime.hooks import SkillHooks
 
 

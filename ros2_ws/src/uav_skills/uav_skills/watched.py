@@ -9,7 +9,6 @@ from skill_runtime.hooks import SkillHooks
 
 if TYPE_CHECKING:
     from skill_runtime.core.execution import Execution
-
     from uav_skills.calls import Answer
     from uav_skills.decisions import Verdict
     from uav_skills.functional import FunctionalPart

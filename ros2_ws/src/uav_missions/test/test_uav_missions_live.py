@@ -1,0 +1,156 @@
+"""The mission as the process that a run starts, over real managers and a faked functional layer."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from uav_skills_rig import Rig
+
+ROUTE = {"route": [[0.0, 0.0, 3.0], [8.0, 0.0, 3.0], [8.0, 6.0, 3.0]]}
+
+
+class Mission:
+    """The process, and what it left behind."""
+
+    def __init__(self, rig: Rig, out) -> None:
+        self.rig = rig
+        self.out = out
+        out.mkdir()
+        (out / "wanted.json").write_text(json.dumps(ROUTE))
+        command = [sys.executable, "-m", "uav_missions", "--scenario", "mapping", "--out", str(out), "--route", str(out / "wanted.json")]
+        self.process = subprocess.Popen([*command, "--ros-args", "-p", "use_sim_time:=true"], env=dict(os.environ))
+
+    def until(self, what) -> None:
+        self.rig.wait(lambda: self.process.poll() is not None or what(), timeout_s=30.0)
+        assert self.process.poll() is None, self.read("mission.json")
+
+    def exit_code(self) -> int:
+        return self.process.wait(timeout=40.0)
+
+    def read(self, name: str) -> dict:
+        return json.loads((self.out / name).read_text())
+
+    def events(self) -> list[dict]:
+        return [json.loads(line) for line in (self.out / "events.jsonl").read_text().splitlines()]
+
+    def executions(self, since: int = 0) -> list[tuple[str, str]]:
+        return [(event["skill"], event["result"] or event["state"]) for event in self.events()[since:] if event["kind"] == "EXECUTION"]
+
+
+@pytest.fixture(scope="module")
+def whole_rig(ros2_domain):
+    rig = Rig()
+    yield rig
+    rig.close()
+
+
+@pytest.fixture
+def mission(whole_rig, tmp_path):
+    whole_rig.prepare()
+    whole_rig.functional.reports_flight = True
+    # Earlier tests of this process have left events of their own: the topics are transient local.
+    mission = Mission(whole_rig, tmp_path / "run")
+    yield mission
+    if mission.process.poll() is None:
+        mission.process.kill()
+        mission.process.wait(timeout=10.0)
+    for node in whole_rig.nodes[:-1]:
+        for execution in node.engine.executions:
+            node.engine.interrupt(execution.id)
+        whole_rig.wait(lambda node=node: not node.engine.executions)
+
+
+def starts_since(mission: Mission, start_s: float) -> list[str]:
+    events = [event for event in mission.events() if event["kind"] == "EXECUTION" and event["stamp_s"] >= start_s]
+    return [event["skill"] for event in sorted(events, key=lambda event: event["stamp_s"]) if event["state"] == "RUNNING"]
+
+
+def test_a_nominal_mission_leaves_a_complete_record(mission):
+    assert mission.exit_code() == 0
+    record = mission.read("mission.json")
+    assert (record["outcome"], record["reason"]) == ("accomplished", "")
+    assert record["start_s"] < record["lift_off_s"] < record["end_s"]
+    assert record["waypoints_reached"] == record["waypoints"] == 3
+    assert mission.read("route.json")["route"] == ROUTE["route"]
+    skills = starts_since(mission, record["start_s"])
+    assert skills[0] == "takeoff"
+    assert sorted(skills[1:3]) == ["lidar_mapping", "zed_depthmap"]
+    assert skills[3:] == ["goto_straight"] * 3 + ["land"]
+    assert mission.read("tree.json")["status"] == "SUCCESS"
+    assert (mission.out / "tree.svg").read_text().startswith("<svg")
+    assert not mission.rig.functional.vehicle.in_air
+    for skillset in ("navigation", "perception", "mapping"):
+        numbers = [event["sequence"] for event in mission.events() if event["skillset"] == skillset]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def test_losing_the_zed_is_survived_within_a_second(mission):
+    functional = mission.rig.functional
+    mission.until(lambda: functional.names().count("set_position") == 2 and functional.vehicle.place[0] > 2.0)
+    failure_s = functional.now_s
+    functional.report("perception", "zed_status", "BROKEN")
+    assert mission.exit_code() == 0
+    record = mission.read("mission.json")
+    assert record["outcome"] == "degraded"
+    assert "zed_ok" in record["reason"]
+    after = [event for event in mission.events() if event["kind"] == "EXECUTION" and event["stamp_s"] >= failure_s - 0.1]
+    ends = {(event["skill"], event["state"]) for event in after}
+    assert ("zed_depthmap", "RESOURCE_INVARIANT_VIOLATED") in ends
+    assert ("goto_straight", "INTERRUPTED") in ends
+    (lidar,) = [event for event in after if (event["skill"], event["state"]) == ("lidar_depthmap", "RUNNING")]
+    assert lidar["stamp_s"] - failure_s < 1.0
+    skills = starts_since(mission, failure_s)
+    assert skills == ["lidar_depthmap", "rotate_head", "lock_head", "goto", "rotate_head", "lock_head", "goto", "land"]
+
+
+def test_losing_both_sensors_lands_where_it_is(mission):
+    functional = mission.rig.functional
+    mission.until(lambda: functional.names().count("set_position") == 2 and functional.vehicle.place[0] > 2.0)
+    functional.report("perception", "zed_status", "BROKEN")
+    functional.report("perception", "lidar_status", "BROKEN")
+    assert mission.exit_code() == 1
+    record = mission.read("mission.json")
+    assert record["outcome"] == "given_up"
+    assert "zed_ok" in record["reason"]
+    assert not functional.vehicle.in_air
+    assert functional.vehicle.place[0] < 7.0
+    assert functional.names()[-1] == "land"
+
+
+def test_a_signal_in_the_air_lands_the_vehicle_first(mission):
+    functional = mission.rig.functional
+    mission.until(lambda: functional.names().count("set_position") == 2 and functional.vehicle.place[0] > 2.0)
+    mission.process.send_signal(signal.SIGINT)
+    assert mission.exit_code() == 1
+    record = mission.read("mission.json")
+    assert (record["outcome"], record["reason"]) == ("aborted", "told to end by SIGINT")
+    assert not functional.vehicle.in_air
+    assert mission.read("tree.json")["name"] == "aborted mission"
+
+
+def test_a_mission_that_is_told_to_end_before_the_start_does_not_start(whole_rig, tmp_path):
+    whole_rig.prepare()
+    whole_rig.set("navigation", "homepoint_status", "INVALID")
+    mission = Mission(whole_rig, tmp_path / "run")
+    mission.until(lambda: (mission.out / "mission.json").exists())
+    assert mission.read("mission.json")["outcome"] == "running"
+    mission.process.send_signal(signal.SIGTERM)
+    assert mission.exit_code() == 1
+    assert mission.read("mission.json")["outcome"] == "aborted"
+    assert whole_rig.functional.names() == []
+
+
+def test_an_unreadable_route_can_not_start(tmp_path):
+    command = [sys.executable, "-m", "uav_missions", "--out", str(tmp_path / "run"), "--route", str(tmp_path / "nowhere.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30.0, check=False)
+    assert done.returncode == 2
+    assert "nowhere.yaml" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,84 @@
+"""The three skillsets served in this process, over the faked functional layer, with a client each."""
+
+from __future__ import annotations
+
+import importlib
+import threading
+import time
+
+from uav_skills_functional_fake import FakeFunctional
+
+READY = {
+    ("navigation", "SDK_authority"): "AVAILABLE",
+    ("navigation", "homepoint_status"): "VALID",
+    ("navigation", "flight_status"): "ON_GROUND",
+    ("perception", "zed_status"): "OK",
+    ("perception", "lidar_status"): "OK",
+}
+
+
+class Rig:
+    """Functional layer, managers, clients."""
+
+    def __init__(self) -> None:
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.node import Node
+        from rclpy.parameter import Parameter
+        from skill_runtime.ros2 import SkillsetClient, SkillsetNode
+
+        self.functional = FakeFunctional()
+        self.executor = SingleThreadedExecutor()
+        sim_time = [Parameter("use_sim_time", value=True)]
+        self.nodes = []
+        for name in ("navigation", "perception", "mapping"):
+            model = importlib.import_module(f"{name}_managers.model")
+            interfaces = importlib.import_module(f"{name}_interfaces.action")
+            make_hooks = importlib.import_module(f"uav_skills.{name}").make_hooks
+            self.nodes.append(
+                SkillsetNode(model.SKILLSET, interfaces, make_hooks, data_bindings=model.DATA_TOPICS, parameter_overrides=sim_time)
+            )
+        self.caller = Node("uav_skills_test_caller")
+        self.nodes.append(self.caller)
+        for node in self.nodes:
+            self.executor.add_node(node)
+        self.clients = {name: SkillsetClient(self.caller, name) for name in ("navigation", "perception", "mapping")}
+        self._thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self._thread.start()
+        assert all(client.wait_ready(20.0) for client in self.clients.values())
+
+    def prepare(self) -> None:
+        self.functional.reset()
+        for (skillset, resource), state in READY.items():
+            self.set(skillset, resource, state)
+
+    def set(self, skillset: str, resource: str, state: str) -> None:
+        if self.clients[skillset].resources[resource] != state:
+            self.functional.report(skillset, resource, state)
+        self.wait(lambda: self.clients[skillset].resources[resource] == state)
+
+    def start(self, skillset: str, skill: str, **inputs):
+        return self.clients[skillset].start(skill, **inputs)
+
+    def in_air(self) -> None:
+        self.functional.fly_at(0.0, 0.0, 3.0)
+        self.set("navigation", "flight_status", "IN_AIR")
+
+    @staticmethod
+    def wait(condition, timeout_s: float = 10.0) -> None:
+        end = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < end, "it did not come"
+            time.sleep(0.005)
+
+    def ended(self, handle) -> tuple[str, str]:
+        assert handle.wait(10.0), f"{handle} does not end"
+        return handle.outcome, handle.result
+
+    def close(self) -> None:
+        for node in self.nodes[:-1]:
+            node.close("test is over")
+        self.executor.shutdown(timeout_sec=2.0)
+        self._thread.join(timeout=3.0)
+        for node in self.nodes:
+            node.destroy_node()
+        self.functional.close()
