@@ -45,6 +45,7 @@ CODES: Mapping[str, str] = {
     "ALU216": "a name that ROS doesn't allow",
     "ALU217": "two names that become one in generated code",
     "ALU218": "a skill that can't end by itself nor be ended",
+    "ALU219": "a unit that is not known",
     "ALU301": "an effect that is never used",
     "ALU302": "a state that can't be reached",
     "ALU303": "a type that is never used",
@@ -53,6 +54,7 @@ CODES: Mapping[str, str] = {
     "ALU402": "a binding for something that isn't there",
     "ALU403": "data that no topic is bound to",
     "ALU404": "two skillsets of one name",
+    "ALU405": "data of a type that no topic can carry",
 }
 
 

@@ -10,7 +10,7 @@ from enum import Enum
 from skill_language.errors import Diagnostic
 from skill_language.model import Span
 
-MAX_CHARACTERS = 1_000_000
+MAX_CHARACTERS = 300_000
 """Models are a few kilobytes; whatever is larger than this is no model, and is refused before it costs time."""
 
 MAX_ERRORS = 40

@@ -101,6 +101,10 @@ def _fit(robot: Robot, types: Mapping[str, RosType], bindings: Bindings, place: 
                 hint = f"add `{name}: package/Name` to {place / 'types.yaml'}"
                 findings.append(Diagnostic("ALU401", f"type `{name}` has no entry in types.yaml", skillset.span, hint=hint))
         for data in skillset.data:
+            ros = types.get(data.type)
+            if ros is not None and ros.message is None:
+                message = f"data `{data.name}` is a list ({ros.interface}), and no topic carries a list by itself"
+                findings.append(Diagnostic("ALU405", message, data.span, hint="give it a message type that has the list as a field"))
             if (skillset.name, data.name) not in bindings.data:
                 hint = f"add `{skillset.name}.{data.name}: {{topic: /...}}` under `data:` in {place / 'bindings.yaml'}"
                 findings.append(Diagnostic("ALU403", f"no topic is bound to data `{data.name}`", data.span, hint=hint))

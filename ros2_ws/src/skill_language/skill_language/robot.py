@@ -70,6 +70,13 @@ class Robot:
         """Return what a type of the models is in ROS; a loaded robot knows all that its skillsets use."""
         return self.types[name] if name in self.types else RosType("", name if name in PRIMITIVES else "")
 
+    def message(self, data: Data) -> RosType:
+        """Return the message that carries a data's values; a primitive is carried by its message of std_msgs."""
+        ros = self.ros_type(data.type).message
+        if ros is None:
+            raise ValueError(f"no topic can carry data {data.name} of type {data.type}")
+        return ros
+
     def source(self, skillset: Skillset, data: Data) -> DataSource:
         """Return where a data's values come from."""
         return self.bindings.data[skillset.name, data.name]

@@ -53,6 +53,16 @@ class RosType:
         element = f"{self.package}.msg.{self.name}" if self.package else PRIMITIVES[self.name]
         return f"list[{element}]" if self.array else element
 
+    @property
+    def message(self) -> RosType | None:
+        """The message that a topic carries values of this type in; None for an array, which no topic carries alone."""
+        if self.array:
+            return None
+        return self if self.package else RosType("std_msgs", _WRAPPERS.get(self.name, self.name[:1].upper() + self.name[1:]))
+
+
+_WRAPPERS: Mapping[str, str] = {"uint8": "UInt8", "uint16": "UInt16", "uint32": "UInt32", "uint64": "UInt64"}
+
 
 def parse_type(text: str) -> RosType | None:
     """Return the type that a text such as ``float64``, ``geometry_msgs/Point`` or ``geometry_msgs/msg/Point[]`` names, if any."""

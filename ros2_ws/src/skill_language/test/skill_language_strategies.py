@@ -52,7 +52,7 @@ data_atoms = st.builds(
     st.lists(names, max_size=2),
     st.sampled_from(Comparison),
     values,
-    st.one_of(st.just(""), st.just("%"), names),
+    st.one_of(st.sampled_from(["", "%", "m/s"]), names),
 )
 
 
@@ -82,6 +82,10 @@ def resources(draw):
     return Resource(name, states, initial, (*arrows, *(a for a in every_arrow(states) if a not in arrows)), all_transitions=True)
 
 
+def results(used):
+    return st.builds(lambda n, e, p, c: Result(n, effect=e, postcondition=p, comment=c), names, used, postconditions, comments)
+
+
 @st.composite
 def skills(draw):
     defined = draw(st.lists(effects, max_size=3, unique_by=lambda effect: effect.name))
@@ -96,14 +100,7 @@ def skills(draw):
         invariants=tuple(draw(st.lists(st.builds(Invariant, names, any_condition, used), max_size=3))),
         progress=draw(st.none() | st.builds(Progress, floats)),
         interrupt=draw(st.builds(lambda e, p: Interrupt(effect=e, postcondition=p), used, postconditions)),
-        results=tuple(
-            draw(
-                st.lists(
-                    st.builds(lambda n, e, p, c: Result(n, effect=e, postcondition=p, comment=c), names, used, postconditions, comments),
-                    max_size=3,
-                )
-            )
-        ),
+        results=tuple(draw(st.lists(results(used), max_size=3))),
     )
 
 

@@ -9,6 +9,7 @@ from skill_language.model import (
     And,
     Assignment,
     Comparison,
+    Constant,
     DataIs,
     Effect,
     Implies,
@@ -124,11 +125,8 @@ def test_places_are_those_of_the_source():
 
 
 def test_scanning_damage_is_told_where_it_is():
-    damaged = (
-        LISTING_3.replace("     }\n     effect", "     effect")
-        .replace("result {", "result |")
-        .replace("sdk_authority:\n", "sdk_authority\n", 1)
-    )
+    damaged = LISTING_3.replace("     }\n     effect", "     effect").replace("result {", "result |")
+    damaged = damaged.replace("sdk_authority:\n", "sdk_authority\n", 1)
     with pytest.raises(LanguageError) as caught:
         wrapped(damaged)
     told = [(d.code, d.span.line, d.span.column) for d in caught.value.diagnostics]
@@ -183,6 +181,7 @@ def test_data_with_and_without_period():
         ("resource = ((a == S and b == T) and c == U)", And((And((ResourceIs("a", "S"), ResourceIs("b", "T"))), ResourceIs("c", "U")))),
         ("data = (battery.level > 0.2)", DataIs("battery", ("level",), Comparison.GT, 0.2)),
         ("data = (battery.level >= -20 %)", DataIs("battery", ("level",), Comparison.GE, -20.0, "%")),
+        ("data = (speed.x <= 7.5 km/h and true)", And((DataIs("speed", ("x",), Comparison.LE, 7.5, "km/h"), Constant(value=True)))),
         ("data = (age < 2 sec)", DataIs("age", (), Comparison.LT, 2.0, "sec")),
         ('data = (mode == "GUI\\"DED")', DataIs("mode", (), Comparison.EQ, 'GUI"DED')),
         ("data = (health.ok)", DataIs("health", ("ok",), Comparison.EQ, value=True)),

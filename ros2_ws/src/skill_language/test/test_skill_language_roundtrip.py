@@ -14,7 +14,7 @@ from skill_language.model import Comparison, DataIs, Event, Precondition, Result
 from skill_language.paper import parse
 from skill_language.printer import NotInThisNotationError, print_skillset
 
-SLOW = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SLOW = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 @SLOW
@@ -56,6 +56,10 @@ def test_what_the_notation_has_no_words_for_is_refused():
         print_skillset(Skillset("s", events=(Event("e"),), skills=(skill,)))
 
 
+NOT = '{"is": "not", "operand": '
+SKILL = '{"name": "s", "skills": [{"name": "f", %s}]}'
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -64,21 +68,14 @@ def test_what_the_notation_has_no_words_for_is_refused():
         ('{"name": 3}', "skillset.name should be str, not 3"),
         ("{}", "skillset should be an object with `name`"),
         ('{"name": "s", "colour": 1}', "skillset should be an object with the fields name, types"),
-        (
-            '{"name": "s", "skills": [{"name": "f", "progress": {"period_s": true}}]}',
-            "skillset.skills[0].progress.period_s should be float, not True",
-        ),
-        ('{"name": "s", "skills": [{"name": "f", "progress": {"period_s": NaN}}]}', "period_s should be float, not nan"),
-        ('{"name": "s", "skills": [{"name": "f", "results": [{"name": "R", "kind": "x"}]}]}', "one of result, success, failure"),
-        (
-            '{"name": "s", "skills": [{"name": "f", "preconditions": [{"name": "p", "condition": {"is": []}}]}]}',
-            'a condition with "is" one of',
-        ),
+        (SKILL % '"progress": {"period_s": true}', "skillset.skills[0].progress.period_s should be float, not True"),
+        (SKILL % '"progress": {"period_s": NaN}', "period_s should be float, not nan"),
+        (SKILL % '"results": [{"name": "R", "kind": "x"}]', "one of result, success, failure"),
+        (SKILL % '"preconditions": [{"name": "p", "condition": {"is": []}}]', 'a condition with "is" one of'),
+        (SKILL % '"inputs": 3', "skillset.skills[0].inputs should be a list, not 3"),
         ("[" * 100_000, "nested too deeply"),
-        (
-            '{"name": "s", "events": [{"name": "e", "guard": ' + '{"is": "not", "operand": ' * 300 + "1" + "}" * 300 + "}]}",
-            "nested less deeply",
-        ),
+        (SKILL % ('"start": ' + '{"name": "e", "assignments": 1}'), "start.assignments should be a list"),
+        (SKILL % f'"preconditions": [{{"name": "p", "condition": {NOT * 300}1{"}" * 301}]', "nested less deeply"),
     ],
 )
 def test_json_that_is_no_model(text, told):

@@ -8,6 +8,7 @@ from typing import Protocol
 from skill_language import ros_types
 from skill_language.errors import Diagnostic, Severity, nearest, quoted
 from skill_language.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, Skillset, Span, atoms
+from skill_language.units import UNIT_IN_SI
 
 
 class Named(Protocol):
@@ -49,6 +50,9 @@ def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
     if isinstance(atom.value, bool | str) and atom.comparison not in {Comparison.EQ, Comparison.NE}:
         kind = "a truth value" if isinstance(atom.value, bool) else "a text"
         yield error("ALU214", f"`{atom.comparison.value}` doesn't compare {kind}; use == or !=", atom.span)
+    if atom.unit not in UNIT_IN_SI:
+        hint = nearest(atom.unit, UNIT_IN_SI) or f"there are {quoted([unit for unit in UNIT_IN_SI if unit])}"
+        yield error("ALU219", f"unknown unit `{atom.unit}`", atom.span, hint=hint)
     python = ros_types.PRIMITIVES.get(types[atom.data])
     if python is None:
         return

@@ -86,7 +86,7 @@ RESULT_FIELDS = frozenset({"outcome", "result", "message", "progress"})
 INPUT_NAMES = frozenset({"self", "skill"})
 """Names that the client's methods have already."""
 
-CLIENT_NAMES = frozenset({"start", "resources", "wait_ready", "on_change", "node", "describe", "model", "skillset", "close", "get_data"})
+CLIENT_NAMES = frozenset({"start", "resources", "wait_ready", "ready", "on_change", "model", "skillset"})
 """Attributes of the generic client that a method named like a skill would hide."""
 
 

@@ -26,7 +26,7 @@ def topics(robot: Robot) -> list[BridgedTopic]:
     for skillset in robot.skillsets:
         for data in skillset.data:
             source = robot.source(skillset, data)
-            kind = robot.ros_type(data.type).interface
+            kind = robot.message(data).interface
             found.append(BridgedTopic(source.topic, "ros1_to_ros2", kind, source.latched, source.depth))
     for skillset in robot.skillsets:
         # The functional layer compares what it reported with what the resource manager holds.

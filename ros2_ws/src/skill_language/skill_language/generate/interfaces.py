@@ -68,7 +68,9 @@ $outputs
 
 
 def interface_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
-    """Return the files of the interface package."""
+    """Return the files of the interface package; none for a skillset without skills, as a package of no interfaces can't be built."""
+    if not skillset.skills:
+        return {}
     package = f"{skillset.name}_interfaces"
     parameters = [parameter for skill in skillset.skills for parameter in (*skill.inputs, *skill.outputs)]
     needed = [name for name in packages(robot.ros_type(p.type) for p in parameters) if name != "action_msgs"]

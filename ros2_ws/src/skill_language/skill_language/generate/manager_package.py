@@ -22,7 +22,6 @@ PACKAGE_XML = """\
 
   <depend>skill_language</depend>
   <depend>skill_runtime</depend>
-  <depend>${skillset}_interfaces</depend>
 $depends
 
   <export>
@@ -92,9 +91,9 @@ def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
     package = f"{skillset.name}_managers"
     common = {"header": header(robot, skillset), "package": package, "skillset": skillset.name}
     parameters = [parameter for skill in skillset.skills for parameter in (*skill.inputs, *skill.outputs)]
-    names = [parameter.type for parameter in parameters] + [data.type for data in skillset.data]
-    types = [robot.ros_type(name) for name in names]
-    depends = lines((f"<depend>{name}</depend>" for name in packages(types)), 2)
+    types = [robot.ros_type(p.type) for p in parameters] + [robot.message(data) for data in skillset.data]
+    needed = [f"{skillset.name}_interfaces"] if skillset.skills else []
+    depends = lines((f"<depend>{name}</depend>" for name in (*needed, *packages(types))), 2)
     return {
         f"{package}/package.xml": fill(PACKAGE_XML, **common, maintainer=MAINTAINER, depends=depends).replace("\n\n\n", "\n\n"),
         f"{package}/setup.py": fill(SETUP_PY, **common),
@@ -110,7 +109,7 @@ def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
 
 def _model_module(robot: Robot, skillset: Skillset) -> str:
     sources = [
-        f"{json.dumps(data.name)}: ({json.dumps(robot.source(skillset, data).topic)}, {json.dumps(robot.ros_type(data.type).ros2)}),"
+        f"{json.dumps(data.name)}: ({json.dumps(robot.source(skillset, data).topic)}, {json.dumps(robot.message(data).ros2)}),"
         for data in skillset.data
     ]
     # JSON escapes every quote inside a string, so that three in a row never end the literal.

@@ -122,8 +122,12 @@ class _Reader:
             raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`")
         value, unit = number(cursor.source, cursor.advance()), cursor.here
         if cursor.at("%") or (unit.kind is Kind.NAME and unit.text not in OPERATOR_WORDS):
-            return value, cursor.advance().text
+            return value, cursor.advance().text + self._per()
         return value, ""
+
+    def _per(self) -> str:
+        """Read the second half of a unit such as `m/s`, if it has one."""
+        return f"/{self.cursor.name('a unit').text}" if self.cursor.accept("/") else ""
 
     def _too_deep(self) -> NoReturn:
         message = f"the condition is nested more than {MAX_DEPTH} deep"

@@ -23,6 +23,7 @@ class Cursor:
         self.source = source
         self._tokens = tokenize(source)
         self._index = 0
+        self._ended = False
 
     @property
     def here(self) -> Token:
@@ -113,6 +114,10 @@ class Cursor:
 
     def _missing_end(self, opening: Token) -> None:
         if self.at_end:
+            # The innermost block tells; that those around it have no end either goes without saying.
+            if self._ended:
+                return
+            self._ended = True
             self.source.report("ALU104", "this block has no `}` before the file ends", self.source.span(opening))
             return
         message = f"the block opened in line {opening.line} has no `}}` before {self.here.shown} begins"

@@ -1,0 +1,26 @@
+"""Units that a condition may be written in; messages carry SI units (REP 103)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+UNIT_IN_SI: Mapping[str, float] = {
+    "": 1.0,
+    "m": 1.0,
+    "km": 1000.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "m/s": 1.0,
+    "km/h": 1 / 3.6,
+    "s": 1.0,
+    "sec": 1.0,
+    "ms": 0.001,
+    "min": 60.0,
+    "h": 3600.0,
+    "rad": 1.0,
+    "deg": math.pi / 180,
+    "V": 1.0,
+    "%": 0.01,
+}
+"""By what to multiply a number in a unit to have it in SI units."""

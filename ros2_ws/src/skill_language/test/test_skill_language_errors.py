@@ -1,0 +1,378 @@
+"""Every finding: its code, its place, its words and its hint."""
+
+from __future__ import annotations
+
+import pytest
+
+from skill_language.check import check
+from skill_language.errors import CODES, Diagnostic, LanguageError, Severity, nearest
+from skill_language.load import check_file, load_robot, load_skillset, read_text
+from skill_language.model import Span
+from skill_language.paper import parse
+
+AXES = "resource axes { initial FREE FREE -> USED USED -> FREE }\n"
+LINK = "resource link { initial DOWN extern DOWN -> UP extern UP -> DOWN }\n"
+TAKE = "effect { take: axes -> USED give: axes -> FREE }"
+END = "result { DONE: apply = give }"
+
+
+def uses(effect: str) -> str:
+    return f"skill f {{ effect {{ {effect} }} precondition {{ success e }} result {{ R }} }}"
+
+
+def asks(block: str) -> str:
+    return f"skill f {{ {block} result {{ R }} }}"
+
+
+# code, a marker `^` stands before the place, what the message says, what the hint says
+SYNTAX = [
+    ("ALU100", "skillset s { ^$& }", "`$&` means nothing here", ""),
+    ("ALU100", "skillset s { skill ^é {} }", "`é` means nothing", "names are made of"),
+    ("ALU100", "skillset s { ^\x00 }", "`U+0000`", ""),
+    ("ALU101", 'skillset s { skill f { precondition { p: data = (m == ^"abc) } } }', "no closing", ""),
+    ("ALU102", "skillset s { skill f { progress = ^1e999 } }", "too large", ""),
+    ("ALU103", "^skilset s {}", "expected `skillset`, found `skilset`", "a file holds one"),
+    ("ALU103", "^", "expected `skillset`, found the end of the file", "a file holds one"),
+    ("ALU103", "skillset s { ^skil f {} }", "found `skil`", "did you mean `skill`?"),
+    ("ALU103", "skillset s { skill f { ^inputs { } } }", "found `inputs`", "did you mean `input`?"),
+    ("ALU103", "skillset s { skill f { input { height ^float64 } } }", "expected `:`, found `float64`", "`name: Type`"),
+    ("ALU103", "skillset s { skill f { effect { take ^axes -> USED } } }", "found `axes`", "take: resource -> STATE"),
+    ("ALU103", "skillset s { skill f { precondition { p: ^axes == USED } } }", "found `axes`", "resource = (...)"),
+    ("ALU103", "skillset s { skill f { precondition { p: resource = (axes ^= USED) } } }", "found `=`", "compared with `==`"),
+    ("ALU103", "skillset s { skill f { precondition { p: resource = (axes == USED^} } }", "found `}`", ""),
+    ("ALU103", "skillset s { skill f { progress ^0.5 } }", "expected `=`", "progress = 0.5"),
+    ("ALU103", "skillset s { skill f { progress = ^fast } }", "expected a number, found `fast`", ""),
+    ("ALU103", "skillset s { skill ^and { } }", "found `and`", "a word of the language"),
+    ("ALU103", "skillset s { resource r { A ^B } }", "expected `->`", "`A -> B` or `extern A -> B`"),
+    ("ALU103", "skillset s {} ^skillset t {}", "expected the end of the file", "its own file"),
+    ("ALU104", "skillset s { skill f ^{ progress = 1 ", "no `}` before the file ends", ""),
+    ("ALU104", "skillset s { skill f { input { a: T ^effect { } } }", "opened in line 1 has no `}` before `effect`", "close the block"),
+    ("ALU104", "skillset s { skill f { progress = 1 ^skill g { } }", "before `skill` begins", "close the block"),
+    ("ALU105", "skillset s { skill f { precondition { p: resource = (" + "(" * 40 + "^(" + "(" * 9, "nested more than 40", ""),
+    ("ALU106", "skillset s { skill f { input { } ^input { } } }", "`input` is given twice", "one of each"),
+    ("ALU106", "skillset s { skill f { effect { e {} } precondition { success e ^success e } } }", "`success` is given twice", ""),
+    ("ALU106", "skillset s { skill f { effect { e {} } interrupt { apply = e ^apply = e } } }", "`apply` is given twice", ""),
+    ("ALU106", "skillset s { resource r { initial A ^initial B } }", "`initial` is given twice", ""),
+    ("ALU106", "skillset s { resource r { state { A } ^state { B } } }", "`state` is given twice", ""),
+    ("ALU204", "skillset s { skill f { effect { take {} } precondition { success ^tale } } }", "no effect `tale`", "`take`?"),
+    ("ALU204", "skillset s { skill f { result { R: apply = ^give } } }", "skill `f` has no effect `give`", "`effect` block"),
+]
+
+SEMANTICS = [
+    ("ALU201", AXES + "^resource axes { initial A A -> B B -> A }", "resource `axes` is defined twice", "line 2 first"),
+    ("ALU201", "data a: string data ^a: string", "data `a` is defined twice", ""),
+    ("ALU201", "skill f { result { R } } skill ^f { result { R } }", "skill `f` is defined twice", ""),
+    ("ALU201", "type P type P data p: P", "type `P` is declared twice", ""),
+    ("ALU201", "skill f { input { a: bool ^a: bool } result { R } }", "input `a` is defined twice", ""),
+    ("ALU201", "skill f { input { a: bool } output { ^a: bool } result { R } }", "is an input and an output", ""),
+    ("ALU201", "skill f { result { R ^R } }", "result `R` is defined twice", ""),
+    ("ALU201", uses("e {} ^e {}"), "effect `e` is defined twice", ""),
+    ("ALU201", "resource r { initial A A -> B ^A -> B B -> A }", "arrow `A -> B` of `r` is given twice", ""),
+    ("ALU201", "resource ^r { state { A B A } initial A A -> B B -> A }", "state `A` of `r` is listed twice", ""),
+    (
+        "ALU202",
+        AXES + asks("precondition { p: resource = (^axis == USED) }"),
+        "no resource `axis`",
+        "did you mean `axes`?",
+    ),
+    (
+        "ALU202",
+        AXES + uses("e: ^nothing -> USED"),
+        "no resource `nothing`",
+        "there is `axes`",
+    ),
+    (
+        "ALU203",
+        AXES + asks("invariant { i: resource = (^axes == USD) }"),
+        "`axes` has no state `USD`",
+        "did you mean `USED`?",
+    ),
+    (
+        "ALU203",
+        AXES + uses("e: ^axes -> used"),
+        "no state `used`",
+        "did you mean `USED`?",
+    ),
+    ("ALU203", "resource r { state { A B } initial A A -> B ^B -> C }", "no state `C`", ""),
+    ("ALU205", "skill f { input { ^p: Pont } result { R } } type Point data d: Point", "unknown type `Pont`", "did you mean `Point`?"),
+    ("ALU205", "data ^d: Quark", "unknown type `Quark`", "declare it with `type Quark`"),
+    ("ALU206", "data level: float64 skill f { precondition { p: data = (^levle > 1) } result { R } }", "no data `levle`", "`level`?"),
+    ("ALU207", "resource ^r { A -> B B -> A }", "no initial state", "add `initial A`"),
+    ("ALU208", "resource ^r { initial AVAILABEL AVAILABLE -> USED USED -> AVAILABLE }", "`AVAILABEL`", "did you mean `AVAILABLE`?"),
+    (
+        "ALU209",
+        "resource r { initial A A -> B } " + uses("e: ^r -> A"),
+        "no arrow leads",
+        "to `B`",
+    ),
+    (
+        "ALU210",
+        LINK + uses("e: ^link -> UP"),
+        "only the functional layer may",
+        "without `extern`",
+    ),
+    ("ALU211", "skill f { ^progress = 0 result { R } }", "period of `f` is 0 s; it must be positive", ""),
+    ("ALU211", "skill f { ^progress = -0.5 result { R } }", "is -0.5 s", ""),
+    ("ALU211", "data ^d: bool period = 0", "period of data `d` is 0 s", ""),
+    (
+        "ALU212",
+        AXES + uses("e { axes -> USED ^axes -> FREE }"),
+        "sets `axes` twice",
+        "",
+    ),
+    (
+        "ALU213",
+        "data d: float64 " + asks("invariant { i: data = (^d > 1) }"),
+        "only preconditions may",
+        "state of a resource",
+    ),
+    ("ALU213", "data d: float64 skill f { result { R: post data = (^d > 1) } }", "only preconditions may", ""),
+    ("ALU214", "data d: bool skill f { precondition { p: data = (^d > true) } result { R } }", "doesn't compare a truth value", ""),
+    ("ALU214", 'data d: string skill f { precondition { p: data = (^d < "a") } result { R } }', "doesn't compare a text", ""),
+    ("ALU214", "data d: float64 " + asks("precondition { p: data = (^d == true) }"), "can't be compared with True", ""),
+    ("ALU214", "data d: float64 " + asks("precondition { p: data = (^d.x > 1) }"), "has no field `x`", ""),
+    ("ALU215", "skill ^start { result { R } }", "client needs the name `start`", ""),
+    ("ALU215", "skill ^lambda { result { R } }", "client needs the name `lambda`", ""),
+    ("ALU215", "skill f { output { ^outcome: string } result { R } }", "needs the field `outcome`", ""),
+    ("ALU215", "skill f { input { ^skill: string } result { R } }", "needs the name `skill`", ""),
+    ("ALU216", "skill f { input { ^Height: float64 } result { R } }", "`Height` can't be the name of a ROS field", "a-z"),
+    ("ALU216", "skill f { input { ^class: float64 } result { R } }", "`class` can't be", "no word of Python"),
+    ("ALU216", "skill f { input { ^a__b: float64 } result { R } }", "`a__b` can't be", ""),
+    ("ALU216", "skill ^_f { result { R } }", "can't be the name of a ROS action", "begins with a letter"),
+    ("ALU216", "data ^Level: float64", "can't be the name of a ROS data", ""),
+    ("ALU217", "skill go_to { result { R } } skill ^goTo { result { R } }", "`go_to` and `goTo` are both `GoTo`", ""),
+    ("ALU218", "skill ^f { progress = 1 }", "skill `f` has no result", "result"),
+    ("ALU219", "data d: float64 " + asks("precondition { p: data = (^d > 3 furlong/min) }"), "unknown unit `furlong/min`", "`m/s`"),
+    ("ALU301", AXES + "skill f { effect { ^e: axes -> USED } result { R } }", "effect `e` of `f` is never used", ""),
+    ("ALU302", "resource ^r { initial A A -> B C -> A }", "state `C` of `r` can't be reached from `A`", ""),
+    ("ALU303", "type P", "type `P` is never used", ""),
+    ("ALU304", AXES + "skill f { input { ^axes: bool } result { R } }", "has the name of a resource", "never of inputs"),
+]
+
+
+def unmarked(text: str) -> tuple[str, tuple[int, int] | None]:
+    """Return a text without its mark, and the line and column of it."""
+    before, mark, after = text.partition("^")
+    place = (before.count("\n") + 1, len(before) - before.rfind("\n")) if mark else None
+    return before + after, place
+
+
+@pytest.mark.parametrize(("code", "marked", "message", "hint"), SYNTAX)
+def test_syntax(code, marked, message, hint):
+    text, place = unmarked(marked)
+    with pytest.raises(LanguageError) as caught:
+        parse(text, "x.skill")
+    finding = next(d for d in caught.value.diagnostics if d.code == code)
+    assert (finding.span.line, finding.span.column) == place
+    assert message in finding.message
+    assert hint in finding.hint
+    assert finding.severity is Severity.ERROR
+
+
+@pytest.mark.parametrize(("code", "marked", "message", "hint"), SEMANTICS)
+def test_semantics(code, marked, message, hint):
+    text, place = unmarked(f"skillset s {{\n{marked}\n}}")
+    findings = check(parse(text, "x.skill"))
+    finding = next(d for d in findings if d.code == code)
+    if place is not None:
+        line = text.split("\n")[place[0] - 1]
+        # Elements are pointed at by their name, which follows the word that the mark may stand before.
+        word = line[place[1] - 1 :].split()[0]
+        column = place[1] + len(word) + 1 if word in {"resource", "skill"} and ":" not in line[place[1] :][:8] else place[1]
+        assert (finding.span.line, finding.span.column) == (place[0], column)
+    assert message in finding.message
+    assert hint in finding.hint
+    assert finding.severity is (Severity.WARNING if code.startswith("ALU3") else Severity.ERROR)
+
+
+def test_a_sound_skillset_has_no_findings():
+    assert check(parse(f"skillset s {{ {AXES} {LINK} skill f {{ {TAKE} precondition {{ success take }} {END} }} }}")) == []
+
+
+def test_the_name_of_a_package():
+    (finding,) = check(parse("skillset My_Skills { }", "x"))
+    assert finding.code == "ALU216"
+    assert "name of a ROS package" in finding.message
+
+
+def test_several_errors_of_one_file_are_told_in_order():
+    text = """skillset s {
+  resource r { initial A  A > B }
+  skill f {
+    input { height float64 }
+    effect { take: r -> B
+    precondition { p: r == A }
+  }
+  skill g { progress 3 }
+}"""
+    with pytest.raises(LanguageError) as caught:
+        parse(text, "x.skill")
+    assert [(d.code, d.span.line) for d in caught.value.diagnostics] == [
+        ("ALU103", 2),
+        ("ALU103", 4),
+        ("ALU104", 6),
+        ("ALU103", 6),
+        ("ALU103", 8),
+    ]
+
+
+def test_an_error_in_the_effects_does_not_make_more_of_their_users():
+    with pytest.raises(LanguageError) as caught:
+        parse("skillset s { skill f { effect { a: r = B  b: r -> A } result { R: apply = b } } }")
+    assert [d.code for d in caught.value.diagnostics] == ["ALU103"]
+
+
+def test_too_many_errors():
+    text = "skillset s {\n" + "$\n" * 60 + "}"
+    with pytest.raises(LanguageError) as caught:
+        parse(text)
+    assert [d.code for d in caught.value.diagnostics] == ["ALU100"] * 40 + ["ALU107"]
+
+
+def test_rendering():
+    text = "skillset s {\n\tskill f { precondition { p: resource = (a = B) } }\n}"
+    with pytest.raises(LanguageError) as caught:
+        parse(text, "models/x.skill")
+    assert str(caught.value) == (
+        "models/x.skill:2:44: error ALU103: expected `==` or `!=`, found `=`\n"
+        "    2 | \tskill f { precondition { p: resource = (a = B) } }\n"
+        "      | \t                                          ^\n"
+        "      = expected one of `==`, `!=`\n"
+        "      = hint: states are compared with `==`"
+    )
+
+
+def test_rendering_of_a_long_line_shows_its_place():
+    line = "x" * 500 + "HERE" + "y" * 500
+    lines = Diagnostic("ALU100", "m", Span("f", 1, 501, 505), source_line=line).render().split("\n")
+    assert max(len(shown) for shown in lines) < 140
+    assert lines[1][lines[2].index("^") :].startswith("HERE")
+    assert lines[2].count("^") == 4
+
+
+def test_rendering_without_a_place():
+    assert Diagnostic("ALU001", "m").render() == "error ALU001: m"
+    assert Diagnostic("ALU001", "m", Span("f.skill", 0, 0, 0)).render() == "f.skill: error ALU001: m"
+
+
+def test_nearest():
+    assert nearest("SDK_autority", ["SDK_authority", "axes_authority"]) == "did you mean `SDK_authority`?"
+    assert nearest("available", ["AVAILABLE", "USED"]) == "did you mean `AVAILABLE`?"
+    assert nearest("zzz", ["a", "b"]) == "there is `a`, `b`"
+    assert nearest("zzz", [f"state_{i}" for i in range(20)]) == ""
+    assert nearest("zzz", []) == ""
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def codes(error) -> list[str]:
+    return [finding.code for finding in error.value.diagnostics]
+
+
+def test_files_that_are_no_text(tmp_path):
+    missing = tmp_path / "missing.skill"
+    with pytest.raises(LanguageError, match=r"missing\.skill: error ALU001: can't be read: No such file") as caught:
+        load_skillset(missing)
+    with pytest.raises(LanguageError, match="ALU001"):
+        load_skillset(tmp_path)
+    with pytest.raises(LanguageError, match="ALU001"):
+        load_skillset("a\0b")
+    latin = tmp_path / "latin.skill"
+    latin.write_bytes("skillset s { // \xe9\n}".encode("latin-1"))
+    with pytest.raises(LanguageError, match="ALU002: not UTF-8 text: byte 16 is 0xe9"):
+        load_skillset(latin)
+    large = tmp_path / "large.skill"
+    large.write_bytes(b" " * 1_200_001)
+    with pytest.raises(LanguageError, match="ALU003"):
+        load_skillset(large)
+    assert codes(caught) == ["ALU001"]
+
+
+def test_marks_and_line_ends_of_other_systems(tmp_path):
+    path = tmp_path / "dos.skill"
+    path.write_bytes("\ufeffskillset s {\r\n  skill f { input { a: bool // yes\r\n } result { R } }\r\n}\r\n".encode())
+    assert "\r" not in read_text(path)
+    assert load_skillset(path).skill("f").inputs[0].comment == "yes"
+
+
+def test_warnings_do_not_keep_a_model_from_being_loaded(tmp_path):
+    path = tmp_path / "x.skill"
+    path.write_text("skillset s { type P }")
+    assert load_skillset(path).name == "s"
+    assert [d.code for d in check_file(path)[1]] == ["ALU303"]
+
+
+def test_findings_of_the_check_carry_their_line(tmp_path):
+    path = tmp_path / "x.skill"
+    path.write_text(f"skillset s {{\n  {LINK}  skill f {{ progress = 0 result {{ R }} }}\n}}")
+    with pytest.raises(LanguageError, match=r"x\.skill:3:13: error ALU211") as caught:
+        load_skillset(path)
+    assert "    3 |   skill f { progress = 0 result { R } }" in str(caught.value)
+
+
+def robot(folder, skill="skillset s { }", types=None, bindings=None):
+    (folder / "s.skill").write_text(skill)
+    for name, text in (("types.yaml", types), ("bindings.yaml", bindings)):
+        if text is not None:
+            (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
+    return folder
+
+
+def test_a_folder_without_skillsets(tmp_path):
+    with pytest.raises(LanguageError, match=r"ALU006: no \*\.skill file in it"):
+        load_robot(tmp_path)
+    with pytest.raises(LanguageError, match="ALU006: is no folder"):
+        load_robot(tmp_path / "none")
+
+
+def test_a_robot_with_all_that_can_be_wrong_tells_all(tmp_path):
+    robot(tmp_path, "skillset s { type Lost data d: Lost }", "Lst: nosuch", "data: {s.e: /x}\ncolour: red")
+    (tmp_path / "t.skill").write_text("skillset s { }")
+    with pytest.raises(LanguageError) as caught:
+        load_robot(tmp_path)
+    assert sorted(codes(caught)) == ["ALU005", "ALU005", "ALU401", "ALU402", "ALU403", "ALU404"]
+    assert "did you mean `s.d`?" in str(caught.value)
+
+
+def test_data_that_no_topic_can_carry(tmp_path):
+    robot(tmp_path, "skillset s { type Path data d: Path }", "Path: geometry_msgs/Point[]", "data: {s.d: /d}")
+    with pytest.raises(LanguageError, match="ALU405: data `d` is a list"):
+        load_robot(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("types", "bindings", "message"),
+    [
+        ("[1, 2]", "", "should be a mapping at its top"),
+        ("a: [", "", "can't be read"),
+        (b"\xff\xfe\x00", "", "can't be read"),
+        ("Point: 3", "", "type `Point` is 3"),
+        ("Point: geometry_msgs", "", "type `Point` is 'geometry_msgs'"),
+        ("", "data: [1]", "`data` should map"),
+        ("", "data: {s.d: 1}", "data.s.d should be a mapping, not 1"),
+        ("", "data: {s.d: {topic: relative}}", "`topic` is 'relative'; it should be an absolute ROS name"),
+        ("", "data: {s.d: {}}", "data.s.d has no `topic`"),
+        ("", "topics: {}", "`topics` should be a list"),
+        ("", "topics: [{name: /a, direction: up, type: std_msgs/Header}]", "`direction` is 'up'; it should be ros1_to_ros2"),
+        ("", "topics: [{name: /a, direction: [], type: std_msgs/Header}]", "`direction` is []"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/msg/Header}]", "it should be package/Name"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, deph: 3}]", "unknown key `deph`"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, depth: 0}]", "`depth` is 0"),
+        ("", "services: [{name: /a, server: ros1, type: std_srvs/SetBool, timeout_s: -1}]", "`timeout_s` is -1"),
+        ("", "services: [{name: /a, type: std_srvs/SetBool}]", "services[0] has no `server`"),
+        ("", "service: []", "unknown section `service`; there are `data`, `topics`, `services`"),
+    ],
+)
+def test_side_files(tmp_path, types, bindings, message):
+    robot(tmp_path, types=types, bindings=bindings)
+    with pytest.raises(LanguageError) as caught:
+        load_robot(tmp_path)
+    assert "ALU005" in codes(caught)
+    assert message in str(caught.value)
+
+
+def test_every_code_has_a_test():
+    tested = {row[0] for row in SYNTAX + SEMANTICS}
+    elsewhere = {"ALU001", "ALU002", "ALU003", "ALU004", "ALU005", "ALU006", "ALU107", "ALU401", "ALU402", "ALU403", "ALU404", "ALU405"}
+    assert tested | elsewhere == set(CODES)
