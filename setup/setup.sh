@@ -94,7 +94,8 @@ build_ros1() {
     export CMAKE_PREFIX_PATH=/usr
     # catkin wants a CMakeLists.txt beside the packages; the workspace is linked so that the checkout stays clean.
     mkdir -p "$ALULA_STATE/ros1" && ln -sfn "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE/ros1/linked_src" || exit 1
-    catkin_make -C "$ALULA_STATE/ros1" --source "$ALULA_STATE/ros1/src" -DPYTHON_EXECUTABLE=/usr/bin/python3 -DCATKIN_ENABLE_TESTING=OFF )
+    # The interpreter of the environment goes into the shebangs of the nodes' relay scripts.
+    catkin_make -C "$ALULA_STATE/ros1" --source "$ALULA_STATE/ros1/src" -DPYTHON_EXECUTABLE="$ALULA_STATE/venv1/bin/python3" -DCATKIN_ENABLE_TESTING=OFF )
 }
 
 prepare_ros1_sources() { # $ALULA_STATE/ros1/src holds links to the packages: catkin_make writes its toplevel file beside them

@@ -18,9 +18,10 @@ TYPED = [
 ]
 
 
-@pytest.mark.parametrize(
-    "command", [["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy", *TYPED]], ids=["lint", "format", "types"]
-)
-def test_tree_is_clean(command: list[str]) -> None:
-    done = subprocess.run(command, cwd=ALULA_ROOT, capture_output=True, text=True, timeout=280, check=False)
+COMMANDS = {"lint": ["ruff", "check", "."], "format": ["ruff", "format", "--check", "."], "types": ["mypy", *TYPED]}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_tree_is_clean(name: str) -> None:
+    done = subprocess.run(COMMANDS[name], cwd=ALULA_ROOT, capture_output=True, text=True, timeout=280, check=False)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
