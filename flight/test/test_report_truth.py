@@ -38,8 +38,8 @@ def flight(*places, wall_y_m=4.0, boxes=()) -> tuple[Track, World, Phases]:
 
 
 def test_the_wall_beside_the_path_decides_not_the_ground_of_take_off_and_landing():
-    found = encounter(*flight((10, 0, 3), wall_y_m=2.5))
-    assert found.min_clearance_m == pytest.approx(2.5 - VEHICLE_RADIUS_M, abs=1e-5)
+    found = encounter(*flight((10, 0, 3), wall_y_m=1.9))
+    assert found.min_clearance_m == pytest.approx(1.9 - VEHICLE_RADIUS_M, abs=1e-5)
     assert found.collisions == 0
     assert found.distance_m == pytest.approx(10.0 + 2 * (3 - STAND_M), abs=1e-6)
 
@@ -66,8 +66,15 @@ def test_each_entry_is_one_collision():
 def test_without_phases_told_the_heights_decide():
     track, world, known = flight((10, 0, 3), wall_y_m=4.0)
     found = encounter(track, world, Phases(LIFT_OFF_S, "simulator", touch_down_s=known.touch_down_s))
-    # Nobody said when the take-off ended: from 1.5 m on everything counts, the ground too.
-    assert found.min_clearance_m == pytest.approx(STAND_M + 1.5 - VEHICLE_RADIUS_M, abs=0.06)
+    assert found.min_clearance_m == pytest.approx(2.0 - VEHICLE_RADIUS_M, abs=0.05)
+    assert encounter(track, world, known).min_clearance_m == pytest.approx(2.0 - VEHICLE_RADIUS_M, abs=0.05)
+
+
+def test_heights_count_from_the_place_of_take_off():
+    track, world, phases = flight((10, 0, 3), wall_y_m=4.0)
+    raised = World(world.vertices + np.array([0, 0, 50]), world.triangles)
+    lifted = Track(track.t_s, track.position_enu_m + np.array([0, 0, 50]))
+    assert encounter(lifted, raised, phases).min_clearance_m == pytest.approx(encounter(track, world, phases).min_clearance_m, abs=1e-4)
 
 
 def test_what_is_not_known_is_none():

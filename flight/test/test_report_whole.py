@@ -41,7 +41,7 @@ FLOWN += [
     (91.8, 44, -4, 3),
 ]
 FLOWN += [(98.8, 44, -4, 0.3), (101.0, 44, -4, 0.3)]
-WALL = ((-8.0, 2.5, 0.0), (15.0, 2.8, 6.0))
+WALL = ((-8.0, 1.9, 0.0), (15.0, 2.2, 6.0))
 LANDING_S, TOUCH_DOWN_S = 91.92, 98.8
 
 
@@ -78,7 +78,7 @@ def lay_out(folder: Path) -> None:
     (folder / "bridge.json").write_text('{"topics": {"/clock": {"count": 5000, "p50_ms": 0.4, "p95_ms": 1.5, "dropped": 0}}}')
     t_s, position = poses()
     fault = {"sensor": "zed", "mode": "dead", "t_s": LIFT_OFF_S + 30.0}
-    state = {"t_s": 113.0, "lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.7, "distance_m": 83.0, "faults": [fault]}
+    state = {"t_s": 113.0, "lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.1, "distance_m": 83.0, "faults": [fault]}
     write_bag(folder / "functional.bag", poses=(t_s, position), states=[state], guidance=guidance(t_s), map_points=5)
 
 
@@ -118,7 +118,7 @@ def test_the_flight_in_numbers(whole):
     }
     assert summary["reason"] == "zed_depthmap: zed_works was violated"
     assert summary["duration_s"] == pytest.approx(98.8)
-    assert summary["min_clearance_m"] == pytest.approx(2.5 - 0.85, abs=1e-3)
+    assert summary["min_clearance_m"] == pytest.approx(1.9 - 0.85, abs=1e-3)
     assert summary["accounts"]["recomputed"]["distance_m"] == pytest.approx(2.7 + 22 + 14 + 22 + 18 + 2.7 * 0.985, abs=0.1)
     assert summary["distance_m"] == 83.0
     assert summary["lift_off"] == {"stamp_s": LIFT_OFF_S, "source": "simulator"}
@@ -258,7 +258,7 @@ def test_each_file_may_be_missing(folder, missing):
         "functional.bag": summary["min_clearance_m"] is None and summary["lift_off"]["source"] == "flight_status",
         "bridge.json": summary["bridge"] is None,
         "map.ply": summary["map"]["points"] == 5 and summary["map"]["rmse_m"] is None,
-        "world.ply": summary["min_clearance_m"] == 1.7 and summary["map"]["rmse_m"] is None,
+        "world.ply": summary["min_clearance_m"] == 1.1 and summary["map"]["rmse_m"] is None,
     }
     assert unknown[missing]
     if missing != "functional.bag":
@@ -284,7 +284,7 @@ def test_a_crash_in_flight(folder):
     assert summary["duration_s"] == pytest.approx(40.0, abs=1.0)
     running = {s["skill"] for s in summary["skills"] if s["outcome"] == "RUNNING"}
     assert running == {"lidar_mapping", "lidar_depthmap", "lock_head", "goto"}
-    assert summary["min_clearance_m"] == pytest.approx(1.65, abs=1e-3)
+    assert summary["min_clearance_m"] == pytest.approx(1.05, abs=1e-3)
     assert "the fault zed@30 never happened" in summary["problems"]
     assert "the mission's process ended before the mission did" in summary["problems"]
     timeline = json.loads((folder / "timeline.json").read_text())

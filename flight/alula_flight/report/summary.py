@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TypedDict
 
 from alula_flight.report.events import History
@@ -155,7 +156,7 @@ def note_doubts(facts: RunFacts, recording: Recording, phases: Phases, problems:
         problems.note(f"no lift-off is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(recording)}
     for fault in facts.faults:
-        if recording.simulator is not None and fault.partition("@")[0] not in broken:
+        if recording.simulator is not None and re.split("[:@]", fault)[0] not in broken:
             problems.note(f"the fault {fault} never happened")
 
 

@@ -1,7 +1,8 @@
 """How near the vehicle truly came to the world, computed from its true path and not taken from the simulator's word.
 
-During take-off and landing the ground below is no obstacle, it is the destination. So in these phases only moments above
-1.5 m count, and only if the nearest surface is not the one below; in between every moment and every surface count.
+From the moment when the take-off has ended or has reached 2 m, and until the landing begins, every surface counts. Before and
+after, the ground below is no obstacle, it is where the vehicle comes from or goes to: then only moments above 1.5 m count,
+and only if the nearest surface is not the one below.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from alula_flight.report.recording import Recording, SimulatorAccount, Track
 from alula_flight.report.world import World
 
 VEHICLE_RADIUS_M = 0.85  # with propellers
-LOW_M = 1.5  # above the place of take-off
+LOW_M = 1.5  # height of the vehicle's centre above the place of take-off
+CRUISE_HEIGHT_M = 2.0
 BELOW_DEG = 45.0  # a surface within this cone around straight down is the ground that one starts from or lands on
 REST_S = 1.0
 REST_MOVE_M = 0.1
@@ -54,8 +56,9 @@ def clearances(track: Track, world: World, phases: Phases) -> tuple[NDArray[np.f
     nearest = world.nearest(track.position_enu_m) - track.position_enu_m
     distance = np.linalg.norm(nearest, axis=1)
     below = -nearest[:, 2] > distance * np.cos(np.radians(BELOW_DEG))
-    high = track.position_enu_m[:, 2] - _start_height(track, phases) >= LOW_M
-    cruise = (track.t_s >= _cruise_begins(track, high, phases)) & (track.t_s < _landing_begins(track, high, phases))
+    height = track.position_enu_m[:, 2] - _ground_height(track, world, phases)
+    high = height >= LOW_M
+    cruise = (track.t_s >= _cruise_begins(track, height, phases)) & (track.t_s < _landing_begins(track, height, phases))
     airborne = (track.t_s >= phases.zero_s) & (track.t_s < (np.inf if phases.touch_down_s is None else phases.touch_down_s))
     return distance - VEHICLE_RADIUS_M, airborne & (cruise | (high & ~below))
 
@@ -66,26 +69,26 @@ def entries_below_zero(clearance: NDArray[np.float64], counts: NDArray[np.bool_]
     return int((touching[1:] & ~touching[:-1]).sum())
 
 
-def _start_height(track: Track, phases: Phases) -> float:
-    """Return z of the vehicle's centre where it stood before lift-off."""
+def _ground_height(track: Track, world: World, phases: Phases) -> float:
+    """Return z of the surface on which the vehicle stood before lift-off (or over which the path begins)."""
     before = track.t_s <= phases.zero_s
-    return float(track.position_enu_m[before][-1, 2] if before.any() else track.position_enu_m[0, 2])
+    place = track.position_enu_m[before][-1] if before.any() else track.position_enu_m[0]
+    above = _height_above_surface(world, place)
+    return float(place[2] - (above if np.isfinite(above) else 0.0))
 
 
-def _cruise_begins(track: Track, high: NDArray[np.bool_], phases: Phases) -> float:
-    """Return the end of the take-off; if nobody told, the first moment above 1.5 m (a take-off that nobody ended has no cruise)."""
-    if phases.cruise_s is not None:
-        return phases.cruise_s
-    return float(track.t_s[high][0]) if high.any() else np.inf
+def _cruise_begins(track: Track, height: NDArray[np.float64], phases: Phases) -> float:
+    """Return the end of the take-off, or the moment when it reached 2 m if that is earlier."""
+    high = track.t_s[(height >= CRUISE_HEIGHT_M) & (track.t_s >= phases.zero_s)]
+    return min(np.inf if phases.cruise_s is None else phases.cruise_s, high[0] if len(high) else np.inf)
 
 
-def _landing_begins(track: Track, high: NDArray[np.bool_], phases: Phases) -> float:
-    """Return the beginning of the landing; if nobody told of one, the last moment above 1.5 m, if the flight ended at all."""
+def _landing_begins(track: Track, height: NDArray[np.float64], phases: Phases) -> float:
+    """Return the beginning of the landing; if nobody told of one, the last moment above 2 m, if the flight ended at all."""
     if phases.landing_s is not None:
         return phases.landing_s
-    if phases.touch_down_s is None or not high.any():
-        return np.inf
-    return float(track.t_s[high][-1])
+    high = track.t_s[height >= CRUISE_HEIGHT_M]
+    return np.inf if phases.touch_down_s is None or not len(high) else float(high[-1])
 
 
 def rests(track: Track | None, world: World | None, phases: Phases) -> bool | None:
