@@ -24,14 +24,13 @@ class ZedSettings:
     min_mean: float = 4.0
     min_std: float = 2.0
     # matching
-    disparities: int = 96
+    disparities: int = 64
     block_px: int = 5
     uniqueness_percent: int = 10
     speckle_px: int = 120
     speckle_range_px: int = 2
     left_right_px: int = 1
-    border_px: int = 32
-    min_texture: float = 1.5
+    min_texture: float = 2.5
     # corridor
     max_range_m: float = 8.0
     stride_px: int = 2
@@ -63,7 +62,6 @@ class ZedSettings:
             speckle_px=self.speckle_px,
             speckle_range_px=self.speckle_range_px,
             left_right_px=self.left_right_px,
-            border_px=self.border_px,
             min_texture=self.min_texture,
         )
 
