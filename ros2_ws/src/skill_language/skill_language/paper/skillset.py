@@ -29,6 +29,8 @@ def parse(text: str, file: str = "") -> Skillset:
     """
     source = Source(file, text)
     cursor = Cursor(source)
+    if cursor.at_end and source.diagnostics:
+        raise LanguageError(source.diagnostics)
     if not cursor.at("skillset") and not cursor.at_end:
         # Some other file: one finding says so better than one for each of its characters.
         source.diagnostics.clear()
