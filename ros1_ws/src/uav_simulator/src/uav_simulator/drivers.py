@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 import rospy
+from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, Imu, PointCloud2
 
 from uav_simulator import ros_messages
@@ -16,6 +17,7 @@ from uav_simulator.sensors.lidar import POINT_DTYPE
 from uav_simulator.simulation import TICK_NS, Simulation
 
 ZERO = (0.0, 0.0, 0.0)
+Pixels = NDArray[np.uint8]
 
 
 class Driver(Protocol):
@@ -52,8 +54,8 @@ class ZedDriver:
         self._images = [_Publisher(f"/zed/{eye}/image_raw", Image) for eye in ("left", "right")]
         self._infos = [_Publisher(f"/zed/{eye}/camera_info", CameraInfo) for eye in ("left", "right")]
         camera = simulation.stereo.camera
-        black = np.zeros((camera.height, camera.width), dtype=np.uint8)
-        self._black = (black, black)
+        black: Pixels = np.zeros((camera.height, camera.width), dtype=np.uint8)
+        self._black: tuple[Pixels, Pixels] = (black, black)
         self._last = self._black
 
     def publish(self, mode: SensorMode) -> None:
@@ -79,7 +81,7 @@ class LidarDriver:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._cloud = _Publisher("/lidar/points", PointCloud2)
-        self._last = np.empty(0, dtype=POINT_DTYPE)
+        self._last: NDArray[np.void] = np.empty(0, dtype=POINT_DTYPE)
 
     def publish(self, mode: SensorMode) -> None:
         """Publish a cloud stamped with the sweep's beginning."""

@@ -6,6 +6,8 @@ import struct
 import threading
 from dataclasses import dataclass
 
+ROUNDING_S = 1e-6  # of stamps in floating point
+
 
 @dataclass
 class _Listener:
@@ -34,7 +36,8 @@ class Pacer:
     def may_advance(self, now_s: float, wall_s: float) -> bool:
         """Return whether simulated time may go on at ``now_s``; ``wall_s`` is a monotonic clock for the patience."""
         with self._lock:
-            return not any([self._holds(listener, now_s, wall_s) for listener in self._listeners.values()])
+            held = [self._holds(listener, now_s, wall_s) for listener in self._listeners.values()]  # asks everyone, for their patience
+            return not any(held)
 
     @property
     def left_out(self) -> list[str]:
@@ -45,7 +48,7 @@ class Pacer:
     def _holds(self, listener: _Listener, now_s: float, wall_s: float) -> bool:
         if not listener.live:
             return False
-        if now_s - listener.stamp_s <= self._limit_s:
+        if now_s - listener.stamp_s <= self._limit_s + ROUNDING_S:
             listener.lagging_since_s = None
             return False
         if listener.lagging_since_s is None:

@@ -46,8 +46,9 @@ def _converted(name: str, value: Any, kind: type) -> Any:
     try:
         if kind is tuple:
             return tuple(value.replace(",", " ").split() if isinstance(value, str) else (str(v) for v in value))
-        if kind is int and (isinstance(value, bool) or float(value) != int(value)):
-            raise ValueError
-        return kind(value)
+        converted = kind(value)
     except (TypeError, ValueError):
-        raise ConfigError(f"parameter ~{name}: {value!r} is no {kind.__name__}") from None
+        converted = None
+    if converted is None or isinstance(value, bool) or (kind is int and float(value) != converted):
+        raise ConfigError(f"parameter ~{name}: {value!r} is no {kind.__name__}")
+    return converted

@@ -216,10 +216,8 @@ class Endpoint:
         if not 0.0 <= angle_deg <= 360.0 or relative not in {0.0, 1.0}:
             return Result.FAILED
         clockwise = 0 if direction == 0.0 else int(math.copysign(1, direction))
-        if relative:
-            yaw_rad = -math.radians(angle_deg) * (clockwise or 1)
-        else:
-            yaw_rad = yaw_enu_from_ned(math.radians(angle_deg))
+        angle_rad = math.radians(angle_deg)
+        yaw_rad = -angle_rad * (clockwise or 1) if relative else yaw_enu_from_ned(angle_rad)
         speed = math.radians(speed_deg_s) if speed_deg_s > 0.0 else 0.0
         return self._pilot.condition_yaw(yaw_rad, relative=bool(relative), turn=-clockwise, speed_rad_s=speed)
 

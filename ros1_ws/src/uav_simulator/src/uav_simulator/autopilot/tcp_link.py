@@ -27,7 +27,7 @@ class TcpLink:
             self._server.close()
             raise SimulatorError(f"MAVLink port {port} on loopback can't be used: {error.strerror}") from error
         self._server.listen(1)
-        self._server.setblocking(False)  # noqa: FBT003 - the socket's own signature
+        self._server.setblocking(False)
         self.port: int = self._server.getsockname()[1]
 
     def serve(self, wait_s: float = 0.0) -> None:
@@ -49,7 +49,7 @@ class TcpLink:
 
     def _accept(self) -> None:
         self._client, _ = self._server.accept()
-        self._client.setblocking(False)  # noqa: FBT003
+        self._client.setblocking(False)
         self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._endpoint.open_link()
 

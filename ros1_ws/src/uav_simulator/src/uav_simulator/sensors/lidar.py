@@ -41,7 +41,7 @@ class Lidar:
         elevation = np.radians(np.linspace(-spec.half_angle_deg, spec.half_angle_deg, spec.beams))
         a, e = np.meshgrid(azimuth, elevation, indexing="ij")
         self._directions = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis=-1)  # (columns, beams, 3), sensor
-        self._offsets_s = np.arange(spec.columns) * (spec.period_s / spec.columns)
+        self._offsets_s: Floats = np.linspace(0.0, spec.period_s, spec.columns, endpoint=False, dtype=np.float64)
         self._body_directions = self._directions @ LIDAR.matrix.T
 
     def scan(self, track: PoseTrack, start_s: float) -> NDArray[np.void]:

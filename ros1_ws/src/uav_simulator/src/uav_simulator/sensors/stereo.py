@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
-SKY_M = 2000.0
+SKY_M = 100.0  # only the scale of the clouds: both eyes see the sky alike, at a disparity of zero
 SKY_GREY = 190.0
 PIXEL_NOISE = 2.0  # grey values, standard deviation
 NOISE_BANK = 1 << 20
@@ -101,7 +101,8 @@ class StereoPair:
             ]
             sky = np.array([0.0, 0.0, 1.0, SKY_M, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, SKY_GREY])
             parts.append(np.concatenate([np.array(columns), sky[:, None]], axis=1))
-        return np.concatenate(parts, axis=1).astype(np.float32)
+        coefficients: Floats32 = np.concatenate(parts, axis=1).astype(np.float32)
+        return coefficients
 
     def _shade(self, index: NDArray[np.intp], depth: Floats32, table: Floats32) -> Floats32:
         """Return both images as float32 grey values, (2, height, width)."""

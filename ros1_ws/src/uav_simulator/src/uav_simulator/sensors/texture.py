@@ -47,14 +47,14 @@ def surface_table(world: World, seed: int) -> SurfaceTable:
     n = world.normals
     upright = np.abs(n[:, 2]) < 0.9
     up = np.where(upright[:, None], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
-    axis_u = np.cross(up, n)
-    axis_u /= np.linalg.norm(axis_u, axis=1, keepdims=True)
-    axis_v = np.cross(n, axis_u)
+    across = np.cross(up, n)
+    axis_u: Floats = (across / np.linalg.norm(across, axis=1, keepdims=True)).astype(np.float64)
     # The offset depends on the plane only, so triangles of one wall continue one another.
     plane = np.round(np.column_stack([n, world.plane_offsets]), 3) @ np.array([12.9898, 78.233, 37.719, 53.117])
     offset_u = np.modf(np.sin(plane + seed) * 43758.5453)[0] * 20.0
     offset_v = np.modf(np.sin(plane * 1.7 + seed) * 24634.6345)[0] * 20.0
-    light = 0.55 + 0.45 * np.clip(n @ SUN, 0.0, 1.0)
+    axis_v: Floats = np.cross(n, axis_u).astype(np.float64)
+    light: Floats = 0.55 + 0.45 * np.clip(n @ SUN, 0.0, 1.0)
     return SurfaceTable(axis_u, axis_v, offset_u, offset_v, 255.0 * world.brightness * light)
 
 
@@ -74,4 +74,5 @@ def layer(tile: NDArray[np.uint8], u_m: Floats32, v_m: Floats32, grain: Grain) -
     """Look a layer of noise up at texture coordinates in metres, (H, W) float32; -1..1."""
     scale = 1.0 / grain.texel_m
     grey = cv2.remap(tile, u_m * scale, v_m * scale, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-    return (grey.astype(np.float32) - 128.0) * (1.0 / 128.0)
+    unit: Floats32 = (grey.astype(np.float32) - 128.0) * np.float32(1.0 / 128.0)
+    return unit

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import open3d as o3d
@@ -29,11 +30,11 @@ class Part:
 
 
 def route_samples(route: tuple[Vec3, ...]) -> Floats:
-    """Return points along the route, (N, 3), at most 0.25 m apart, the way up from the ground to its start and down from its end included."""
+    """Return points along the route, (N, 3), at most 0.25 m apart, with the ways up to its start and down from its end."""
     first, last = route[0], route[-1]
     corners = [(first[0], first[1], 0.9), *route, (last[0], last[1], 0.9)]
     pieces = []
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in pairwise(corners):
         count = max(2, math.ceil(math.dist(a, b) / ROUTE_SAMPLE_M) + 1)
         pieces.append(np.linspace(a, b, count))
     return np.concatenate(pieces)

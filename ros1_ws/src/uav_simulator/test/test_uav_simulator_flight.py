@@ -1,0 +1,100 @@
+"""The whole simulation without ROS: the route is flown as a client would, in wind, and repeats with its seed."""
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from uav_simulator.autopilot.types import LandedState
+from uav_simulator.sensors.faults import parse_faults
+from uav_simulator.settings import Settings
+from uav_simulator.simulation import Simulation
+from uav_simulator.world.config import load_world_config
+
+CONFIG = load_world_config(Path(Settings().world))
+SPEED_M_S = 1.0
+
+
+class Client:
+    """Streams setpoints at 10 Hz along the route at the mission's speed, with the yaw of the leg."""
+
+    def __init__(self, simulation):
+        self.simulation = simulation
+        self._mavlink = mavlink.MAVLink(None, srcSystem=1, srcComponent=191)
+
+    def command(self, command, *params):
+        values = [*params, *([0.0] * (7 - len(params)))]
+        self.simulation.endpoint.feed(mavlink.MAVLink_command_long_message(1, 1, command, 0, *values).pack(self._mavlink))
+
+    def run_until(self, condition, timeout_s=20.0):
+        start = self.simulation.now_s
+        while not condition():
+            assert self.simulation.now_s - start < timeout_s
+            self.simulation.tick()
+
+    def take_off(self):
+        self.command(176, 1, 4)
+        self.command(400, 1)
+        self.command(22, 0, 0, 0, 0, 0, 0, 3.0)
+        self.run_until(lambda: self.simulation.autopilot.landed_state is LandedState.IN_AIR)
+
+    def fly_leg(self, a, b):
+        yaw_ned = math.atan2(b[0] - a[0], b[1] - a[1])
+        for way in np.arange(0.0, math.dist(a, b) + 1e-6, 0.1 * SPEED_M_S):
+            x, y, z = np.array(a) + (np.array(b) - np.array(a)) * way / math.dist(a, b)
+            message = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x09F8, y, x, -z, 0, 0, 0, 0, 0, 0, yaw_ned, 0)
+            self.simulation.endpoint.feed(message.pack(self._mavlink))
+            for _ in range(5):
+                self.simulation.tick()
+        self.run_until(lambda: math.dist(self.simulation.vehicle.body.position, b) < 0.3)
+
+
+def fly_route(seed):
+    simulation = Simulation(CONFIG, seed=seed, faults=parse_faults("zed@30"), boot_before_s=60.0)
+    client = Client(simulation)
+    client.take_off()
+    for a, b in pairwise(CONFIG.route):
+        client.fly_leg(a, b)
+    client.command(21)
+    client.run_until(lambda: not simulation.autopilot.armed)
+    return simulation
+
+
+def test_the_route_is_flown_without_a_contact_and_with_clearance():
+    state = fly_route(seed=1).state
+    assert state.collisions == 0
+    assert 0.8 <= state.min_clearance_m <= 2.0
+    assert state.distance_m == pytest.approx(76.0 + 6.0, abs=4.0)
+    assert 75.0 <= state.t_s - state.lift_off_s <= 130.0
+    assert state.faults == [{"sensor": "zed", "mode": "dead", "t_s": pytest.approx(state.lift_off_s + 30.0, abs=0.03)}]
+
+
+def test_flying_into_a_wall_is_a_contact_and_does_not_go_through():
+    simulation = Simulation(CONFIG, seed=0, faults=[], boot_before_s=60.0)
+    client = Client(simulation)
+    client.take_off()
+    client.fly_leg((0.0, 0.0, 3.0), (4.0, 0.0, 3.0))
+    message = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DF8, -8, 4, -3, 0, 0, 0, 0, 0, 0, 0, 0)
+    simulation.endpoint.feed(message.pack(mavlink.MAVLink(None, srcSystem=1, srcComponent=191)))
+    for _ in range(400):
+        simulation.tick()
+    assert simulation.state.collisions >= 1
+    assert simulation.state.min_clearance_m < 0.0
+    assert simulation.vehicle.body.position[1] > -4.3
+
+
+def test_the_same_seed_and_commands_give_the_same_flight_and_measurements():
+    def run():
+        simulation = Simulation(CONFIG, seed=3, faults=[], boot_before_s=60.0)
+        client = Client(simulation)
+        client.take_off()
+        client.fly_leg((0.0, 0.0, 3.0), (2.0, 0.0, 3.0))
+        return simulation, simulation.stereo.render(simulation.pose), simulation.lidar.scan(simulation.track, simulation.now_s - 0.1)
+
+    (a, images_a, cloud_a), (b, images_b, cloud_b) = run(), run()
+    assert a.pose == b.pose
+    assert all(np.array_equal(x, y) for x, y in zip(images_a, images_b, strict=True))
+    assert np.array_equal(cloud_a, cloud_b)

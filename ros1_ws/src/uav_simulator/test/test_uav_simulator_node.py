@@ -1,0 +1,218 @@
+"""The node on a live ROS graph, with a real MAVLink client over TCP."""
+
+import json
+import socket
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import rospy
+from geometry_msgs.msg import PoseStamped
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, Image, Imu, PointCloud2
+from std_msgs.msg import Header, String
+from tf2_msgs.msg import TFMessage
+from uav_msgs.srv import SetSensor
+
+from alula_testing.ros1 import wait_until
+
+NODE = Path(__file__).parents[1] / "scripts" / "uav_simulator_node"
+PACE_TOPIC = "/uav_simulator_test/work"
+
+
+class Collector:
+    """The messages of some topics, as they come."""
+
+    def __init__(self, **topics):
+        self.messages = {name: [] for name in topics}
+        self._subscribers = [
+            rospy.Subscriber(topic, kind, self.messages[name].append, queue_size=100, tcp_nodelay=True)
+            for name, (topic, kind) in topics.items()
+        ]
+
+    def close(self):
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+    def count(self, name):
+        return len(self.messages[name])
+
+    def wait(self, name, count=1, timeout_s=10.0):
+        goal = self.count(name) + count
+        wait_until(lambda: self.count(name) >= goal, timeout_s=timeout_s, what=f"{count} more messages of {name}")
+        return self.messages[name][-1]
+
+
+class Client:
+    """A MAVLink client over TCP."""
+
+    def __init__(self, port):
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=5.0)
+        self._socket.settimeout(0.05)
+        self._parser = mavlink.MAVLink(None, srcSystem=1, srcComponent=191)
+
+    def receive(self):
+        try:
+            return self._parser.parse_buffer(self._socket.recv(65536)) or []
+        except TimeoutError:
+            return []
+
+    def wait(self, name, condition=lambda _: True, timeout_s=10.0):
+        found = []
+
+        def came():
+            found.extend(m for m in self.receive() if m.get_type() == name and m.get_srcSystem() == 1 and condition(m))
+            return bool(found)
+
+        wait_until(came, timeout_s=timeout_s, what=name)
+        return found[0]
+
+    def command(self, command, *params):
+        values = [*params, *([0.0] * (7 - len(params)))]
+        self._socket.sendall(mavlink.MAVLink_command_long_message(1, 1, command, 0, *values).pack(self._parser))
+        return self.wait("COMMAND_ACK", lambda m: m.command == command).result
+
+    def close(self):
+        self._socket.close()
+
+
+@pytest.fixture
+def collect():
+    collectors = []
+
+    def start(**topics):
+        collectors.append(Collector(**topics))
+        return collectors[-1]
+
+    yield start
+    for collector in collectors:
+        collector.close()
+
+
+@pytest.fixture
+def start_simulator(start_node):
+    """Return a function that starts the simulator on any free port and waits for its clock; it returns the MAVLink port."""
+    started = []
+
+    def start(*params):
+        rospy.set_param("/uav_simulator/mavlink_port", 0)
+        started.append(start_node([sys.executable, str(NODE), "__name:=uav_simulator", *params]))
+        rospy.wait_for_message("/clock", Clock, timeout=20.0)
+        return int(rospy.get_param("/uav_simulator/mavlink_port"))
+
+    yield start
+    for process in started:
+        process.terminate()
+        process.wait(10.0)
+    rospy.delete_param("/uav_simulator")
+
+
+def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, collect, tmp_path):
+    port = start_simulator("_rate:=0", f"_world_path:={tmp_path / 'world.ply'}", "_faults:=imu")
+    seen = collect(
+        left=("/zed/left/image_raw", Image),
+        right=("/zed/right/image_raw", Image),
+        info=("/zed/right/camera_info", CameraInfo),
+        lidar=("/lidar/points", PointCloud2),
+        imu=("/imu/data", Imu),
+        pose=("/sim/true_pose", PoseStamped),
+        state=("/sim/state", String),
+        tf=("/tf_static", TFMessage),
+        clock=("/clock", Clock),
+    )
+    seen.wait("right")
+    seen.wait("lidar")
+    assert (tmp_path / "world.ply").stat().st_size > 10_000
+    left = {m.header.stamp.to_nsec(): m for m in seen.messages["left"]}
+    right = seen.wait("right")
+    wait_until(
+        lambda: right.header.stamp.to_nsec() in {m.header.stamp.to_nsec() for m in seen.messages["left"]}, timeout_s=5.0, what="pair"
+    )
+    assert left
+    assert (right.width, right.height, right.encoding, len(right.data)) == (480, 270, "mono8", 480 * 270)
+    assert seen.messages["info"][-1].P[3] == pytest.approx(-240.0 * 0.12)
+    assert [f.name for f in seen.messages["lidar"][-1].fields] == ["x", "y", "z", "intensity", "time"]
+    assert {t.child_frame_id for t in seen.messages["tf"][0].transforms} == {"zed_left", "zed_right", "lidar", "imu"}
+    assert seen.count("imu") == 0, "broken from the beginning"
+
+    client = Client(port)
+    assert client.command(511, 245, 100_000) == 0
+    assert client.command(176, 1, 4) == 0
+    assert client.command(400, 1) == 0
+    assert client.command(22, 0, 0, 0, 0, 0, 0, 3.0) == 0
+    client.wait("EXTENDED_SYS_STATE", lambda m: m.landed_state == mavlink.MAV_LANDED_STATE_IN_AIR, timeout_s=30.0)
+    wait_until(lambda: seen.messages["pose"][-1].pose.position.z > 2.8, timeout_s=5.0, what="the vehicle is up")
+    client.close()
+    again = Client(port)
+    assert again.command(512, 242) == 0, "a client may come back"
+    again.close()
+
+    set_sensor = rospy.ServiceProxy("/sim/set_sensor", SetSensor)
+    assert not set_sensor("sonar", "dead").accepted
+    assert set_sensor("zed", "dead").accepted
+    seen.wait("clock", 5)
+    silent_from = seen.count("left")
+    seen.wait("lidar", 5)
+    assert seen.count("left") <= silent_from + 1
+    assert set_sensor("zed", "frozen").accepted
+    seen.wait("left", 2)
+    first, second = seen.messages["left"][-2:]
+    assert first.data == second.data
+    assert first.header.stamp < second.header.stamp
+    assert set_sensor("zed", "black").accepted
+    wait_until(lambda: not any(seen.messages["left"][-1].data), timeout_s=5.0, what="a black image")
+    assert set_sensor("zed", "ok").accepted
+    wait_until(lambda: any(seen.messages["left"][-1].data), timeout_s=5.0, what="an image again")
+    state = json.loads(seen.wait("state").data)
+    assert state["lift_off_s"] > 0.0
+    assert state["collisions"] == 0
+    assert [(f["sensor"], f["mode"]) for f in state["faults"]] == [
+        ("imu", "dead"),
+        ("zed", "dead"),
+        ("zed", "frozen"),
+        ("zed", "black"),
+        ("zed", "ok"),
+    ]
+    stamps = [m.clock.to_nsec() for m in seen.messages["clock"]]
+    assert {b - a for a, b in pairwise(stamps)} == {20_000_000}, "50 Hz, none lost"
+
+
+def test_time_waits_for_who_works_for_it_and_lets_go_of_the_dead(start_simulator, collect):
+    start_simulator("_rate:=0", f"_pace_topics:=[{PACE_TOPIC}]", "_pace_patience_s:=1.5")
+    seen = collect(clock=("/clock", Clock))
+
+    def now_s():
+        return seen.messages["clock"][-1].clock.to_sec()
+
+    work = rospy.Publisher(PACE_TOPIC, Header, queue_size=1)
+    wait_until(lambda: work.get_num_connections() > 0, timeout_s=5.0, what="the simulator listens")
+    seen.wait("clock")
+    for _ in range(5):  # each word lets time go on for as long as the limit
+        stamp = now_s()
+        work.publish(Header(stamp=rospy.Time.from_sec(stamp)))
+        wait_until(lambda stamp=stamp: now_s() >= stamp + 0.29, timeout_s=1.4, what="time goes on")
+    stamp = now_s()
+    work.publish(Header(stamp=rospy.Time.from_sec(stamp)))
+    wait_until(lambda: now_s() >= stamp + 0.29, timeout_s=1.4, what="time goes on")
+    held_at, held_from = now_s(), time.monotonic()
+    wait_until(lambda: now_s() > held_at + 0.1, timeout_s=6.0, what="time lets go")
+    assert time.monotonic() - held_from > 1.0
+    work.unregister()
+
+
+@pytest.mark.usefixtures("ros_master")
+def test_a_wrong_parameter_ends_the_node_with_one_line():
+    done = subprocess.run(
+        [sys.executable, str(NODE), "__name:=uav_simulator_wrong", "_faults:=sonar@3"],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "unknown sensor 'sonar'" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,119 @@
+"""Lockstep and parameters, without ROS."""
+
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from uav_simulator_link import Link
+
+from uav_simulator.autopilot.tcp_link import TcpLink
+from uav_simulator.autopilot.types import Mode
+from uav_simulator.errors import ConfigError, SimulatorError
+from uav_simulator.pacing import Pacer, header_stamp_s
+from uav_simulator.pilot_hooks import apply_pilot_word
+from uav_simulator.settings import Settings, settings_from_params
+
+LIMIT_S, PATIENCE_S = 0.3, 2.0
+
+
+def pacer():
+    return Pacer(limit_s=LIMIT_S, patience_s=PATIENCE_S)
+
+
+def test_time_waits_for_a_laggard_and_goes_on_when_it_has_caught_up():
+    p = pacer()
+    assert p.may_advance(100.0, 0.0), "who has never spoken is not waited for"
+    p.heard("/a", 10.0)
+    assert p.may_advance(10.3, 0.0)
+    assert not p.may_advance(10.32, 1.0)
+    p.heard("/a", 10.1)
+    assert p.may_advance(10.32, 1.5)
+
+
+def test_time_lets_go_after_its_patience_until_the_topic_speaks_again():
+    p = pacer()
+    p.heard("/a", 10.0)
+    assert not p.may_advance(11.0, 50.0)
+    assert not p.may_advance(11.0, 51.9)
+    assert p.may_advance(11.0, 52.0)
+    assert p.left_out == ["/a"]
+    assert p.may_advance(15.0, 53.0)
+    p.heard("/a", 14.9)
+    assert p.left_out == []
+    assert not p.may_advance(15.3, 54.0)
+
+
+def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
+    p = pacer()
+    p.heard("/a", 10.0)
+    p.may_advance(20.0, 0.0)
+    assert p.may_advance(20.0, 3.0)
+    p.heard("/a", 10.0)
+    p.heard("/a", 0.0)
+    assert p.may_advance(20.0, 3.1)
+
+
+def test_the_slowest_of_many_holds():
+    p = pacer()
+    p.heard("/a", 10.0)
+    p.heard("/b", 9.0)
+    assert not p.may_advance(10.0, 0.0)
+    p.heard("/b", 10.0)
+    assert p.may_advance(10.0, 0.1)
+
+
+@given(st.lists(st.floats(0.001, 0.5), max_size=40))
+def test_a_live_topic_is_never_left_behind_by_more_than_the_limit(progress):
+    p, now, stamp, wall = pacer(), 1.0, 1.0, 0.0
+    p.heard("/a", stamp)
+    for step in progress:
+        for _ in range(50):
+            wall += 0.001
+            if p.may_advance(now, wall):
+                now += 0.02
+        assert now - stamp <= LIMIT_S + 0.02 + 1e-9
+        stamp = min(now, stamp + step)
+        p.heard("/a", stamp)
+
+
+def test_header_stamps_are_read_from_the_first_bytes():
+    # std_msgs/Header: seq, stamp.secs, stamp.nsecs (uint32 little endian), then the frame's name
+    assert header_stamp_s(struct.pack("<IIII3s", 7, 12, 500_000_000, 3, b"map")) == 12.5
+
+
+def test_parameters_have_defaults_and_are_converted():
+    assert settings_from_params({}) == Settings()
+    settings = settings_from_params({"seed": 3, "rate": 2, "pace_topics": "/a, /b", "boot_before_s": 0})
+    assert (settings.seed, settings.rate, settings.pace_topics, settings.boot_before_s) == (3, 2.0, ("/a", "/b"), 0.0)
+    assert settings_from_params({"pace_topics": ["/a"]}).pace_topics == ("/a",)
+
+
+@pytest.mark.parametrize(
+    ("params", "said"), [({"speed": 1}, "~speed"), ({"seed": "x"}, "~seed"), ({"seed": 1.5}, "~seed"), ({"rate": -1}, "~rate")]
+)
+def test_a_wrong_parameter_is_named(params, said):
+    with pytest.raises(ConfigError, match=said):
+        settings_from_params(params)
+
+
+def test_pilot_words():
+    link = Link().flying()
+    apply_pilot_word("LOITER", link.pilot, link.endpoint)
+    assert link.pilot.mode is Mode.LOITER
+    apply_pilot_word("RC_LOST", link.pilot, link.endpoint)
+    assert link.pilot.mode is Mode.RTL
+    apply_pilot_word("GCS_LOST", link.pilot, link.endpoint)
+    assert not link.endpoint.gcs_present
+    for wrong, said in (("JUMP", "unknown word 'JUMP'"), ("YAW_STICK left", "not 'left'")):
+        with pytest.raises(ConfigError, match=said):
+            apply_pilot_word(wrong, link.pilot, link.endpoint)
+
+
+def test_a_taken_port_is_named():
+    first = TcpLink(Link().endpoint, 0)
+    try:
+        with pytest.raises(SimulatorError, match=str(first.port)):
+            TcpLink(Link().endpoint, first.port)
+    finally:
+        first.close()
