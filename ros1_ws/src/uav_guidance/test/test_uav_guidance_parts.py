@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from uav_guidance.commands import ATTEMPTS, Procedure, arm, set_mode, take_off
 from uav_guidance.encoding import from_autopilot_to_us
 from uav_guidance.settings import Settings, SettingsError
-from uav_guidance.stamping import StampClock
+from uav_guidance.stamping import FineClock, StampClock
 from uav_guidance.stillness import StillWatch
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
@@ -121,6 +121,20 @@ def test_a_clock_that_is_set_is_followed_at_once():
         clock.stamp_ns(i * 20, i * 20 * 10**6)
     assert clock.stamp_ns(600, 50 * 10**9) == 50 * 10**9
     assert clock.stamp_ns(20, 51 * 10**9) == 51 * 10**9  # the autopilot started anew
+
+
+@pytest.mark.parametrize("rate", [0.3, 1.0, 4.0])
+def test_a_coarse_clock_is_read_between_its_steps(rate):
+    clock = FineClock()
+    assert clock.now_ns(0) is None
+    for step in range(50):
+        clock.tick(step * 20_000_000, int(step * 20_000_000 / rate))
+    begin = int(49 * 20_000_000 / rate)
+    assert clock.now_ns(begin) == 980_000_000
+    assert clock.now_ns(begin + int(10_000_000 / rate)) == pytest.approx(990_000_000, abs=100)
+    assert clock.now_ns(begin + 10**10) == 1_000_000_000  # held: it stands before its next step
+    clock.tick(20_000_000, begin + 10**10)
+    assert clock.now_ns(begin + 10**10 + 10**6) == 20_000_000  # set back: nothing is known of its steps yet
 
 
 def test_streams_are_asked_for_on_each_link_and_when_they_stay_away():

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import math
 import sys
 import threading
+import time
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import PoseStamped
+from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, Obstacle
 from uav_msgs.srv import (
@@ -36,7 +40,7 @@ from uav_guidance.guidance import Guidance
 from uav_guidance.link import Link
 from uav_guidance.messages import pose_message, sighting, state_message, time_of, transform_message, vec3
 from uav_guidance.settings import Settings, SettingsError
-from uav_guidance.stamping import StampClock
+from uav_guidance.stamping import FineClock, StampClock
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
 
@@ -57,6 +61,9 @@ class GuidanceNode:
         self._changed = threading.Condition(threading.RLock())
         self._streams = StreamKeeper()
         self._stamps = StampClock()
+        self._fine_clock = FineClock()
+        if rospy.get_param("/use_sim_time", False):
+            rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=10, tcp_nodelay=True)
         self._texts = TextAssembler()
         self._heartbeat_s = -HEARTBEAT_PERIOD_S
         self._reporter = ResourceReporter(SKILLSET)
@@ -71,13 +78,12 @@ class GuidanceNode:
     def run(self) -> None:
         """Step at 20 Hz of the mission clock until the node is shut down; a clock that starts late is waited for."""
         self._link.start()
-        rate = rospy.Rate(STATE_HZ, reset=True)
+        due_s = _now_s()
         while not rospy.is_shutdown():
             self._step()
-            try:
-                rate.sleep()
-            except rospy.ROSInterruptException:
-                break
+            due_s = _next_due(due_s, _now_s())
+            with contextlib.suppress(rospy.ROSInterruptException):
+                rospy.sleep(due_s - _now_s())
         self._link.close()
         self._reporter.close()
 
@@ -130,6 +136,9 @@ class GuidanceNode:
         with self._changed:
             self._guidance.on_obstacle(sighting(message))
 
+    def _on_clock(self, message: Clock) -> None:
+        self._fine_clock.tick(message.clock.to_nsec(), time.monotonic_ns())
+
     def _on_connect(self) -> None:
         with self._changed:
             self._streams.forget()
@@ -161,7 +170,8 @@ class GuidanceNode:
             self._guidance.on_text(message.severity, text)
 
     def _stamped_pose(self, boot_ms: int, arrival: rospy.Time) -> PoseStamped | None:
-        stamp_ns = self._stamps.stamp_ns(boot_ms, arrival.to_nsec())
+        fine_ns = self._fine_clock.now_ns(time.monotonic_ns())
+        stamp_ns = self._stamps.stamp_ns(boot_ms, arrival.to_nsec() if fine_ns is None else fine_ns)
         return None if stamp_ns is None else pose_message(self._guidance.vehicle, time_of(max(stamp_ns, 0)))
 
     # ---- what goes out -------------------------------------------------------------------------------------------------
@@ -194,6 +204,12 @@ class GuidanceNode:
 
 def _now_s() -> float:
     return float(rospy.get_rostime().to_sec())
+
+
+def _next_due(due_s: float, now_s: float) -> float:
+    """Return the time of the next step; steps that are missed are left out, and a clock that was set back is followed."""
+    missed = max(math.ceil((now_s - due_s) * STATE_HZ), 1)
+    return min(due_s + missed / STATE_HZ, now_s + 1.0 / STATE_HZ)
 
 
 def main() -> None:

@@ -33,8 +33,8 @@ class Settings:
     """Of the carrot, and for planned braking."""
     carrot_lead_m: float = 1.0
     """The carrot keeps its speed until it is so far ahead of the vehicle ..."""
-    carrot_lead_s: float = 0.8
-    """... or so many seconds at the speed of the reference, if that is more: a vehicle follows a moving setpoint with such a lag."""
+    carrot_lead_s: float = 1.25
+    """... or so many seconds at the speed of the reference, if that is more: a vehicle follows moving positions about 1 s late."""
 
     yaw_rate_rad_s: float = 0.7
     """At which the nose is turned into the travel."""

@@ -7,6 +7,38 @@ from statistics import median_low
 
 WINDOW = 25
 JUMP_NS = 500_000_000
+SMOOTHING = 0.1
+
+
+class FineClock:
+    """Read a coarse clock between its ticks: /clock has steps of 20 ms, and the autopilot's messages come before or after a step.
+
+    How much of a step has passed is told by the wall time since the last one, compared with what steps usually take. A clock that
+    is held (the simulator waits for somebody) does not run on: it stands just before its next step.
+    """
+
+    def __init__(self) -> None:
+        self._tick_ns: int | None = None
+        self._tick_wall_ns = 0
+        self._step_ns = 0
+        self._usual_wall_ns = 0.0
+
+    def tick(self, clock_ns: int, wall_ns: int) -> None:
+        """Take a step of the clock, and the time of a monotonic one at its arrival."""
+        if self._tick_ns is None or clock_ns <= self._tick_ns:
+            self._step_ns, self._usual_wall_ns = 0, 0.0
+        else:
+            took_ns = wall_ns - self._tick_wall_ns
+            self._usual_wall_ns += (took_ns - self._usual_wall_ns) * (SMOOTHING if self._usual_wall_ns else 1.0)
+            self._step_ns = clock_ns - self._tick_ns
+        self._tick_ns, self._tick_wall_ns = clock_ns, wall_ns
+
+    def now_ns(self, wall_ns: int) -> int | None:
+        """Return the time between the last step and the next one; None before the first."""
+        if self._tick_ns is None or self._usual_wall_ns <= 0.0:
+            return self._tick_ns
+        passed = min((wall_ns - self._tick_wall_ns) / self._usual_wall_ns, 1.0)
+        return self._tick_ns + int(max(passed, 0.0) * self._step_ns)
 
 
 class StampClock:

@@ -1,0 +1,81 @@
+"""The link over UDP and TCP, without ROS: what comes in, what goes out, what happens when the other side goes away."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from alula_testing.ros1 import wait_until
+from uav_guidance.encoding import heartbeat_message
+from uav_guidance.link import Link
+
+AUTOPILOT = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+STATION = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+
+
+def frame(sender: mavlink.MAVLink, mode: int) -> bytes:
+    return bytes(mavlink.MAVLink_heartbeat_message(13, 3, 81, mode, 4, 3).pack(sender))
+
+
+class Ear:
+    def __init__(self, url: str) -> None:
+        self.modes: list[int] = []
+        self.connected = threading.Semaphore(0)
+        self.link = Link(url, 57600, on_message=lambda m: self.modes.append(m.custom_mode), on_connect=self.connected.release)
+        self.link.start()
+
+
+@pytest.fixture
+def peer() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        peer.settimeout(5.0)
+        yield peer
+
+
+def test_udp_of_a_vehicle_that_sends_to_us(peer):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    ear = Ear(f"udpin:127.0.0.1:{port}")
+    assert ear.connected.acquire(timeout=5.0)
+    peer.sendto(frame(STATION, 1) + b"\x00noise" + frame(AUTOPILOT, 4), ("127.0.0.1", port))
+    wait_until(lambda: ear.modes == [4], timeout_s=5.0, what="the autopilot's heartbeat only")
+    ear.link.send(heartbeat_message())
+    heard = mavlink.MAVLink(None).parse_buffer(peer.recv(300))[0]
+    assert (heard.get_srcSystem(), heard.get_srcComponent(), heard.type) == (1, 191, mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
+    ear.link.close()
+
+
+def test_udp_towards_a_vehicle(peer):
+    ear = Ear(f"udpout:127.0.0.1:{peer.getsockname()[1]}")
+    assert ear.connected.acquire(timeout=5.0)
+    ear.link.send(heartbeat_message())
+    _, address = peer.recvfrom(300)
+    peer.sendto(frame(AUTOPILOT, 9), address)
+    wait_until(lambda: ear.modes == [9], timeout_s=5.0, what="the answer")
+    ear.link.close()
+
+
+def test_tcp_that_is_not_there_yet_and_goes_away():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        ear = Ear(f"tcp:127.0.0.1:{listener.getsockname()[1]}")
+        ear.link.send(heartbeat_message())  # lost: nobody is there
+        assert not ear.connected.acquire(timeout=0.3)
+        listener.listen()
+        for mode in (4, 5):
+            assert ear.connected.acquire(timeout=5.0)
+            client, _ = listener.accept()
+            with client:
+                half = len(frame(AUTOPILOT, mode)) // 2
+                data = frame(AUTOPILOT, mode)
+                client.sendall(data[:half])
+                client.sendall(data[half:])
+                wait_until(lambda mode=mode: ear.modes[-1:] == [mode], timeout_s=5.0, what="a heartbeat")
+    assert ear.modes == [4, 5]
+    ear.link.close()
