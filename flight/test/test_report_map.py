@@ -123,6 +123,8 @@ def test_files_are_read_or_refused(tmp_path):
             load_route(tmp_path / "route.json")
     (tmp_path / "route.json").write_text("[[0, 0, 3], [1, 0, 3]]")
     np.testing.assert_allclose(load_route(tmp_path / "route.json"), [[0, 0, 3], [1, 0, 3]])
+    (tmp_path / "route.json").write_text('{"frame": "map", "route": [[0, 0, 3], [1, 0, 3]]}')
+    np.testing.assert_allclose(load_route(tmp_path / "route.json"), [[0, 0, 3], [1, 0, 3]])
 
 
 def test_the_outline_of_a_box_is_its_twelve_edges(tmp_path):

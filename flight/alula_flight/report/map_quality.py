@@ -62,8 +62,13 @@ def load_map(path: Path) -> Floats:
 
 
 def load_route(path: Path) -> Floats:
-    """Return the planned waypoints, (N, 3), frame map; raise ReportError when they are missing or unreadable."""
-    waypoints = [[finite(number) for number in sequence(waypoint)] for waypoint in sequence(read_json(path))]
+    """Return the planned waypoints, (N, 3), frame map; raise ReportError when they are missing or unreadable.
+
+    The mission writes them under the key ``route``; a bare list is read, too.
+    """
+    written = read_json(path)
+    listed = written.get("route") if isinstance(written, dict) else written
+    waypoints = [[finite(number) for number in sequence(waypoint)] for waypoint in sequence(listed)]
     if not waypoints or any(len(waypoint) != 3 or None in waypoint for waypoint in waypoints):
         raise ReportError(f"{path.name} is no list of [x, y, z]")
     return np.asarray(waypoints, dtype=np.float64)
