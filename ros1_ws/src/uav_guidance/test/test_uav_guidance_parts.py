@@ -115,6 +115,14 @@ def test_rare_delays_leave_the_stamps_exact():
     assert stamps == [10**9 + i * 20 * 10**6 for i in range(100)]
 
 
+def test_a_stall_of_a_second_leaves_the_stamps_exact():
+    clock = StampClock()
+    for i in range(200):
+        assert clock.stamp_ns(i * 20, i * 20_000_000) in {i * 20_000_000, None}
+    for i in range(200, 250):
+        assert clock.stamp_ns(i * 20, i * 20_000_000 - 220_000_000) == i * 20_000_000
+
+
 def test_a_clock_that_is_set_is_followed_at_once():
     clock = StampClock()
     for i in range(30):

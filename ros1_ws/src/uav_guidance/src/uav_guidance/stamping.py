@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from statistics import median_low
 
-WINDOW = 25
+WINDOW = 250
 JUMP_NS = 500_000_000
 SMOOTHING = 0.1
 
@@ -44,8 +44,8 @@ class FineClock:
 class StampClock:
     """Turn the autopilot's milliseconds since boot into the mission clock.
 
-    The offset between the clocks is the median of the last arrivals (half a second at 50 Hz), so that a message that was held up, or
-    that came just before a tick of a coarse clock, still gets the time at which it was measured. Stamps always grow.
+    The offset between the clocks is the median of the last arrivals (5 s at 50 Hz; two crystals drift apart by 0.5 ms in that time), so
+    that messages that were held up, or a clock that was, change nothing. Stamps always grow.
     """
 
     def __init__(self) -> None:
