@@ -237,7 +237,7 @@ class FakeVehicle:
 class FakeAutopilot(FakeVehicle):
     """The vehicle behind a TCP port of loopback, for one client, on a clock that runs ``rate`` times as fast as the wall's."""
 
-    def __init__(self, *, on_clock: Callable[[float], None], rate: float = 4.0) -> None:
+    def __init__(self, *, on_clock: Callable[[float], None], rate: float = 5.0) -> None:
         super().__init__(self._transmit)
         self._on_clock, self._rate = on_clock, rate
         self._listener = socket.create_server(("127.0.0.1", 0))

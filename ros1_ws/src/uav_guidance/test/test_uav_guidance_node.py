@@ -1,4 +1,4 @@
-"""The node on a live graph, with a real MAVLink peer that moves the clock four times as fast as the wall's."""
+"""The node on a live graph, with a real MAVLink peer that moves the clock five times as fast as the wall's."""
 
 from __future__ import annotations
 
