@@ -1,1 +1,1 @@
-"""Executes skillsets: ``core`` without ROS, ``ros2`` the managers and the client over rclpy, ``hooks`` what a developer of skills writes."""
+"""Executes skillsets: ``core`` without ROS, ``ros2`` managers and client over rclpy, ``hooks`` what a developer of skills writes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
 from skill_runtime.core.errors import DataMissingError, UnsupportedModelError
@@ -11,7 +12,7 @@ from skill_runtime.core.errors import DataMissingError, UnsupportedModelError
 States = Mapping[str, str]
 Data = Mapping[str, object]
 
-_COMPARE: dict[Comparison, Callable[[object, object], bool]] = {
+_COMPARE: dict[Comparison, Callable[[Any, Any], Any]] = {
     Comparison.EQ: operator.eq,
     Comparison.NE: operator.ne,
     Comparison.LT: operator.lt,
@@ -73,7 +74,7 @@ def _data_holds(atom: DataIs, data: Data) -> bool:
     wanted = atom.value
     if isinstance(wanted, float | int) and not isinstance(wanted, bool):
         wanted = wanted * in_si(atom)
-    return _COMPARE[atom.comparison](value, wanted)
+    return bool(_COMPARE[atom.comparison](value, wanted))
 
 
 def in_si(atom: DataIs) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
+import re
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -101,13 +102,13 @@ def _integer(kind: str, value: Any, place: str) -> int:
 
 
 def _of_type(wanted: type, kind: str, value: Any, place: str) -> Any:
-    if not isinstance(value, wanted):
-        raise ValueError(f"{place} takes a {kind}, not {value!r}")
-    return value
+    if isinstance(value, wanted):
+        return value
+    raise ValueError(f"{place} takes a {kind}, not {value!r}")
 
 
 def _elements(kind: str, value: Any, place: str) -> list[Any]:
-    inner = kind.removeprefix("sequence<").removesuffix(">").split(",")[0] if kind.startswith("sequence<") else kind.split("[", maxsplit=1)[0]
+    inner = re.sub(r"^sequence<(.*?)(, \d+)?>$|\[.*\]$", r"\1", kind)
     if isinstance(value, str | bytes) or not hasattr(value, "__iter__"):
         raise ValueError(f"{place} takes a list ({kind}), not {value!r}")
     return [_fitting(inner, element, f"{place}[{index}]") for index, element in enumerate(value)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 import time
 import traceback
@@ -16,6 +17,7 @@ from skill_runtime.core.errors import SkillRuntimeError
 
 DEFAULT_TIMEOUT_S = 2.0
 _TICK_S = 0.05
+_PATIENCE_S = 1.0
 OnReply = Callable[[Any], None]
 OnError = Callable[[str], None]
 
@@ -63,18 +65,15 @@ class ServiceCaller:
         Raises:
             ServiceCallError: there is none within the time.
         """
-        done = threading.Event()
-        replies: list[Any] = []
-        errors: list[str] = []
-
-        def keep(into: list[Any]) -> Callable[[Any], None]:
-            return lambda value: (into.append(value), done.set())[0]
-
-        self.call(client, request, keep(replies), keep(errors), timeout_s=timeout_s)
-        done.wait(timeout_s + 1.0)
-        if not replies:
-            raise ServiceCallError(errors[0] if errors else f"{client.srv_name}: nobody spins the node")
-        return replies[0]
+        answer: queue.SimpleQueue[tuple[Any, str]] = queue.SimpleQueue()
+        self.call(client, request, lambda reply: answer.put((reply, "")), lambda error: answer.put((None, error)), timeout_s=timeout_s)
+        try:
+            reply, error = answer.get(timeout=timeout_s + _PATIENCE_S)
+        except queue.Empty:
+            raise ServiceCallError(f"{client.srv_name}: nobody spins the node") from None
+        if error:
+            raise ServiceCallError(error)
+        return reply
 
     def _send(self, call: _Call) -> None:
         if call.client.service_is_ready():

@@ -22,6 +22,7 @@ from skill_runtime.ros2.resource_manager import EventPublisher, ResourceManager
 from skill_runtime.ros2.skill_manager import SkillManager
 
 HooksFactory = Callable[[Node], Mapping[str, SkillHooks]]
+FLUSH_S = 1.0
 WORKERS = 8
 """Threads for hooks that may wait a bounded time; none is held while a skill runs."""
 
@@ -78,6 +79,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         """Fail whatever runs for this reason, so that functions are stopped, and take no more requests."""
         self.engine.close(reason)
         self._workers.shutdown(wait=True)
+        self._events.flush(FLUSH_S)
 
     def _on_events(self, events: Sequence[EngineEvent]) -> None:
         """Pass on one step: resources before events before results, so that who sees a result sees its effects."""

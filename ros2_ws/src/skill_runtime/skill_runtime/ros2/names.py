@@ -50,6 +50,6 @@ def action_type(interfaces: ModuleType, skill: str) -> type:
     """
     actions = interfaces if hasattr(interfaces, camel(skill)) else importlib.import_module(f"{interfaces.__name__}.action")
     found = getattr(actions, camel(skill), None)
-    if not isinstance(found, type):
-        raise AttributeError(f"{interfaces.__name__} has no action {camel(skill)} for skill {skill}; generate and build it again")
-    return found
+    if isinstance(found, type):
+        return found
+    raise AttributeError(f"{interfaces.__name__} has no action {camel(skill)} for skill {skill}; generate and build it again")

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.time import Time
 from skillset_interfaces.msg import Event, ResourceState, ResourceStates
@@ -28,6 +29,10 @@ class EventPublisher:
         """Publish in order."""
         for event in events:
             self._publisher.publish(event_message(self._skillset, event))
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait (wall clock) until all who listen have all events: those of a process that ends would be lost."""
+        self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
 
 class ResourceManager:

@@ -1,0 +1,86 @@
+"""Finds the managers of a skillset, and notices when they have gone."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.action import ActionClient
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from skillset_interfaces.msg import ResourceStates
+from skillset_interfaces.srv import Describe
+
+from skill_language.json_form import from_json
+from skill_language.model import Skillset
+from skill_runtime.ros2.names import ALIVE, action_module, action_type
+
+DESCRIBE_AGAIN_S = 1.0
+
+
+class Presence:
+    """Whether the managers can be called: they are alive, have described themselves, and their actions are there.
+
+    ``on_resources`` gets each ``ResourceStates``; ``on_gone`` is called when a manager process has ended, or its signs of
+    life (sent by DDS itself, however busy the process is) have stayed away for the lease.
+    """
+
+    def __init__(self, node: Node, skillset: str, on_resources: Callable[[Any], None], on_gone: Callable[[], None]) -> None:
+        self._node = node
+        self._skillset = skillset
+        self._on_resources = on_resources
+        self._on_gone = on_gone
+        self.ready = threading.Event()
+        self.model: Skillset | None = None
+        self.actions: dict[str, Any] = {}
+        self.clients: dict[str, Any] = {}
+        self._heard = False
+        self._alive = 0
+        self._asked_s = float("-inf")
+        self._describe = node.create_client(Describe, f"{skillset}/describe")
+        node.create_subscription(
+            ResourceStates,
+            f"{skillset}/resource_states",
+            self._hear,
+            ALIVE,
+            event_callbacks=SubscriptionEventCallbacks(liveliness=self._on_liveliness),
+        )
+
+    def tick(self) -> None:
+        """Take the next step towards being ready."""
+        if self.model is None:
+            self._ask()
+        elif self._heard and self._alive > 0 and all(client.server_is_ready() for client in self.clients.values()):
+            self.ready.set()
+
+    def _ask(self) -> None:
+        """Ask for the description, again after a while: the answer may be lost (see ``pursuit``)."""
+        if self._describe.service_is_ready() and time.monotonic() - self._asked_s > DESCRIBE_AGAIN_S:
+            self._asked_s = time.monotonic()
+            self._describe.call_async(Describe.Request()).add_done_callback(self._on_description)
+
+    def _on_description(self, future: Any) -> None:
+        answer = future.result()
+        if answer is None or self.model is not None:
+            return
+        model = from_json(answer.model_json)
+        actions = action_module(self._skillset)
+        for skill in model.skills:
+            self.actions[skill.name] = action_type(actions, skill.name)
+            self.clients[skill.name] = ActionClient(self._node, self.actions[skill.name], f"{self._skillset}/skill/{skill.name}")
+        self.model = model
+
+    def _hear(self, message: Any) -> None:
+        self._heard = True
+        self._on_resources(message)
+
+    def _on_liveliness(self, info: Any) -> None:
+        gone = info.alive_count < self._alive or info.not_alive_count_change > 0
+        self._alive = info.alive_count
+        # Where managers were started anew already, theirs is the last word that was heard.
+        self._heard = self._heard and self._alive > 0
+        if gone:
+            self.ready.clear()
+            self._on_gone()

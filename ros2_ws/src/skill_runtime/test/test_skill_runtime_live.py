@@ -1,0 +1,405 @@
+"""Managers and client on a live ROS 2 graph, with the drone's generated navigation and fake hooks."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy")
+navigation_actions = pytest.importorskip("navigation_interfaces.action")
+
+from action_msgs.msg import GoalStatus  # noqa: E402
+from geometry_msgs.msg import Point  # noqa: E402
+from navigation_managers.hooks import ABSTRACT_HOOKS  # noqa: E402
+from navigation_managers.inputs import GotoStraightInputs  # noqa: E402
+from navigation_managers.model import SKILLSET  # noqa: E402
+from rclpy.action import ActionClient  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.time import Time  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from skill_runtime_models import Recorder  # noqa: E402
+from skillset_interfaces.msg import Event  # noqa: E402
+from skillset_interfaces.srv import Describe, GetData, Transition  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from uav_msgs.msg import GuidanceState  # noqa: E402
+
+from skill_language.json_form import from_json  # noqa: E402
+from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
+from skill_runtime.ros2 import RosHooks, SkillsetClient, SkillsetNode  # noqa: E402
+from skill_runtime.ros2.hooks_ros import ServiceCaller, ServiceCallError  # noqa: E402
+from skill_runtime.ros2.names import EVENTS, LIVELINESS_LEASE_S  # noqa: E402
+
+S = ExecutionState
+SOON_S = 10.0
+READY_S = 30.0
+NUMBERS = itertools.count()
+FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
+
+
+def until(condition, what: str, timeout_s: float = SOON_S) -> None:
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, f"not within {timeout_s} s: {what}"
+        time.sleep(0.002)
+
+
+def ask(node, kind, service: str, **request: object):
+    """Call a service, again when the answer does not come: DDS loses those to clients that it has not discovered yet."""
+    client = node.create_client(kind, service)
+    assert client.wait_for_service(SOON_S)
+    answers: list = []
+    until(lambda: answers.append(client.call(kind.Request(**request), timeout_sec=1.0)) or answers[-1] is not None, f"{service} answers")
+    node.destroy_client(client)
+    return answers[-1]
+
+
+def take(node, resource: str, state: str) -> None:
+    """Take an extern transition, as the functional layer does."""
+    answer = ask(node, Transition, "navigation/transition", resource=resource, to=state)
+    assert answer.accepted or answer.state == state, answer.reason
+
+
+class NavigationRecorder(Recorder):
+    inputs_type = None
+
+
+class Spinning:
+    """Nodes, each spun by a thread of its own."""
+
+    def __init__(self) -> None:
+        self.running: list = []
+
+    def spin(self, node):
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        thread = threading.Thread(target=executor.spin, daemon=True)
+        thread.start()
+        self.running.append((node, executor, thread))
+        return node
+
+    def close(self) -> None:
+        for node, executor, thread in reversed(self.running):
+            if isinstance(node, SkillsetNode):
+                node.close("the test is over")
+            executor.shutdown(timeout_sec=5.0)
+            thread.join(5.0)
+            node.destroy_node()
+
+
+@pytest.fixture
+def spinning(ros2_domain):
+    nodes = Spinning()
+    yield nodes
+    nodes.close()
+
+
+class Navigation:
+    """The managers with recorders, a client, and the events as somebody else hears them."""
+
+    def __init__(self, spinning: Spinning, **node_options: object) -> None:
+        self.hooks = {skill.name: NavigationRecorder() for skill in SKILLSET.skills}
+        for name, hooks in self.hooks.items():
+            hooks.make_inputs = lambda values, name=name: ABSTRACT_HOOKS[name].inputs_type(**values)
+        namespace = str(node_options.get("namespace", ""))
+        self.managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, lambda _: self.hooks, **node_options))
+        self.node = Node(f"skill_runtime_tester_{next(NUMBERS)}", namespace=namespace)
+        self.client = SkillsetClient(self.node, "navigation")
+        assert self.client.wait_ready(READY_S)
+        self.events: list = []
+        self.node.create_subscription(Event, "navigation/events", self.events.append, EVENTS)
+        spinning.spin(self.node)
+
+    def service(self, kind, service: str, **request: object):
+        return ask(self.node, kind, f"navigation/{service}", **request)
+
+    def bring(self, states: dict[str, str]) -> None:
+        """Take extern transitions, as the functional layer does."""
+        for resource, state in states.items():
+            take(self.node, resource, state)
+
+    def fly_straight(self):
+        handle = self.client.start("goto_straight", target=(1, 2.5, 3), speed=1)
+        until(lambda: handle.state is S.RUNNING, f"goto_straight runs, it is {handle}")
+        assert self.hooks["goto_straight"].dispatched.wait(SOON_S)
+        return handle
+
+
+@pytest.fixture
+def navigation(spinning):
+    return Navigation(spinning)
+
+
+def test_an_execution_from_request_to_result(navigation):
+    navigation.bring(FLYING)
+    seen = []
+    navigation.client.on_change(seen.append)
+    handle = navigation.fly_straight()
+    execution = navigation.managers.engine.executions[0]
+    assert execution.id == handle.id
+    assert execution.inputs == GotoStraightInputs(target=Point(x=1.0, y=2.5, z=3.0), speed=1.0)
+    until(lambda: handle.progress == 0.5, "progress is reported every period")
+    ended = threading.Event()
+    handle.add_done_callback(lambda _: ended.set())
+    execution.terminate("ARRIVED", "there")
+    assert handle.wait(SOON_S)
+    assert ended.wait(SOON_S)
+    assert (handle.state, handle.outcome, handle.result, handle.message) == (S.TERMINATED, "TERMINATED", "ARRIVED", "there")
+    until(lambda: [states["axes_authority"] for states in seen] == ["USED", "AVAILABLE"], "the resource followed")
+    until(lambda: navigation.events and navigation.events[-1].state == "TERMINATED", "all events")
+    assert [event.sequence for event in navigation.events] == list(range(1, len(navigation.events) + 1))
+    held = ["axes_authority", "heading_authority"]
+    told = [event.resource or event.state for event in navigation.events[len(FLYING) :]]
+    assert told == ["REQUESTED", *held, "RUNNING", *held, "TERMINATED"]
+    first = next(event for event in navigation.events if event.state == "REQUESTED")
+    assert json.loads(first.inputs_json) == {"target": {"x": 1.0, "y": 2.5, "z": 3.0}, "speed": 1.0}
+
+
+def test_refusals_carry_their_reason(navigation):
+    handle = navigation.client.start("goto_straight", target=Point(), speed=1.0)
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.result) == (S.NOT_READY, "sdk_authority")
+    assert "SDK_authority is UNAVAILABLE" in handle.message
+    navigation.hooks["takeoff"].acts["validate"] = lambda inputs: f"{inputs.height} m is too high"
+    handle = navigation.client.start("takeoff", height=300, speed=1)
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.message) == (S.NOT_VALIDATED, "300.0 m is too high")
+    answer = navigation.service(Transition, "transition", resource="axes_authority", to="USED")
+    assert (answer.accepted, answer.state) == (False, "AVAILABLE")
+    assert "for skills only" in answer.reason
+
+
+def test_interrupt_and_violation_reach_client_and_function(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly_straight()
+    handle.interrupt()
+    assert handle.wait(SOON_S)
+    assert handle.state is S.INTERRUPTED
+    assert navigation.hooks["goto_straight"].calls.count("on_interrupt") == 1
+    early = navigation.client.start("goto_straight", target=(0, 0, 0), speed=1)
+    early.interrupt()
+    assert early.wait(SOON_S)
+    assert early.state is S.INTERRUPTED
+    handle = navigation.fly_straight()
+    navigation.bring({"SDK_authority": "UNAVAILABLE"})
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.result) == (S.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")
+    until(lambda: "on_violation" in navigation.hooks["goto_straight"].calls, "the function is told")
+
+
+def test_a_hook_that_raises_fails_its_execution_only(navigation):
+    navigation.bring(FLYING)
+    navigation.hooks["goto_straight"].acts["on_dispatch"] = lambda execution: execution.inputs.nosuch
+    handle = navigation.client.start("goto_straight", target=(1, 2, 3), speed=1)
+    assert handle.wait(SOON_S)
+    assert handle.state is S.FAILED
+    assert handle.message == "on_dispatch raised AttributeError: 'GotoStraightInputs' object has no attribute 'nosuch'"
+    navigation.hooks["goto_straight"].acts.clear()
+    assert navigation.fly_straight().state is S.RUNNING
+
+
+def test_wrong_inputs_are_refused_before_anything_is_sent(navigation):
+    for inputs, words in (
+        ({"target": (1, 2), "speed": 1}, "target takes a geometry_msgs/Point or three numbers"),
+        ({"target": (1, 2, "3"), "speed": 1}, "target, z takes a number"),
+        ({"target": (1, 2, 3), "speed": True}, "speed takes a number"),
+        ({"target": (1, 2, 3)}, "speed missing"),
+        ({"target": (1, 2, 3), "velocity": 1}, "no 'velocity'; it has target, speed"),
+    ):
+        with pytest.raises(ValueError, match="goto_straight") as raised:
+            navigation.client.start("goto_straight", **inputs)
+        assert words in str(raised.value)
+    with pytest.raises(ValueError, match="no skill 'fly'; it has takeoff"):
+        navigation.client.start("fly")
+    assert navigation.managers.engine.executions == ()
+    handle = navigation.client.start("land")
+    assert handle.wait(SOON_S)
+    assert handle.state is S.NOT_READY
+
+
+def test_generic_tools_need_no_generated_code(navigation):
+    assert from_json(navigation.service(Describe, "describe").model_json) == from_json(navigation.managers._model_json)
+    assert not navigation.service(GetData, "get_data", name="nosuch").known
+    before = navigation.service(GetData, "get_data", name="guidance_state")
+    assert (before.known, before.received) == (True, False)
+    publisher = navigation.node.create_publisher(GuidanceState, "/uav_guidance/state", 10)
+    passed: list = []
+    navigation.node.create_subscription(GuidanceState, "navigation/data/guidance_state", passed.append, EVENTS)
+
+    def arrived() -> bool:
+        publisher.publish(GuidanceState(reference="hover"))
+        return bool(passed)
+
+    until(arrived, "data is passed on")
+    answer = navigation.service(GetData, "get_data", name="guidance_state")
+    assert json.loads(answer.value_json)["reference"] == "hover"
+    assert passed[0].reference == "hover"
+
+
+def test_goals_have_the_right_states_for_plain_action_clients(navigation):
+    navigation.bring(FLYING)
+    client = ActionClient(navigation.node, navigation_actions.GotoStraight, "navigation/skill/goto_straight")
+    assert client.wait_for_server(SOON_S)
+
+    def run():
+        sent = client.send_goal_async(navigation_actions.GotoStraight.Goal(speed=1.0))
+        until(sent.done, "accepted")
+        result = sent.result().get_result_async()
+        until(lambda: navigation.managers.engine.executions or result.done(), "under way")
+        return sent.result(), result
+
+    goal, result = run()
+    until(lambda: goal.status == GoalStatus.STATUS_EXECUTING, "the status topic says executing")
+    goal.cancel_goal_async()
+    until(result.done, "canceled")
+    assert (result.result().status, result.result().result.outcome) == (GoalStatus.STATUS_CANCELED, "INTERRUPTED")
+    goal, result = run()
+    until(lambda: navigation.managers.engine.executions[0].terminate("ARRIVED"), "terminated")
+    until(result.done, "result")
+    assert result.result().status == GoalStatus.STATUS_SUCCEEDED
+    navigation.bring({"flight_status": "ON_GROUND"})
+    _, result = run()
+    until(result.done, "result")
+    assert (result.result().status, result.result().result.outcome) == (GoalStatus.STATUS_ABORTED, "NOT_READY")
+    client.destroy()
+
+
+def test_time_is_the_mission_clock_and_names_follow_the_namespace(spinning):
+    parameters = [Parameter("use_sim_time", value=True)]
+    navigation = Navigation(spinning, namespace="uav1", parameter_overrides=parameters)
+    publisher = navigation.node.create_publisher(Clock, "/clock", 10)
+
+    def set_time(seconds: float) -> None:
+        def there() -> bool:
+            publisher.publish(Clock(clock=Time(seconds=seconds).to_msg()))
+            return navigation.managers.get_clock().now().nanoseconds == int(seconds * 1e9)
+
+        until(there, "the managers follow the clock")
+
+    set_time(100.0)
+    navigation.bring(FLYING)
+    handle = navigation.fly_straight()
+    until(lambda: len(navigation.events) >= 6, "events")
+    assert {event.header.stamp.sec for event in navigation.events} == {100}
+    calls = navigation.hooks["goto_straight"].calls
+    assert "progress" not in calls  # time stands still
+    set_time(101.0)
+    until(lambda: "progress" in calls, "progress follows the mission clock")
+    until(lambda: handle.progress == 0.5, "and is reported")
+
+
+class Asking(RosHooks, Recorder):
+    """Hooks that ask a service of the functional layer."""
+
+    def __init__(self, node, name: str, timeout_s: float) -> None:
+        Recorder.__init__(self)
+        self.caller, self.timeout_s = ServiceCaller(node), timeout_s
+        self.service = node.create_client(Trigger, name)
+
+    def on_dispatch(self, execution) -> None:
+        self.call(
+            self.service,
+            Trigger.Request(),
+            lambda reply: execution.terminate("DONE", reply.message),
+            execution.fail,
+            timeout_s=self.timeout_s,
+        )
+
+
+def test_service_calls_of_hooks_neither_block_nor_last(spinning):
+    behaviour: dict = {"answer": lambda reply: reply}
+    server = Node("skill_runtime_functional")
+
+    def answer(_, reply):
+        reply.message = "done"
+        return behaviour["answer"](reply)
+
+    server.create_service(Trigger, "skill_runtime/ask", answer)
+    spinning.spin(server)
+    hooks: dict = {}
+
+    def factory(node):
+        plain = {skill.name: Recorder() for skill in SKILLSET.skills}
+        hooks.update(plain, hover=Asking(node, "skill_runtime/ask", SOON_S), land=Asking(node, "skill_runtime/nosuch", 0.2))
+        return hooks
+
+    managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, factory))
+    for resource, state in FLYING.items():
+        managers.engine.transition(resource, state)
+    execution = managers.engine.request("hover", None)
+    until(lambda: execution.done, "the answer ended it")
+    assert (execution.state, execution.message) == (S.TERMINATED, "done")
+    execution = managers.engine.request("land", None)
+    until(lambda: execution.done, "the time-out ended it")
+    assert execution.state is S.FAILED
+    assert execution.message == "service skill_runtime/nosuch is not there within 0.2 s"
+    assert hooks["hover"].call_and_wait(hooks["hover"].service, Trigger.Request()).message == "done"
+    with pytest.raises(ServiceCallError, match="nosuch"):
+        hooks["land"].call_and_wait(hooks["land"].service, Trigger.Request(), timeout_s=0.1)
+
+
+def test_missing_hooks_are_named(ros2_domain):
+    with pytest.raises(SkillRuntimeError, match="no hooks for takeoff, goto"):
+        SkillsetNode(SKILLSET, navigation_actions, lambda _: {})
+
+
+@pytest.fixture
+def process(ros2_domain):
+    started = []
+
+    def start(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, str(Path(__file__).with_name("skill_runtime_process.py")), *arguments]
+        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.poll() is None:
+            os.killpg(one.pid, signal.SIGKILL)
+        one.wait(5.0)
+        one.stdout.close()
+
+
+@pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + 2.0)])
+def test_nobody_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
+    served = process("--ros-args", "-p", "use_sim_time:=false", "__name:=from_roslaunch")
+    node = Node(f"skill_runtime_tester_{next(NUMBERS)}")
+    client = SkillsetClient(node, "navigation")
+    assert client.wait_ready(READY_S)
+    spinning.spin(node)
+    for resource, state in FLYING.items():
+        take(node, resource, state)
+    handle = client.start("goto_straight", target=(1, 2, 3), speed=1)
+    until(lambda: handle.state is S.RUNNING, "goto_straight runs")
+    asked_s = time.monotonic()
+    served.send_signal(number)
+    assert handle.wait(SOON_S)
+    assert time.monotonic() - asked_s < limit_s
+    assert handle.state is S.FAILED
+    if number is signal.SIGINT:
+        assert handle.message == "the managers were shut down"
+        assert served.wait(SOON_S) == 0
+        assert served.stdout.read() == "stopped goto_straight: the managers were shut down\n"
+    else:
+        assert "the managers of navigation have gone" in handle.message
+        assert_that_new_managers_are_found(client, process)
+
+
+def assert_that_new_managers_are_found(client, process):
+    until(lambda: not client.ready, "the client knows")
+    late = client.start("goto_straight", target=(1, 2, 3), speed=1)
+    assert (late.state, late.message) == (S.FAILED, "the managers of navigation are not there")
+    process()
+    assert client.wait_ready(READY_S), "the client finds managers that were started anew"
+    assert client.start("land").wait(SOON_S)
