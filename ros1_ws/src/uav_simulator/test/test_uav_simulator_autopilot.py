@@ -365,6 +365,17 @@ def test_landing_ends_on_the_ground_and_disarms_half_a_second_later(land):
     assert list(dict.fromkeys(states)) == [LANDING, GROUND]
 
 
+def test_a_landing_from_high_up_is_slow_near_the_ground():
+    link = Link().flying(height=16.0)
+    link.command(21)
+    speeds = []
+    link.run_until(
+        lambda: link.position[2] == 0.0, timeout_s=40.0, each_tick=lambda: speeds.append((link.position[2], -link.vehicle.body.velocity[2]))
+    )
+    assert max(v for z, v in speeds if z > 11.0) > 1.3
+    assert max(v for z, v in speeds if z < 8.0) < 0.6
+
+
 def test_a_touch_down_in_guided_stays_armed():
     link = Link().flying()
     link.ask(245, hz=50)

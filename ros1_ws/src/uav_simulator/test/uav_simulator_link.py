@@ -100,7 +100,7 @@ class Link:
         """Take off and hover; return self."""
         self.guided_and_armed()
         assert self.command(22, 0, 0, 0, 0, 0, 0, height) == ACCEPTED
-        self.run_until(lambda: self.landed_state == IN_AIR, timeout_s=10.0)
+        self.run_until(lambda: self.landed_state == IN_AIR, timeout_s=20.0)
         self.run(1.0)
         return self
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import queue
+import signal
+import threading
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -54,17 +56,26 @@ class SimulatorNode:
         self._pose_due_ns = self._state_due_ns = 0
         self._last_state = self._simulation.state
         self._left_out: list[str] = []
+        self._stopping = threading.Event()
         rospy.set_param("~mavlink_port", self._link.port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
         rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
         for topic in settings.pace_topics:
             rospy.Subscriber(topic, rospy.AnyMsg, self._on_paced, callback_args=topic, tcp_nodelay=True)
 
+    def stop(self) -> None:
+        """End ``run`` soon; may be called by a signal's handler."""
+        self._stopping.set()
+
+    @property
+    def _ended(self) -> bool:
+        return self._stopping.is_set() or rospy.is_shutdown()
+
     def run(self) -> None:
-        """Step until ROS shuts down."""
+        """Step until ``stop`` or until ROS shuts down."""
         self._tf_static.publish(ros_messages.static_transforms(0))
         due = time.monotonic()
-        while not rospy.is_shutdown():
+        while not self._ended:
             self._obey_pilot()
             self._simulation.tick()
             self._publish()
@@ -75,7 +86,7 @@ class SimulatorNode:
 
     def _wait(self, due: float) -> None:
         """Serve the link until wall time and everybody's work have come far enough."""
-        while not rospy.is_shutdown():
+        while not self._ended:
             now = time.monotonic()
             held = not self._pacer.may_advance(self._simulation.now_s, now)
             rest = max(due - now, WAIT_S if held else 0.0)
@@ -130,10 +141,15 @@ class SimulatorNode:
 
 def main() -> None:
     """Run the node until ROS ends it; a wrong parameter ends it with one line."""
-    rospy.init_node("uav_simulator")
+    # Not rospy's own handlers: they close connections inside the signal's handler, and wait for ever when the signal
+    # interrupts the main thread in the middle of a publish, which here is where it nearly always is.
+    rospy.init_node("uav_simulator", disable_signals=True)
     try:
         node = SimulatorNode(settings_from_params(rospy.get_param("~", {})))
     except SimulatorError as error:
         rospy.logfatal(str(error))
         raise SystemExit(2) from error
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: node.stop())
     node.run()
+    rospy.signal_shutdown("the simulation has been ended")

@@ -10,8 +10,11 @@ import math
 from dataclasses import dataclass, replace
 
 from uav_simulator.autopilot.estimator import READY_AFTER_S, Estimator
+from uav_simulator.autopilot.failsafe import Failsafes
+from uav_simulator.autopilot.ground_contact import TouchDown
 from uav_simulator.autopilot.navigator import Goal, Navigator
 from uav_simulator.autopilot.params import Parameters
+from uav_simulator.autopilot.return_home import ReturnHome
 from uav_simulator.autopilot.setpoint import RawSetpoint, read_setpoint
 from uav_simulator.autopilot.types import LandedState, Mode, Notice, Result, Severity, SystemStatus, Text
 from uav_simulator.frames import Vec3, wrap_pi
@@ -20,7 +23,6 @@ from uav_simulator.vehicle.controller import Gains, PositionLoop
 from uav_simulator.vehicle.hexacopter import Hexacopter
 
 SPOOL_UP_S = 2.4
-TOUCH_DOWN_S = 1.0  # of standing before the landing is believed
 DISARM_AFTER_LANDING_S = 0.5
 SLOW_LANDING_BELOW_M = 10.0
 NOT_ARMABLE = (Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE)
@@ -46,21 +48,18 @@ class Autopilot:
         self._estimator = Estimator(seed)
         self.estimate = self._estimator.step(vehicle.body, 0.0)
         self._position_loop = PositionLoop(airframe, Gains())
-        self._hover_n = airframe.hover_thrust_n
+        self._touch_down = TouchDown(airframe.hover_thrust_n)
         self._navigator = Navigator(self.params)
         self.now_s = 0.0
         self.mode = Mode.STABILIZE
         self.armed = False
         self.landed = True
         self.home: Vec3 | None = None
-        self.rc_lost = False
-        self.gcs_lost = False
         self.flown_s = 0.0
-        self._gcs_heard_s: float | None = None
+        self._failsafes = Failsafes(self.params)
         self._takeoff: Takeoff | None = None
         self._landed_since_s = 0.0
-        self._standing_s = 0.0
-        self._rtl_over_home_s: float | None = None
+        self._return: ReturnHome | None = None
         self._texts: list[Text] = []
         self._notices: list[Notice] = []
         if self.ready:
@@ -83,14 +82,14 @@ class Autopilot:
         """Return MAV_LANDED_STATE [8]."""
         if self.landed:
             return LandedState.ON_GROUND
-        if self.mode is Mode.LAND or (self.mode is Mode.RTL and self._rtl_over_home_s is not None):
+        if self.mode is Mode.LAND or (self._return and self._return.landing):
             return LandedState.LANDING
         return LandedState.TAKING_OFF if self._takeoff else LandedState.IN_AIR
 
     @property
     def system_status(self) -> SystemStatus:
         """Return MAV_STATE: critical as long as a failsafe's cause lasts [10]."""
-        if self.rc_lost or self.gcs_lost:
+        if self._failsafes.active:
             return SystemStatus.CRITICAL
         return SystemStatus.STANDBY if self.landed else SystemStatus.ACTIVE
 
@@ -208,17 +207,13 @@ class Autopilot:
 
     def hear_gcs(self) -> None:
         """Note a heartbeat of the ground station [10]."""
-        self._gcs_heard_s = self.now_s
-        if self.gcs_lost:
-            self.gcs_lost = False
+        if self._failsafes.hear_gcs(self.now_s):
             self._say(Severity.WARNING, "GCS Failsafe Cleared")
 
     def set_rc(self, *, lost: bool) -> None:
         """Lose or regain the remote control: RTL, which stays when it comes back [10]."""
-        if lost and not self.rc_lost and self.params["FS_THR_ENABLE"]:
-            self._say(Severity.WARNING, "Radio Failsafe")
-            self._failsafe()
-        self.rc_lost = lost
+        if self._failsafes.set_rc(lost=lost):
+            self._fail_safe("Radio Failsafe")
 
     def yaw_stick(self, rate_rad_s: float) -> None:
         """Turn by the pilot's stick until it is centred, 0 [11]."""
@@ -234,9 +229,10 @@ class Autopilot:
         if self.ready and not was_ready:
             self._notices.append(Notice.ORIGIN)
             self._set_home()
-        self._watch_gcs()
+        if self.armed and self._failsafes.gcs_falls_silent(now_s):
+            self._fail_safe("GCS Failsafe")
         self._progress_takeoff()
-        self._progress_rtl()
+        self._progress_landing()
         self._watch_touch_down(dt_s)
         self._watch_disarm()
         self._fly(now_s, dt_s)
@@ -259,15 +255,13 @@ class Autopilot:
         self.mode = mode
         self._notices.append(Notice.HEARTBEAT)
         self._takeoff = None
-        self._rtl_over_home_s = None
+        self._return = None
         nav = self._navigator
         nav.reset_speeds()
         nav.hold_yaw()
         nav.stop()
-        if mode is Mode.LAND:
-            self._descend()
         if mode is Mode.RTL and self.home:
-            nav.goal.z = max(self.estimate.position[2], self.home[2] + self.params["RTL_ALT"] / 100.0)
+            self._return = ReturnHome(self.params, nav.goal, self.estimate.position, self.home)
 
     def _descend(self) -> None:
         height = self.estimate.position[2] - (self.home[2] if self.home else 0.0)
@@ -275,22 +269,13 @@ class Autopilot:
         goal = self._navigator.goal
         goal.z, goal.velocity = None, (0.0, 0.0, -speed / 100.0)
 
-    def _failsafe(self) -> None:
-        if not self.armed:
-            return
-        if self.landed:
+    def _fail_safe(self, cause: str) -> None:
+        """Return home, or disarm on the ground; a landing goes on [10]."""
+        self._say(Severity.WARNING, cause)
+        if self.armed and self.landed:
             self.disarm()
-        elif self.mode is not Mode.LAND:
+        elif self.armed and self.mode is not Mode.LAND:
             self.set_mode(Mode.RTL)
-
-    def _watch_gcs(self) -> None:
-        heard = self._gcs_heard_s
-        if not self.params["FS_GCS_ENABLE"] or heard is None or self.gcs_lost or not self.armed:
-            return
-        if self.now_s - heard > self.params["FS_GCS_TIMEOUT"]:
-            self.gcs_lost = True
-            self._say(Severity.WARNING, "GCS Failsafe")
-            self._failsafe()
 
     def _progress_takeoff(self) -> None:
         """Spool up, lift off, and end the take-off at its height [5]."""
@@ -299,35 +284,29 @@ class Autopilot:
             return
         if not takeoff.lifted and self.now_s - takeoff.accepted_s >= SPOOL_UP_S:
             takeoff.lifted, self.landed = True, False
+            self._touch_down.standing_s = 0.0
             self._position_loop.restart()
             nav.restart(self.estimate)
             nav.goal.z = takeoff.height_m
         if takeoff.lifted and self.estimate.position[2] > takeoff.height_m - 0.1 and abs(self.estimate.velocity[2]) < 0.3:
             self._takeoff = None
 
-    def _progress_rtl(self) -> None:
-        """Climb, go home, wait above it, descend."""
-        if self.mode is not Mode.RTL or self.landed or self.home is None:
+    def _progress_landing(self) -> None:
+        """Descend in LAND, slowly near the ground, and at the end of a return."""
+        if self.landed:
             return
-        nav, p = self._navigator, self.estimate.position
-        if self._rtl_over_home_s is not None:
-            if self.now_s - self._rtl_over_home_s > self.params["RTL_LOIT_TIME"] / 1000.0:
-                self._descend()
-        elif nav.goal.z is not None and p[2] > nav.goal.z - 0.2:
-            nav.goal.xy = (self.home[0], self.home[1])
-            if math.dist(p[:2], self.home[:2]) < 0.5:
-                self._rtl_over_home_s = self.now_s
+        home_reached = self._return and self._return.step(self.now_s, self.estimate.position, self._navigator.goal)
+        if self.mode is Mode.LAND or home_reached:
+            self._descend()
 
     def _watch_touch_down(self, dt_s: float) -> None:
-        """Believe a landing after standing for a while at low thrust; not during a take-off [8]."""
-        body, target = self._vehicle.body, self._vehicle.target
-        pressed = target is None or target.thrust_n < 0.9 * self._hover_n
-        if self.landed or self._takeoff or not body.on_ground or not pressed:
-            self._standing_s = 0.0
+        """Land when the ground carries; never during a take-off [8]."""
+        if self.landed or self._takeoff:
             return
-        self._navigator.keep_above(self.estimate.position[2] - 0.5)
-        self._standing_s += dt_s
-        if self._standing_s >= TOUCH_DOWN_S:
+        landed = self._touch_down.step(self._vehicle.body, self._vehicle.target, dt_s)
+        if self._touch_down.standing_s > 0.0:
+            self._navigator.keep_above(self.estimate.position[2] - 0.5)
+        if landed:
             self.landed = True
             self._landed_since_s = self.now_s
             self._position_loop.restart()

@@ -1,0 +1,40 @@
+"""Which of the links to people on the ground are lost [10]."""
+
+from __future__ import annotations
+
+from uav_simulator.autopilot.params import Parameters
+
+
+class Failsafes:
+    """Remembers the remote control's and the ground station's state; what follows from a loss is the autopilot's to decide."""
+
+    def __init__(self, params: Parameters) -> None:
+        self._params = params
+        self._gcs_heard_s: float | None = None
+        self.rc_lost = False
+        self.gcs_lost = False
+
+    @property
+    def active(self) -> bool:
+        """Return whether a cause lasts."""
+        return self.rc_lost or self.gcs_lost
+
+    def hear_gcs(self, now_s: float) -> bool:
+        """Note a heartbeat of the ground station; return whether that ends its failsafe."""
+        self._gcs_heard_s = now_s
+        was_lost, self.gcs_lost = self.gcs_lost, False
+        return was_lost
+
+    def set_rc(self, *, lost: bool) -> bool:
+        """Note the remote control's state; return whether that begins its failsafe."""
+        begins = lost and not self.rc_lost and bool(self._params["FS_THR_ENABLE"])
+        self.rc_lost = lost
+        return begins
+
+    def gcs_falls_silent(self, now_s: float) -> bool:
+        """Return whether the ground station's failsafe begins now: it is enabled, had spoken, and has been silent for too long."""
+        heard = self._gcs_heard_s
+        if not self._params["FS_GCS_ENABLE"] or heard is None or self.gcs_lost:
+            return False
+        self.gcs_lost = now_s - heard > self._params["FS_GCS_TIMEOUT"]
+        return self.gcs_lost
