@@ -10,6 +10,7 @@ pytest.importorskip("rclpy")
 
 from uav_skills_rig import Rig
 
+
 @pytest.fixture(scope="module")
 def whole_rig(ros2_domain):
     rig = Rig()

@@ -88,9 +88,7 @@ class FakeFunctional:
         group = ReentrantCallbackGroup()
         self._clock = self.node.create_publisher(ClockMessage, "/clock", 10)
         self._state = self.node.create_publisher(GuidanceState, "/uav_guidance/state", 10)
-        self._obstacles = {
-            name: self.node.create_publisher(Obstacle, f"/{name}/obstacle", 10) for name in ("zed_depth", "lidar_obstacles")
-        }
+        self._obstacles = {name: self.node.create_publisher(Obstacle, f"/{name}/obstacle", 10) for name in ("zed_depth", "lidar_obstacles")}
         self._mapping = self.node.create_publisher(MappingState, "/lidar_mapping/state", 10)
         for name, kind, handler in (
             ("takeoff", Takeoff, self._takeoff),

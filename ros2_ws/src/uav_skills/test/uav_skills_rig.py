@@ -24,6 +24,7 @@ class Rig:
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.node import Node
         from rclpy.parameter import Parameter
+
         from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 
         self.functional = FakeFunctional()
