@@ -140,7 +140,7 @@ def test_a_mission_that_is_told_to_end_before_the_start_does_not_start(whole_rig
     whole_rig.prepare()
     whole_rig.set("navigation", "homepoint_status", "INVALID")
     mission = Mission(whole_rig, tmp_path / "run")
-    mission.until(lambda: (mission.out / "mission.json").exists())
+    mission.until((mission.out / "mission.json").exists)
     assert mission.read("mission.json")["outcome"] == "running"
     mission.process.send_signal(signal.SIGTERM)
     assert mission.exit_code() == 1

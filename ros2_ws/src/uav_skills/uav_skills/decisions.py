@@ -29,13 +29,6 @@ class GuidanceReport(Protocol):
     obstacle_m: float
 
 
-class MappingReport(Protocol):
-    """The fields of uav_msgs/MappingState that decide."""
-
-    running: bool
-    scans: int
-
-
 @dataclass(frozen=True)
 class Verdict:
     """How an execution ends: a result of the skill's model, and why in words."""
