@@ -15,6 +15,8 @@ BROKEN = "BROKEN"
 MENDED = "ok"
 # Per scenario, the skill whose running means that the vehicle can see ahead again (paper, Figure 6).
 FALLBACK_SKILLS = {"mapping": "lidar_depthmap"}
+# Skills that take the vehicle somewhere; a turn on the spot, or braking past the stop point and back, is not moving on.
+MOTION_SKILLS = {"mapping": ("goto", "goto_straight")}
 MOVING_M_S = 0.2
 # The managers' clock ticks at 50 Hz, so an event's stamp may be a tick older than what caused it.
 STAMP_TOLERANCE_S = 0.05
@@ -47,8 +49,13 @@ def find_recovery(scenario: str, history: History, recording: Recording, phases:
     violated = [execution.end_s for execution in history.executions if execution.outcome == VIOLATED and execution.end_s is not None]
     detected_s = _first([*broken, *violated], since_s)
     fallback_s = _fallback(FALLBACK_SKILLS.get(scenario), history.executions, since_s if detected_s is None else detected_s)
-    moving_s = None if fallback_s is None or recording.path is None else moving_again(recording.path, fallback_s, phases.landing_s)
+    motion_s = None if fallback_s is None else _first(_running_stamps(history, MOTION_SKILLS.get(scenario, ())), fallback_s)
+    moving_s = None if motion_s is None or recording.path is None else moving_again(recording.path, motion_s, phases.landing_s)
     return Recovery(failure_s, detected_s, fallback_s, moving_s)
+
+
+def _running_stamps(history: History, skills: tuple[str, ...]) -> list[float]:
+    return [e.running_s for e in history.executions if e.skill in skills and e.running_s is not None]
 
 
 def _first(stamps: list[float], since_s: float) -> float | None:
@@ -63,7 +70,7 @@ def _fallback(skill: str | None, executions: tuple[Execution, ...], since_s: flo
 def moving_again(track: Track, since_s: float, landing_s: float | None) -> float | None:
     """Return when the vehicle set off (horizontally) after it had stopped; ``since_s`` itself if it never stopped.
 
-    A vehicle that still brakes when the fallback begins has not moved on; it has when it got slow and fast again.
+    ``since_s`` is when a motion skill runs again. A vehicle that still brakes then has not moved on; it has when it got slow and fast again.
     """
     part = (track.t_s >= since_s) & (track.t_s < (np.inf if landing_s is None else landing_s))
     t_s, fast = track.t_s[part], track.horizontal_speed_m_s()[part] > MOVING_M_S
