@@ -136,10 +136,10 @@ def test_phases_from_the_guidance_alone():
 @pytest.mark.parametrize(
     ("speeds", "expected"),
     [
-        ([2, 2, 1, 0, 0, 0, 1, 1], 6.0),  # brakes, stands, sets off
+        ([0, 0, 1, 0, 0, 0, 1, 1], 2.0),  # sets off, stops again
         ([0, 0, 0, 0, 1, 1, 1, 1], 4.0),  # stands from the start
         ([1, 1, 1, 1, 1, 1, 1, 1], 0.0),  # never stopped
-        ([1, 1, 0, 0, 0, 0, 0, 0], None),  # never set off
+        ([0, 0, 0, 0, 0, 0, 0, 0], None),  # never set off
     ],
 )
 def test_moving_again(speeds, expected):

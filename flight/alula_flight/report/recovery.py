@@ -68,16 +68,7 @@ def _fallback(skill: str | None, executions: tuple[Execution, ...], since_s: flo
 
 
 def moving_again(track: Track, since_s: float, landing_s: float | None) -> float | None:
-    """Return when the vehicle set off (horizontally) after it had stopped; ``since_s`` itself if it never stopped.
-
-    ``since_s`` is when a motion skill runs again. A vehicle that still brakes then has not moved on; it has when it got slow and fast again.
-    """
+    """Return when the vehicle is first fast (horizontally) from ``since_s`` on, when a motion skill runs again; None if it never is."""
     part = (track.t_s >= since_s) & (track.t_s < (np.inf if landing_s is None else landing_s))
-    t_s, fast = track.t_s[part], track.horizontal_speed_m_s()[part] > MOVING_M_S
-    if not len(t_s):
-        return None
-    if fast.all():
-        return since_s
-    stopped = int(np.argmin(fast))
-    moving = np.flatnonzero(fast[stopped:])
-    return float(t_s[stopped + moving[0]]) if len(moving) else None
+    fast = track.t_s[part][track.horizontal_speed_m_s()[part] > MOVING_M_S]
+    return float(fast[0]) if len(fast) else None
