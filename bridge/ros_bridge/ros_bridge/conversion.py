@@ -6,7 +6,9 @@ and ``.srv`` files in the ament prefixes; ROS 1's from its Noetic store, else fr
 
 from __future__ import annotations
 
+import os
 import struct
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,7 +91,8 @@ class Types:
         sums = []
         for suffix, text in zip(("Request", "Response"), halves, strict=True):
             half = f"{ros1_name}_{suffix}"
-            self._adopt(half, text)
+            self._adopt_ros2(half, text)
+            self._adopt_ros1(half, text)
             sums.append(ros1_definition.sum_text(self._definitions[half], self._md5))
         request, response = (self._message(f"{ros1_name}_{suffix}") for suffix in ("Request", "Response"))
         return ServiceType(ros1_name, ros1_definition.md5("".join(sums)), request, response)
@@ -114,31 +117,49 @@ class Types:
         return self._sums[ros1_name]
 
     def _load(self, ros1_name: str) -> None:
-        """Read a message's definition and those of its parts, once."""
-        if ros1_name not in self._definitions:
-            self._adopt(ros1_name, self._message_text(ros1_name))
+        """Read a message's definitions in both worlds, and those of its parts, once."""
+        self._load_ros2(ros1_name)
+        self._load_ros1(ros1_name)
 
-    def _adopt(self, ros1_name: str, text: str) -> None:
+    def _load_ros1(self, ros1_name: str) -> None:
+        if ros1_name in self._definitions:
+            return
+        name = _ros2_name(ros1_name)
+        if name in self._ros1.fielddefs:
+            text = _stored_text(self._ros1, name)
+        else:
+            text = self._file_text(ros1_name) or _stored_text(self._ros2, name)
+        self._adopt_ros1(ros1_name, text)
+
+    def _adopt_ros1(self, ros1_name: str, text: str) -> None:
         definition = ros1_definition.parse_definition(ros1_name, text)
         self._definitions[ros1_name] = definition
         for part in definition.parts:
-            self._load(part)
-        for store in (self._ros1, self._ros2):
-            if _ros2_name(ros1_name) not in store.fielddefs:
-                store.register(_fielddefs(ros1_name, text))
+            self._load_ros1(part)
+        if _ros2_name(ros1_name) not in self._ros1.fielddefs:
+            self._ros1.register(_fielddefs(ros1_name, text))
 
-    def _message_text(self, ros1_name: str) -> str:
-        name = _ros2_name(ros1_name)
-        if name in self._ros1.fielddefs:
-            return _stored_text(self._ros1, name)
+    def _load_ros2(self, ros1_name: str) -> None:
+        if _ros2_name(ros1_name) in self._ros2.fielddefs:
+            return
+        text = self._file_text(ros1_name)
+        if text is None:
+            package, short = ros1_name.split("/")
+            raise TypeUnknownError(
+                f"message type {ros1_name}: no {package}/msg/{short}.msg in {self._places()}; build the package in the ROS 2 world",
+            )
+        self._adopt_ros2(ros1_name, text)
+
+    def _adopt_ros2(self, ros1_name: str, text: str) -> None:
+        for part in ros1_definition.parse_definition(ros1_name, text).parts:
+            self._load_ros2(part)
+        if _ros2_name(ros1_name) not in self._ros2.fielddefs:
+            self._ros2.register(_fielddefs(ros1_name, text))
+
+    def _file_text(self, ros1_name: str) -> str | None:
         package, short = ros1_name.split("/")
-        if (path := self._find(package, "msg", f"{short}.msg")) is not None:
-            return path.read_text(encoding="utf-8")
-        if name in self._ros2.fielddefs:
-            return _stored_text(self._ros2, name)
-        raise TypeUnknownError(
-            f"message type {ros1_name}: no {package}/msg/{short}.msg in {self._places()}; build the package in the ROS 2 world",
-        )
+        path = self._find(package, "msg", f"{short}.msg")
+        return None if path is None else path.read_text(encoding="utf-8")
 
     def _service_text(self, package: str, name: str) -> list[str]:
         path = self._find(package, "srv", f"{name}.srv")
@@ -156,6 +177,11 @@ class Types:
 
     def _places(self) -> str:
         return ", ".join(map(str, self._shares)) or "an empty ament prefix path"
+
+
+def ament_prefixes() -> list[Path]:
+    """Return the prefixes in which this environment looks for ROS 2 packages."""
+    return [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", sys.prefix).split(os.pathsep) if prefix]
 
 
 def _ros2_name(ros1_name: str) -> str:
@@ -182,8 +208,6 @@ def require_same_layout(name: str, ros1: Typestore, ros2: Typestore) -> None:
     """
     if name == HEADER:
         return
-    if name not in ros2.fielddefs:
-        raise TypeUnknownError(f"message type {name}: ROS 1 has it, ROS 2 has not")
     left, right = ros1.fielddefs[name][1], ros2.fielddefs[name][1]
     for (left_field, left_type), (right_field, right_type) in zip(left, right, strict=False):
         left_part, right_part = _shape(left_type), _shape(right_type)

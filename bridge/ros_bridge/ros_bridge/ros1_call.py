@@ -167,10 +167,11 @@ class Ros1Service:
             self._discard(connection)
 
     def _connect(self, deadline: Deadline) -> Ros1Connection:
-        problem = "no server"
+        problem = "the ROS master has not answered, asked"
         while not self._closed.is_set():
             try:
-                address = self._look_up(deadline)
+                address = self._look_up(deadline.remaining_s(f"{problem} for {self._name} in ROS 1"))
+                problem = "no server"
                 if address is not None:
                     connection = Ros1Connection(address, self._header, deadline)
                     with self._lock:
@@ -181,9 +182,8 @@ class Ros1Service:
             self._closed.wait(min(POLL_S, deadline.remaining_s(f"{problem} for {self._name} in ROS 1")))
         raise CallError("the bridge is shutting down")
 
-    def _look_up(self, deadline: Deadline) -> tuple[str, int] | None:
+    def _look_up(self, timeout_s: float) -> tuple[str, int] | None:
         """Ask the master where the server is; None when it knows none."""
-        timeout_s = deadline.remaining_s("the ROS master has not answered")
         with ServerProxy(self._master_uri, transport=TimedTransport(timeout_s)) as master:
             answer: Any = master.lookupService(self._header["callerid"], self._name)
         code, _, uri = answer

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ros_bridge import two_worlds
-from ros_bridge.conversion import Types
+from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.master import Master
 
 two_worlds.import_ros1()
@@ -31,18 +31,13 @@ SWITCH_INTERVAL_S = 0.0005  # a thread that copies an image must not keep /clock
 END_WITHIN_S = 1.5
 
 
-def prefixes() -> list[Path]:
-    """Return the ament prefixes, in which message definitions are looked for."""
-    return [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", sys.prefix).split(os.pathsep) if prefix]
-
-
 def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.Event, master_uri: str) -> None:
     """Wait for the master, start both nodes, bridge until asked to stop (or shut down by either world), end both nodes.
 
     Neither node takes time from ``/clock``: the bridge has to work before it ticks, and is what makes it tick in ROS 2.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    types = Types(prefixes())
+    types = Types(ament_prefixes())
     master = Master(master_uri, f"/{NODE_NAME}")
     if not master.wait(stop):
         return

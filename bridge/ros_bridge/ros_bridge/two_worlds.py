@@ -14,6 +14,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 
 from ros_bridge.errors import WorldError
 
@@ -78,21 +79,29 @@ def _is_message_package(name: str, folder: Path) -> bool:
 def import_ros1() -> Path:
     """Import rospy and give its message packages' names back to ROS 2; return the folder that it came from. Twice is once.
 
+    ROS 2 message packages that are imported already are put back afterwards. Call it before other threads import anything.
+
     Raises:
-        WorldError: rospy is not there, or a ROS 2 message package that it would have to replace is imported already.
+        WorldError: rospy is not there.
     """
     folder = find_ros1_path()
     if "rospy" in sys.modules:
         return folder
     for name in KEEP_OURS:
         importlib.import_module(name)
-    taken = [name for name in sys.modules if "." not in name and _is_message_package(name, folder)]
-    if taken:
-        raise WorldError(f"import rospy before ROS 2's {', '.join(taken)}: call ros_bridge.two_worlds.import_ros1() first")
-    with _in_front(folder):
-        importlib.import_module("rospy")
-    tops = {name.split(".")[0] for name in sys.modules}
-    messages = {name for name in tops if _is_message_package(name, folder)}
-    for name in [name for name in sys.modules if name.split(".")[0] in messages]:
-        del sys.modules[name]
+    ros2_messages = _take_out_messages(folder)
+    try:
+        with _in_front(folder):
+            importlib.import_module("rospy")
+    finally:
+        _take_out_messages(folder)
+        sys.modules.update(ros2_messages)
     return folder
+
+
+def _take_out_messages(folder: Path) -> dict[str, ModuleType]:
+    """Remove the modules of all message packages that ROS 1 has from the table of imported ones, and return them."""
+    tops = {name.partition(".")[0] for name in sys.modules}
+    messages = {name for name in tops if _is_message_package(name, folder)}
+    names = [name for name in sys.modules if name.partition(".")[0] in messages]
+    return {name: sys.modules.pop(name) for name in names}

@@ -1,5 +1,6 @@
 """Processes around the bridge for its live tests: a ROS master, the bridge itself, ROS 1 peers."""
 
+import contextlib
 import json
 import os
 import queue
@@ -43,12 +44,16 @@ def end(process: subprocess.Popen, within_s: float = 5.0) -> float:
     return time.monotonic() - start
 
 
+RUNNING: list["Master | Lines"] = []  # a test that fails half-way must leave no process behind in its domain
+
+
 class Master:
     def __init__(self, port: int) -> None:
         self.port = port
         self.uri = f"http://127.0.0.1:{port}"
         self.environment = {**os.environ, "ROS_MASTER_URI": self.uri, "ROS_IP": "127.0.0.1"}
         self.process: subprocess.Popen | None = None
+        RUNNING.append(self)
 
     def start(self) -> None:
         command = [str(alula_root() / "setup/in_ros1"), "rosmaster", "--core", "-p", str(self.port)]
@@ -62,7 +67,7 @@ class Master:
             return False
         return True
 
-    def stop(self) -> None:
+    def close(self) -> None:
         if self.process is not None:
             end(self.process)
 
@@ -80,6 +85,7 @@ class Lines:
             stdout=subprocess.DEVNULL if errors else subprocess.PIPE,
             stderr=subprocess.PIPE if errors else None,
         )
+        RUNNING.append(self)
         self.lines: list[str] = []
         self._stream = self.process.stderr if errors else self.process.stdout
         self._fresh: queue.Queue[str] = queue.Queue()
@@ -90,6 +96,10 @@ class Lines:
             self.lines.append(line.rstrip("\n"))
             self._fresh.put(line)
 
+    def close(self) -> float:
+        """End the process, and return how many seconds it took."""
+        return end(self.process)
+
     def next_line(self, within_s: float) -> str:
         return self._fresh.get(timeout=within_s)
 
@@ -99,6 +109,13 @@ class Ros1Peer(Lines):
         command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / "ros_bridge_ros1_peer.py")]
         super().__init__(command, master.environment, errors=False)
         self.expect("ready")
+
+    def close(self) -> float:
+        """Close its input, at which it ends."""
+        self.process.stdin.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.process.wait(2.0)
+        return super().close()
 
     def do(self, command: str, **arguments: object) -> None:
         self.process.stdin.write(json.dumps({"do": command, **arguments}) + "\n")
@@ -114,13 +131,6 @@ class Ros1Peer(Lines):
                 pytest.fail(f"no {kinds} {wanted} from the ROS 1 peer within {within_s} s")
             if event["event"] in kinds and all(event.get(key) == value for key, value in wanted.items()):
                 return event
-
-    def wait_connected(self, topic: str) -> None:
-        def connected() -> bool:
-            self.do("connections", topic=topic)
-            return self.expect("connections", topic=topic)["number"] > 0
-
-        wait_until(connected, f"somebody subscribes to {topic} in ROS 1")
 
 
 class BridgeProcess(Lines):

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Reader
 
-from ros_bridge.conversion import Types
+from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.errors import TypeDiffersError, TypeUnknownError
-from ros_bridge.session import prefixes
 
 ROUND_TRIPS = [
     "std_msgs/String",
@@ -50,7 +49,7 @@ SCALARS = {
 
 @pytest.fixture(scope="module")
 def types():
-    return Types(prefixes())
+    return Types(ament_prefixes())
 
 
 def ros1_bytes(types, name):
