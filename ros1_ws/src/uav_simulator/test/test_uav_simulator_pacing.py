@@ -54,6 +54,19 @@ def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
     assert p.may_advance(20.0, 3.1)
 
 
+def test_who_works_on_measurements_is_waited_for_while_there_are_some():
+    p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    p.measured("zed", 10.0)
+    p.heard("/depth/done", 10.0)
+    assert p.may_advance(99.0, 0.0), "a dead camera holds nobody up"
+    p.measured("zed", 10.1)
+    assert p.may_advance(10.1, 0.0), "one measurement may be under way"
+    p.measured("zed", 10.2)
+    assert not p.may_advance(10.2, 0.0)
+    p.heard("/depth/done", 10.1)
+    assert p.may_advance(10.2, 0.1)
+
+
 def test_the_slowest_of_many_holds():
     p = pacer()
     p.heard("/a", 10.0)

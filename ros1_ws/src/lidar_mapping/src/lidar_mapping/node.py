@@ -16,7 +16,7 @@ from lidar_mapping.mapper import Mapper
 from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.settings import MappingSettings
 from perception_core import NS, Sweep
-from perception_core.ros import EnableSwitch, NewestWorker, Vehicle, cloud_message, read_settings, sweep_of_cloud
+from perception_core.ros import DoneReporter, EnableSwitch, NewestWorker, Vehicle, cloud_message, read_settings, sweep_of_cloud
 
 if TYPE_CHECKING:
     from std_srvs.srv import TriggerRequest
@@ -40,6 +40,7 @@ class LidarMappingNode:
         self._resume()
         self._state = rospy.Publisher("~state", MappingState, queue_size=5, latch=True)
         self._map = rospy.Publisher("~map", PointCloud2, queue_size=1, latch=True)
+        self._done = DoneReporter()
         self._vehicle = Vehicle()
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=self._on_switch)
@@ -61,14 +62,19 @@ class LidarMappingNode:
             rospy.logwarn(f"starting with an empty map: {error}")
 
     def _on_cloud(self, message: PointCloud2) -> None:
-        if not self._switch.enabled:
-            return
-        self._received += 1
-        if self._received % self._settings.every_scan == 0:
+        self._received += self._switch.enabled
+        if self._switch.enabled and self._received % self._settings.every_scan == 0:
             self._worker.offer((message.header.frame_id, sweep_of_cloud(message)))
+        else:
+            self._done.done(message.header.stamp.to_nsec())
 
     def _process(self, item: tuple[str, Sweep]) -> None:
-        frame, sweep = item
+        try:
+            self._register(*item)
+        finally:
+            self._done.done(item[1].stamp_ns)
+
+    def _register(self, frame: str, sweep: Sweep) -> None:
         with self._lock:
             registration = self._mapper.add(sweep, self._vehicle.poses, self._vehicle.mount(frame))
             full = self._mapper.map.full

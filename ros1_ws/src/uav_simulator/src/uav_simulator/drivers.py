@@ -27,8 +27,8 @@ class Driver(Protocol):
     every_ticks: int
     at_tick: int  # within its period: sensors take turns, so that the work spreads
 
-    def publish(self, mode: SensorMode) -> None:
-        """Publish one measurement of this moment."""
+    def publish(self, mode: SensorMode) -> int | None:
+        """Publish one measurement of this moment and return its stamp (ns); None when nobody listens."""
 
 
 class _Publisher:
@@ -58,19 +58,20 @@ class ZedDriver:
         self._black: tuple[Pixels, Pixels] = (black, black)
         self._last = self._black
 
-    def publish(self, mode: SensorMode) -> None:
+    def publish(self, mode: SensorMode) -> int | None:
         """Publish images of the same stamp."""
         simulation = self._simulation
         stamp_ns = simulation.now_ns
         for info, right in zip(self._infos, (False, True), strict=True):
             info.publish(ros_messages.camera_info(simulation.stereo.camera, right=right, stamp_ns=stamp_ns))
         if not any(p.wanted for p in self._images):
-            return
+            return None
         if mode is SensorMode.OK:
             self._last = simulation.stereo.render(simulation.pose)
         images = self._black if mode is SensorMode.BLACK else self._last
         for publisher, pixels in zip(self._images, images, strict=True):
             publisher.publish(ros_messages.image(pixels, stamp_ns))
+        return stamp_ns
 
 
 class LidarDriver:
@@ -83,17 +84,18 @@ class LidarDriver:
         self._cloud = _Publisher("/lidar/points", PointCloud2)
         self._last: NDArray[np.void] = np.empty(0, dtype=POINT_DTYPE)
 
-    def publish(self, mode: SensorMode) -> None:
+    def publish(self, mode: SensorMode) -> int | None:
         """Publish a cloud stamped with the sweep's beginning."""
         if not self._cloud.wanted:
-            return
+            return None
         start_ns = self._simulation.now_ns - self.every_ticks * TICK_NS
         if start_ns < 0:
-            return
+            return None
         if mode is SensorMode.OK:
             self._last = self._simulation.lidar.scan(self._simulation.track, start_ns * 1e-9)
         points = np.empty(0, dtype=POINT_DTYPE) if mode is SensorMode.BLACK else self._last
         self._cloud.publish(ros_messages.cloud(points, start_ns))
+        return start_ns
 
 
 class ImuDriver:
@@ -106,22 +108,25 @@ class ImuDriver:
         self._imu = _Publisher("/imu/data", Imu)
         self._last = ImuReading(ZERO, ZERO)
 
-    def publish(self, mode: SensorMode) -> None:
+    def publish(self, mode: SensorMode) -> int | None:
         """Publish one reading."""
         if not self._imu.wanted:
-            return
+            return None
         if mode is SensorMode.OK:
             body = self._simulation.vehicle.body
             self._last = self._simulation.imu.measure(body.rates, body.specific_force)
         reading = ImuReading(ZERO, ZERO) if mode is SensorMode.BLACK else self._last
         self._imu.publish(ros_messages.imu(reading, self._simulation.now_ns))
+        return self._simulation.now_ns
 
 
 class Drivers:
     """All drivers, each at its time."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulation, measured: Callable[[str, float], None]) -> None:
+        """``measured`` is told the sensor and the stamp (seconds) of what was published."""
         self._simulation = simulation
+        self._measured = measured
         self._drivers: list[Driver] = [ZedDriver(simulation), LidarDriver(simulation), ImuDriver(simulation)]
 
     def publish_due(self) -> None:
@@ -130,4 +135,6 @@ class Drivers:
         for driver in self._drivers:
             mode = self._simulation.sensors.mode(driver.sensor)
             if tick % driver.every_ticks == driver.at_tick and mode is not SensorMode.DEAD:
-                driver.publish(mode)
+                stamp_ns = driver.publish(mode)
+                if stamp_ns is not None:
+                    self._measured(driver.sensor, stamp_ns * 1e-9)

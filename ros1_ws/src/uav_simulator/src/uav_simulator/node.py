@@ -46,13 +46,13 @@ class SimulatorNode:
         if settings.world_path:
             write_mesh(Path(settings.world_path), self._simulation.world.vertices, self._simulation.world.triangles)
         self._link = TcpLink(self._simulation.endpoint, settings.mavlink_port)
-        self._pacer = Pacer(limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
+        self._pacer = Pacer(settings.pace_topics, limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
         self._pilot_words: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
         self._pose = rospy.Publisher("/sim/true_pose", PoseStamped, queue_size=5)
         self._state = rospy.Publisher("/sim/state", String, queue_size=5, latch=True)
         self._tf_static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
-        self._drivers = Drivers(self._simulation)
+        self._drivers = Drivers(self._simulation, self._pacer.measured)
         self._pose_due_ns = self._state_due_ns = 0
         self._last_state = self._simulation.state
         self._left_out: list[str] = []
@@ -60,7 +60,7 @@ class SimulatorNode:
         rospy.set_param("~mavlink_port", self._link.port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
         rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
-        for topic in settings.pace_topics:
+        for topic in (word.partition("=")[0] for word in settings.pace_topics):
             rospy.Subscriber(topic, rospy.AnyMsg, self._on_paced, callback_args=topic, tcp_nodelay=True)
 
     def stop(self) -> None:

@@ -1,12 +1,18 @@
-"""Lockstep: whether simulated time may go on, given how far those who work for it have come. No ROS, no clock of its own."""
+"""Lockstep: whether simulated time may go on, given how far those who work for it have come. No ROS, no clock of its own.
+
+A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, against the last measurement that the sensor published: who
+works on images has done its share when the last image is dealt with, and need not say anything while there are none.
+"""
 
 from __future__ import annotations
 
 import struct
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 ROUNDING_S = 1e-6  # of stamps in floating point
+BEHIND_SENSOR_S = 0.15  # at 10 Hz: one measurement may be under way while the next one is made
 
 
 @dataclass
@@ -19,10 +25,17 @@ class _Listener:
 class Pacer:
     """Remembers the last stamp of each topic; heard from other threads than the one that asks."""
 
-    def __init__(self, *, limit_s: float, patience_s: float) -> None:
+    def __init__(self, topics: Iterable[str] = (), *, limit_s: float, patience_s: float) -> None:
         self._limit_s, self._patience_s = limit_s, patience_s
+        self._sensor_of = {topic: sensor for topic, _, sensor in (word.partition("=") for word in topics) if sensor}
+        self._measured_s: dict[str, float] = {}
         self._listeners: dict[str, _Listener] = {}
         self._lock = threading.Lock()
+
+    def measured(self, sensor: str, stamp_s: float) -> None:
+        """Note that a sensor has published a measurement."""
+        with self._lock:
+            self._measured_s[sensor] = stamp_s
 
     def heard(self, topic: str, stamp_s: float) -> None:
         """Note a message; one that has been left out is back when it speaks with a newer stamp."""
@@ -36,7 +49,8 @@ class Pacer:
     def may_advance(self, now_s: float, wall_s: float) -> bool:
         """Return whether simulated time may go on at ``now_s``; ``wall_s`` is a monotonic clock for the patience."""
         with self._lock:
-            held = [self._holds(listener, now_s, wall_s) for listener in self._listeners.values()]  # asks everyone, for their patience
+            # Asks everyone, for their patience.
+            held = [self._holds(listener, self._lag_s(topic, listener, now_s), wall_s) for topic, listener in self._listeners.items()]
             return not any(held)
 
     @property
@@ -45,10 +59,17 @@ class Pacer:
         with self._lock:
             return sorted(topic for topic, listener in self._listeners.items() if not listener.live)
 
-    def _holds(self, listener: _Listener, now_s: float, wall_s: float) -> bool:
+    def _lag_s(self, topic: str, listener: _Listener, now_s: float) -> float:
+        """Return by how much the topic lags more than it may; not positive: it does not."""
+        sensor = self._sensor_of.get(topic)
+        if sensor is None:
+            return now_s - listener.stamp_s - self._limit_s
+        return self._measured_s.get(sensor, 0.0) - listener.stamp_s - BEHIND_SENSOR_S
+
+    def _holds(self, listener: _Listener, lag_s: float, wall_s: float) -> bool:
         if not listener.live:
             return False
-        if now_s - listener.stamp_s <= self._limit_s + ROUNDING_S:
+        if lag_s <= ROUNDING_S:
             listener.lagging_since_s = None
             return False
         if listener.lagging_since_s is None:

@@ -21,7 +21,7 @@ class Settings:
     faults: str = ""  # SENSOR[:MODE][@SECONDS after lift-off],...
     mavlink_port: int = 5760  # on loopback; 0: any free one, told by /sim/state's neighbour ~mavlink_port
     rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
-    pace_topics: tuple[str, ...] = ()  # topics of those who work for simulated time
+    pace_topics: tuple[str, ...] = ()  # of those who work for simulated time: TOPIC, or TOPIC=SENSOR for who deals with its measurements
     pace_limit_s: float = 0.3
     pace_patience_s: float = 2.0
     boot_before_s: float = 60.0  # how long the autopilot has had power when the clock starts

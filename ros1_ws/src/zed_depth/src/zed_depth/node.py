@@ -13,6 +13,7 @@ from uav_msgs.msg import Obstacle
 
 from perception_core import NS
 from perception_core.ros import (
+    DoneReporter,
     EnableSwitch,
     HealthReporter,
     NewestWorker,
@@ -43,6 +44,7 @@ class ZedDepthNode:
         self._frame = ""
         self._depth = rospy.Publisher("~depth", Image, queue_size=1)
         self._obstacle = rospy.Publisher("~obstacle", Obstacle, queue_size=1, tcp_nodelay=True)
+        self._done = DoneReporter()
         self._vehicle = Vehicle()
         self._health = HealthReporter("zed", resource="zed_status", limits=settings.health)
         self._worker = NewestWorker[StereoPair](self._process)
@@ -73,12 +75,21 @@ class ZedDepthNode:
             self._health.good(pair.stamp_ns)
             if self._switch.enabled:
                 self._worker.offer(pair)
+                return
         elif complaint:
             self._health.bad(complaint)
         elif apart_s > self._settings.sync_tolerance_s:
             self._health.bad(f"left and right images are {apart_s:.2f} s apart")
+        if pair is not None:
+            self._done.done(pair.stamp_ns)
 
     def _process(self, pair: StereoPair) -> None:
+        try:
+            self._look_ahead(pair)
+        finally:
+            self._done.done(pair.stamp_ns)
+
+    def _look_ahead(self, pair: StereoPair) -> None:
         if len(self._projections) < 2:
             rospy.logwarn_throttle(5.0, "images, but no camera_info of both sides yet")
             return

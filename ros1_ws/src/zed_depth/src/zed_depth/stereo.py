@@ -45,9 +45,9 @@ class StereoGeometry:
 class MatcherSettings:
     """Parameters of the matching.
 
-    With fx 240 px and 0.12 m between the cameras, 64 disparities reach from 0.45 m, half the vehicle's radius. The image is widened by as many
-    columns at the left, or its left ``disparities`` columns would have no depth at all. ``min_texture`` is the mean gradient along the row
-    (grey levels a pixel) below which there is nothing to match: sky and blank walls would else be matched by chance.
+    With fx 240 px and 0.12 m between the cameras, 64 disparities reach from 0.45 m, half the vehicle's radius. The image is widened by as
+    many columns at the left, or its left ``disparities`` columns would have no depth at all. ``min_texture`` is the mean gradient along the
+    row (grey levels a pixel) below which there is nothing to match: sky and blank walls would else be matched by chance.
     """
 
     disparities: int = 64

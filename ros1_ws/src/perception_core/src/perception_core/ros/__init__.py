@@ -8,6 +8,7 @@ from perception_core.ros.conversions import (
     obstacle_message,
     sweep_of_cloud,
 )
+from perception_core.ros.done import DoneReporter
 from perception_core.ros.health import HealthReporter
 from perception_core.ros.settings import SettingsError, read_settings
 from perception_core.ros.switch import EnableSwitch
@@ -15,6 +16,7 @@ from perception_core.ros.vehicle import Vehicle
 from perception_core.ros.worker import NewestWorker
 
 __all__ = [
+    "DoneReporter",
     "EnableSwitch",
     "HealthReporter",
     "NewestWorker",

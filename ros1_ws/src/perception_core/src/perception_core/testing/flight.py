@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
@@ -62,7 +62,7 @@ class FakeFlight:
         self._states = {"zed_status": "UNKNOWN", "lidar_status": "UNKNOWN"}
         self._steps = 0
 
-    def __enter__(self) -> FakeFlight:
+    def __enter__(self) -> Self:
         """Go on simulated time and advertise everything."""
         self._sim_time_before = rospy.get_param("/use_sim_time", None)
         rospy.set_param("/use_sim_time", True)
