@@ -17,7 +17,7 @@ BOX = Corridor()
 
 
 def blob(ahead, left=0.0, up=0.0, *, count=20, size=0.1, seed=0) -> np.ndarray:
-    return ORIGIN + [ahead, left, up] + np.random.default_rng(seed).uniform(-size / 2, size / 2, (count, 3))
+    return ORIGIN + np.array([ahead, left, up]) + np.random.default_rng(seed).uniform(-size / 2, size / 2, (count, 3))
 
 
 def look(points, support=None, **corridor):
@@ -72,7 +72,7 @@ def test_single_outliers_before_an_obstacle_do_not_stop_the_vehicle() -> None:
 @given(st.floats(0.35, 7.9), st.floats(-1.2, 1.2), st.floats(-0.55, 0.55))
 @settings(max_examples=100, deadline=None)
 def test_three_close_returns_suffice_wherever_the_cells_cut_them(ahead, left, up) -> None:
-    three = ORIGIN + [ahead, left, up] + np.array([[0.0, 0.0, 0.0], [0.03, 0.02, 0.03], [0.02, -0.03, -0.03]])
+    three = ORIGIN + np.array([ahead, left, up]) + np.array([[0.0, 0.0, 0.0], [0.03, 0.02, 0.03], [0.02, -0.03, -0.03]])
     assert look(three) is not None
 
 

@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 class MapperSettings:
     """How the map is made; metres.
 
-    The surface to register against is the map within reach; it is made anew every ``refresh_scans`` scans, because its normals are the
-    costly part. The first ``warm_up_scans`` are taken as the poses put them: their mean is what the rest is laid onto.
+    The surface to register against is what the map holds within ``local_m``, where it is flatter than ``flat_m``; it is made anew every
+    ``refresh_scans`` scans, because its normals are the costly part. The first ``warm_up_scans`` are taken as the poses put them: their
+    mean is what the rest is laid onto.
     """
 
     voxel_m: float = 0.1
@@ -28,8 +29,10 @@ class MapperSettings:
     self_m: float = 1.2
     max_range_m: float = 20.0
     scan_voxel_m: float = 0.3
-    local_voxel_m: float = 0.25
+    local_m: float = 15.0
+    local_voxel_m: float = 0.3
     normal_radius_m: float = 0.6
+    flat_m: float = 0.05
     refresh_scans: int = 5
     warm_up_scans: int = 5
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
@@ -73,7 +76,8 @@ class Mapper:
         self.count.scans += 1
         if surface is None:
             return Registration(np.eye(4), 0.0, 0.0, 0.0, "there is no map yet")
-        registration = register(downsample(points, self._settings.scan_voxel_m), position, surface, self._settings.registration)
+        near = downsample(points[_within(points, position, self._settings.local_m)], self._settings.scan_voxel_m)
+        registration = register(near, position, surface, self._settings.registration)
         self.count.rejected += not registration.believed
         return registration
 
@@ -84,7 +88,14 @@ class Mapper:
             return None
         if self._surface is None or self._since_refresh >= s.refresh_scans:
             known = self.map.points
-            around = known[np.all(np.abs(known - position) <= s.max_range_m + 1.0, axis=1)]
-            self._surface = Surface(downsample(around, s.local_voxel_m), normal_radius_m=s.normal_radius_m)
+            around = downsample(known[_within(known, position, s.local_m)], s.local_voxel_m)
+            self._surface = Surface(around, normal_radius_m=s.normal_radius_m, flat_m=s.flat_m)
             self._since_refresh = 0
         return self._surface
+
+
+def _within(points: NDArray[np.float64], centre: NDArray[np.float64], reach_m: float) -> NDArray[np.bool_]:
+    """Return which points (N, 3) are in the upright cylinder around the centre."""
+    away = points[:, :2] - centre[:2]
+    inside: NDArray[np.bool_] = np.einsum("ij,ij->i", away, away) <= reach_m**2
+    return inside

@@ -23,7 +23,7 @@ class MappingSettings:
     self_m: float = 1.2
     max_range_m: float = 20.0
     max_correction_m: float = 0.3
-    min_fitness: float = 0.6
+    min_fitness: float = 0.3
 
     @property
     def mapper(self) -> MapperSettings:
