@@ -283,7 +283,7 @@ def test_a_listener_that_raises_or_asks_back_does_no_harm():
         bench.engine.transition("sdk", "NOSUCH")
         raise ValueError("listener")
 
-    bench.engine._listener = listener
+    bench.engine._outbox._listener = listener
     bench.run().terminate("DONE")
     assert told == [2, 3, 4, 5, 6]
     assert "listener" in bench.errors[0]

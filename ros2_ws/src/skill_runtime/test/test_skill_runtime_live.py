@@ -40,6 +40,7 @@ from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
 from skill_runtime.ros2 import RosHooks, SkillsetClient, SkillsetNode  # noqa: E402
 from skill_runtime.ros2.hooks_ros import ServiceCaller, ServiceCallError  # noqa: E402
 from skill_runtime.ros2.names import EVENTS, LIVELINESS_LEASE_S  # noqa: E402
+from skill_runtime.ros2.spin import spin_until  # noqa: E402
 
 S = ExecutionState
 SOON_S = 10.0
@@ -347,6 +348,34 @@ def test_service_calls_of_hooks_neither_block_nor_last(spinning):
     assert hooks["hover"].call_and_wait(hooks["hover"].service, Trigger.Request()).message == "done"
     with pytest.raises(ServiceCallError, match="nosuch"):
         hooks["land"].call_and_wait(hooks["land"].service, Trigger.Request(), timeout_s=0.1)
+
+
+def test_a_callback_that_raises_fails_what_runs_and_the_managers_live_on(ros2_domain):
+    hooks = {skill.name: Recorder() for skill in SKILLSET.skills}
+    managers = SkillsetNode(SKILLSET, navigation_actions, lambda _: hooks)
+    stop = threading.Event()
+    spinner = threading.Thread(target=spin_until, args=(managers, stop))
+    spinner.start()
+    for resource, state in FLYING.items():
+        managers.engine.transition(resource, state)
+    execution = managers.engine.request("hover", None)
+    beats: list[int] = []
+
+    def beat() -> None:
+        beats.append(1)
+        if len(beats) == 1:
+            raise RuntimeError("no such field")
+
+    managers.create_timer(0.01, beat)
+    until(lambda: execution.done, "it is failed")
+    assert (execution.state, execution.message) == (S.FAILED, "a callback raised RuntimeError: no such field")
+    until(lambda: len(beats) > 2, "callbacks go on")
+    assert managers.engine.request("hover", None).state is S.RUNNING
+    stop.set()
+    spinner.join(SOON_S)
+    assert not spinner.is_alive()
+    assert managers.engine.executions == ()
+    managers.destroy_node()
 
 
 def test_missing_hooks_are_named(ros2_domain):

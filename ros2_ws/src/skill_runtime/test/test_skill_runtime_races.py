@@ -269,4 +269,4 @@ def test_every_trace_obeys_the_model(skillset, behaviours, programs):
     check_hooks(running)
     bench.engine.close("over")
     assert bench.engine.executions == ()
-    assert bench.engine._entries == {}
+    assert bench.engine._ledger.entries == {}

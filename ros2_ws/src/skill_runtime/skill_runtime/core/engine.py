@@ -1,16 +1,15 @@
 """Runs one skillset: takes the steps of ``semantics`` one after another and calls the hooks between them.
 
 All changes go through one lock; hooks and the listener are never called while it is held, so a hook may end, interrupt
-or start whatever it likes. Events are queued under the lock in the order of the steps and delivered by one thread at a
-time; a thread that finds another delivering leaves its events to it.
+or start whatever it likes. Events are queued under the lock, so in the order of the steps, and delivered without it.
 """
 
 from __future__ import annotations
 
+import functools
 import logging
 import threading
 import traceback
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -18,22 +17,14 @@ from skill_language.model import Skillset
 from skill_runtime.core import semantics
 from skill_runtime.core.conditions import Data
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.core.events import EngineEvent, ExecutionEvent, Listener, TransitionEvent
+from skill_runtime.core.events import Listener
 from skill_runtime.core.execution import Execution, ExecutionState
-from skill_runtime.core.semantics import Change, Entered, Running, Step
+from skill_runtime.core.ledger import Entry, Ledger, ResourceStatus
+from skill_runtime.core.outbox import Outbox
 from skill_runtime.hooks import SkillHooks
 
 _LOG = logging.getLogger(__name__)
 Job = Callable[[], None]
-
-
-@dataclass(frozen=True)
-class ResourceStatus:
-    """A resource at one moment; ``previous`` is empty and ``stamp_ns`` that of the engine's start before the first transition."""
-
-    state: str
-    previous: str
-    stamp_ns: int
 
 
 @dataclass(frozen=True)
@@ -43,17 +34,6 @@ class TransitionReply:
     accepted: bool
     reason: str
     state: str
-
-
-@dataclass
-class _Entry:
-    """What the engine keeps of an execution that has not ended or whose hooks are not through."""
-
-    execution: Execution
-    key: Running
-    dispatching: bool = False
-    stop_hook: str = ""
-    """The one hook that stops the function, once it is decided on; called at once, or after ``on_dispatch`` has returned."""
 
 
 def run_at_once(job: Job) -> None:
@@ -97,21 +77,14 @@ class SkillsetEngine:
         semantics.check_supported(skillset)
         _check_hooks(skillset, hooks)
         self.skillset = skillset
-        self._clock_ns = clock_ns
         self._hooks = dict(hooks)
-        self._listener = listener
         self._data: Data = {} if data is None else data
         self._defer = defer
         self._on_error = on_error
         self._lock = threading.Lock()
-        self._situation = semantics.initial(skillset)
-        born_ns = clock_ns()
-        self._resources = {name: ResourceStatus(state, "", born_ns) for name, state in self._situation.states.items()}
-        self._entries: dict[str, _Entry] = {}
-        self._sequence = 0
+        self._outbox = Outbox(listener, on_error)
+        self._ledger = Ledger(skillset, clock_ns, self._outbox.put)
         self._closed = ""
-        self._outbox: deque[tuple[EngineEvent, ...]] = deque()
-        self._delivering = False
 
     # --- what others ask for -----------------------------------------------------------------------------------------
 
@@ -127,7 +100,7 @@ class SkillsetEngine:
         """
         self.skillset.skill(skill)
         entry = self._register(skill, inputs, execution_id)
-        self._deliver()
+        self._outbox.deliver()
         if self._validated(entry):
             self._start(entry)
         return entry.execution
@@ -135,28 +108,28 @@ class SkillsetEngine:
     def transition(self, resource: str, to: str) -> TransitionReply:
         """Take an extern transition, or say why not."""
         with self._lock:
-            reason = semantics.extern_refusal(self.skillset, self._situation, resource, to)
-            stops = [] if reason else self._commit(semantics.transition(self.skillset, self._situation, resource, to))
-            reply = TransitionReply(not reason, reason, self._situation.states.get(resource, ""))
+            reason = semantics.extern_refusal(self.skillset, self._ledger.situation, resource, to)
+            stops = [] if reason else self._ledger.commit(semantics.transition(self.skillset, self._ledger.situation, resource, to))
+            reply = TransitionReply(not reason, reason, self._ledger.situation.states.get(resource, ""))
         self._after_step(stops)
         return reply
 
-    def interrupt(self, execution_id: str, message: str = "") -> bool:
+    def interrupt(self, execution_id: str) -> bool:
         """Interrupt an execution: ``on_interrupt``, then the step. False when it has ended or is not known.
 
         While ``validate`` runs, it ends at once and never starts; while ``on_dispatch`` runs, the rest follows after it.
         """
         with self._lock:
-            entry = self._entries.get(execution_id)
+            entry = self._ledger.entries.get(execution_id)
             if entry is None or entry.execution.done:
                 return False
             requested = entry.execution.state is ExecutionState.REQUESTED
             now = not (requested or entry.dispatching or entry.stop_hook)
             if requested:
-                self._end_request(entry, ExecutionState.INTERRUPTED, message or "interrupted before it started")
+                self._ledger.end_request(entry, ExecutionState.INTERRUPTED, "interrupted before it started")
             elif not entry.stop_hook:
                 entry.stop_hook = "on_interrupt"
-        self._deliver()
+        self._outbox.deliver()
         if now:
             self._stop(entry)
         return True
@@ -165,30 +138,30 @@ class SkillsetEngine:
         """End a running execution with a result of the model; False when it is not running (any more)."""
         values = dict(outputs or {})
         with self._lock:
-            entry = self._entries.get(execution_id)
-            if entry is None or entry.execution.state is not ExecutionState.RUNNING:
+            entry = self._ledger.running(execution_id)
+            if entry is None:
                 return False
             unknown = self._unknown_output(entry, values)
             if unknown:
-                step = semantics.fail(self.skillset, self._situation, entry.key, unknown)
+                step = semantics.fail(self.skillset, self._ledger.situation, entry.key, unknown)
             else:
                 entry.execution.outputs.update(values)
-                step = semantics.terminate(self.skillset, self._situation, entry.key, result, message)
-            stops = self._commit(step, by_itself=entry)
+                step = semantics.terminate(self.skillset, self._ledger.situation, entry.key, result, message)
+            stops = self._ledger.commit(step, by_itself=entry)
         self._after_step(stops)
         return True
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED; False when it has ended or is not known."""
         with self._lock:
-            entry = self._entries.get(execution_id)
+            entry = self._ledger.entries.get(execution_id)
             if entry is None or entry.execution.done:
                 return False
-            stops: list[_Entry] = []
+            stops: list[Entry] = []
             if entry.execution.state is ExecutionState.REQUESTED:
-                self._end_request(entry, ExecutionState.FAILED, message)
+                self._ledger.end_request(entry, ExecutionState.FAILED, message)
             else:
-                stops = self._commit(semantics.fail(self.skillset, self._situation, entry.key, message))
+                stops = self._ledger.commit(semantics.fail(self.skillset, self._ledger.situation, entry.key, message))
         self._after_step(stops)
         return True
 
@@ -196,8 +169,8 @@ class SkillsetEngine:
         """Keep outputs of a running execution; unknown names end it as FAILED."""
         values = dict(outputs)
         with self._lock:
-            entry = self._entries.get(execution_id)
-            if entry is None or entry.execution.state is not ExecutionState.RUNNING:
+            entry = self._ledger.running(execution_id)
+            if entry is None:
                 return
             unknown = self._unknown_output(entry, values)
             if not unknown:
@@ -208,8 +181,8 @@ class SkillsetEngine:
     def progress(self, execution_id: str) -> float | None:
         """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running."""
         with self._lock:
-            entry = self._entries.get(execution_id)
-            if entry is None or entry.execution.state is not ExecutionState.RUNNING:
+            entry = self._ledger.running(execution_id)
+            if entry is None:
                 return None
             execution = entry.execution
             if entry.dispatching or entry.stop_hook:
@@ -222,48 +195,48 @@ class SkillsetEngine:
         execution.progress = value
         return None if execution.done else value
 
+    def fail_all(self, message: str) -> None:
+        """End whatever was asked for or runs as FAILED."""
+        for execution in self.executions:
+            self.fail(execution.id, message)
+
     def close(self, message: str) -> None:
         """Fail whatever runs, for ``message``, and refuse all later requests for the same reason."""
         with self._lock:
             self._closed = message
-            unfinished = list(self._entries)
-        for execution_id in unfinished:
-            self.fail(execution_id, message)
+        self.fail_all(message)
 
     @property
     def resources(self) -> dict[str, ResourceStatus]:
         """Return all resources at one moment."""
         with self._lock:
-            return dict(self._resources)
+            return dict(self._ledger.resources)
 
     @property
     def executions(self) -> tuple[Execution, ...]:
         """Return those that have not ended."""
         with self._lock:
-            return tuple(entry.execution for entry in self._entries.values() if not entry.execution.done)
+            return tuple(entry.execution for entry in self._ledger.entries.values() if not entry.execution.done)
 
     def execution(self, execution_id: str) -> Execution | None:
         """Return one that has not ended, or None."""
         with self._lock:
-            entry = self._entries.get(execution_id)
+            entry = self._ledger.entries.get(execution_id)
         return None if entry is None or entry.execution.done else entry.execution
 
     # --- a request's way ---------------------------------------------------------------------------------------------
 
-    def _register(self, skill: str, inputs: object, execution_id: str) -> _Entry:
+    def _register(self, skill: str, inputs: object, execution_id: str) -> Entry:
         with self._lock:
-            if not execution_id:
-                execution_id = str(self._sequence + 1)
-            if execution_id in self._entries:
+            execution_id = execution_id or str(self._ledger.sequence + 1)
+            if execution_id in self._ledger.entries:
                 raise SkillRuntimeError(f"skill {skill}: the execution id {execution_id} is in use")
-            entry = _Entry(Execution(self, execution_id, skill, inputs), Running(execution_id, skill))
-            self._entries[execution_id] = entry
-            self._outbox.append((self._entered(entry.execution),))
+            entry = self._ledger.add(Execution(self, execution_id, skill, inputs))
             if self._closed:
-                self._end_request(entry, ExecutionState.NOT_VALIDATED, self._closed)
+                self._ledger.end_request(entry, ExecutionState.NOT_VALIDATED, self._closed)
         return entry
 
-    def _validated(self, entry: _Entry) -> bool:
+    def _validated(self, entry: Entry) -> bool:
         """Call ``validate``; tell whether the request is still on."""
         if entry.execution.done:
             return False
@@ -275,148 +248,71 @@ class SkillsetEngine:
         if refusal:
             with self._lock:
                 if not entry.execution.done:
-                    self._end_request(entry, ExecutionState.NOT_VALIDATED, str(refusal))
-            self._deliver()
+                    self._ledger.end_request(entry, ExecutionState.NOT_VALIDATED, str(refusal))
+            self._outbox.deliver()
         return not entry.execution.done
 
-    def _start(self, entry: _Entry) -> None:
+    def _start(self, entry: Entry) -> None:
         """Take the start step and call ``on_dispatch``; then what was asked for meanwhile."""
         data = dict(self._data)
         with self._lock:
             if entry.execution.done:
                 return
             entry.dispatching = True
-            stops = self._commit(semantics.start(self.skillset, self._situation, entry.key, data))
+            stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, entry.key, data))
             started = entry.execution.state is ExecutionState.RUNNING
             if not started:
                 # Also when its own invariant broke in the very step: nothing was dispatched, nothing is to be stopped.
-                self._entries.pop(entry.key.id, None)
+                self._ledger.entries.pop(entry.key.id, None)
         self._after_step([other for other in stops if other is not entry])
         if started:
             self._call(entry, "on_dispatch")
             with self._lock:
                 entry.dispatching = False
                 stop = bool(entry.stop_hook) and entry.execution.state is not ExecutionState.TERMINATED
-                self._forget_if_through(entry)
+                self._ledger.forget_if_through(entry)
             if stop:
                 self._stop(entry)
 
-    def _stop(self, entry: _Entry) -> None:
+    def _stop(self, entry: Entry) -> None:
         """Call the decided stop hook; after ``on_interrupt`` take the step of the interruption."""
         self._call(entry, entry.stop_hook)
         with self._lock:
-            stops: list[_Entry] = []
+            stops: list[Entry] = []
             if entry.execution.state is ExecutionState.RUNNING:
-                stops = self._commit(semantics.interrupt(self.skillset, self._situation, entry.key), by_itself=entry)
+                stops = self._ledger.commit(semantics.interrupt(self.skillset, self._ledger.situation, entry.key), by_itself=entry)
         self._after_step(stops)
 
     # --- hooks -------------------------------------------------------------------------------------------------------
 
-    def _call(self, entry: _Entry, name: str) -> None:
+    def _call(self, entry: Entry, name: str) -> None:
         hooks = self._hooks[entry.execution.skill]
         try:
             getattr(hooks, name)(entry.execution)
         except Exception as error:  # noqa: BLE001 - as in progress
             self._hook_raised(entry, name, error)
 
-    def _hook_raised(self, entry: _Entry, hook: str, error: Exception) -> None:
+    def _hook_raised(self, entry: Entry, hook: str, error: Exception) -> None:
         """End the execution as FAILED with the last line of the traceback."""
         last_line = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
         self._on_error(f"{entry.execution}: {hook} raised\n{''.join(traceback.format_exception(error))}")
         self.fail(entry.key.id, f"{hook} raised {last_line}")
 
-    # --- steps, with the lock held -----------------------------------------------------------------------------------
+    # --- parts -------------------------------------------------------------------------------------------------------
 
-    def _commit(self, step: Step, *, by_itself: _Entry | None = None) -> list[_Entry]:
-        """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
-        self._situation = step.situation
-        events: list[EngineEvent] = []
-        stops: list[_Entry] = []
-        for happening in step.happenings:
-            if isinstance(happening, Change):
-                events.append(self._changed(happening))
-                continue
-            entry = self._entries[happening.execution.id]
-            self._set_state(entry.execution, happening)
-            events.append(self._entered(entry.execution))
-            if entry.execution.done:
-                stopping = bool(entry.stop_hook) or entry is by_itself
-                if not stopping:
-                    failed = entry.execution.state is ExecutionState.FAILED
-                    entry.stop_hook = "on_failure" if failed else "on_violation"
-                    if not entry.dispatching:
-                        stops.append(entry)
-                self._forget_if_through(entry)
-        if events:
-            self._outbox.append(tuple(events))
-        return stops
-
-    def _end_request(self, entry: _Entry, state: ExecutionState, message: str) -> None:
-        """End an execution that never started."""
-        self._set_state(entry.execution, Entered(entry.key, state, "", message))
-        self._outbox.append((self._entered(entry.execution),))
-        self._forget_if_through(entry)
-
-    def _forget_if_through(self, entry: _Entry) -> None:
-        if entry.execution.done and not entry.dispatching:
-            self._entries.pop(entry.key.id, None)
-
-    @staticmethod
-    def _set_state(execution: Execution, entered: Entered) -> None:
-        execution.result = entered.result
-        execution.message = entered.message
-        execution.state = entered.state
-
-    def _unknown_output(self, entry: _Entry, outputs: Mapping[str, object]) -> str:
+    def _unknown_output(self, entry: Entry, outputs: Mapping[str, object]) -> str:
+        """Return what is wrong with the names of outputs, or ""."""
         known = [output.name for output in self.skillset.skill(entry.execution.skill).outputs]
         unknown = [name for name in outputs if name not in known]
         if not unknown:
             return ""
         return f"skill {entry.execution.skill} has no output {', '.join(unknown)}; it has {', '.join(known) or 'none'}"
 
-    def _changed(self, change: Change) -> TransitionEvent:
-        now_ns = self._clock_ns()
-        self._sequence += 1
-        self._resources[change.resource] = ResourceStatus(change.target, change.source, now_ns)
-        return TransitionEvent(self._sequence, now_ns, change.resource, change.source, change.target, change.cause)
-
-    def _entered(self, execution: Execution) -> ExecutionEvent:
-        self._sequence += 1
-        return ExecutionEvent(
-            sequence=self._sequence,
-            stamp_ns=self._clock_ns(),
-            skill=execution.skill,
-            id=execution.id,
-            state=execution.state,
-            result=execution.result,
-            message=execution.message,
-            inputs=execution.inputs,
-            outputs=dict(execution.outputs),
-        )
-
-    # --- after a step, without the lock ------------------------------------------------------------------------------
-
-    def _after_step(self, stops: list[_Entry]) -> None:
-        """Deliver events, then have the functions of broken executions stopped."""
-        self._deliver()
+    def _after_step(self, stops: list[Entry]) -> None:
+        """Deliver events, then have the functions of executions that were ended stopped; called without the lock."""
+        self._outbox.deliver()
         for entry in stops:
-            self._defer(lambda entry=entry: self._call(entry, entry.stop_hook))  # type: ignore[misc]
-
-    def _deliver(self) -> None:
-        """Give queued events to the listener, unless another thread is at it."""
-        while True:
-            with self._lock:
-                if self._delivering or not self._outbox:
-                    return
-                self._delivering = True
-                events = self._outbox.popleft()
-            try:
-                self._listener(events)
-            except Exception as error:  # noqa: BLE001 - a listener must not stop the managers
-                self._on_error(f"the listener raised {''.join(traceback.format_exception(error))}")
-            finally:
-                with self._lock:
-                    self._delivering = False
+            self._defer(functools.partial(self._call, entry, entry.stop_hook))
 
 
 def _check_hooks(skillset: Skillset, hooks: Mapping[str, SkillHooks]) -> None:

@@ -8,7 +8,7 @@ from types import ModuleType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-LIVELINESS_LEASE_S = 2.0
+LIVELINESS_LEASE_S = 3.0
 """Without a sign of life for so long (wall clock), a manager process is dead; DDS itself sends the signs."""
 
 LATCHED = QoSProfile(

@@ -37,7 +37,7 @@ class Presence:
         self.actions: dict[str, Any] = {}
         self.clients: dict[str, Any] = {}
         self._heard = False
-        self._alive = 0
+        self._answered = False
         self._asked_s = float("-inf")
         self._describe = node.create_client(Describe, f"{skillset}/describe")
         node.create_subscription(
@@ -50,9 +50,9 @@ class Presence:
 
     def tick(self) -> None:
         """Take the next step towards being ready."""
-        if self.model is None:
+        if not self._answered:
             self._ask()
-        elif self._heard and self._alive > 0 and all(client.server_is_ready() for client in self.clients.values()):
+        elif self._heard and all(client.server_is_ready() for client in self.clients.values()):
             self.ready.set()
 
     def _ask(self) -> None:
@@ -63,9 +63,14 @@ class Presence:
 
     def _on_description(self, future: Any) -> None:
         answer = future.result()
-        if answer is None or self.model is not None:
+        if answer is None:
             return
-        model = from_json(answer.model_json)
+        self._answered = True
+        if self.model is None:
+            self._use(answer.model_json)
+
+    def _use(self, model_json: str) -> None:
+        model = from_json(model_json)
         actions = action_module(self._skillset)
         for skill in model.skills:
             self.actions[skill.name] = action_type(actions, skill.name)
@@ -77,10 +82,12 @@ class Presence:
         self._on_resources(message)
 
     def _on_liveliness(self, info: Any) -> None:
-        gone = info.alive_count < self._alive or info.not_alive_count_change > 0
-        self._alive = info.alive_count
-        # Where managers were started anew already, theirs is the last word that was heard.
-        self._heard = self._heard and self._alive > 0
-        if gone:
+        """Notice a loss by the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).
+
+        Whether others are there, managers that were started anew say themselves by describing themselves again.
+        """
+        if info.alive_count_change < 0 or info.not_alive_count_change > 0:
+            self._answered = False
+            self._asked_s = float("-inf")
             self.ready.clear()
             self._on_gone()

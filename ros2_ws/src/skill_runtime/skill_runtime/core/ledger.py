@@ -1,0 +1,125 @@
+"""What is the case in a skillset now: the situation, since when, and the executions that are not through.
+
+Not safe for threads: the engine calls it with its lock held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from skill_language.model import Skillset
+from skill_runtime.core import semantics
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from skill_runtime.core.execution import Execution, ExecutionState
+from skill_runtime.core.semantics import Change, Entered, Running, Step
+
+
+@dataclass(frozen=True)
+class ResourceStatus:
+    """A resource at one moment; ``previous`` is empty and ``stamp_ns`` that of the engine's start before the first transition."""
+
+    state: str
+    previous: str
+    stamp_ns: int
+
+
+@dataclass(eq=False)
+class Entry:
+    """An execution that has not ended, or whose ``on_dispatch`` has not returned."""
+
+    execution: Execution
+    key: Running
+    dispatching: bool = False
+    stop_hook: str = ""
+    """The one hook that stops the function, once it is decided on; called at once, or after ``on_dispatch`` has returned."""
+
+
+class Ledger:
+    """Records steps; every change comes out as an event, numbered from 1 without gaps, through ``publish``."""
+
+    def __init__(self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None]) -> None:
+        self._clock_ns = clock_ns
+        self._publish = publish
+        self.situation = semantics.initial(skillset)
+        born_ns = clock_ns()
+        self.resources = {name: ResourceStatus(state, "", born_ns) for name, state in self.situation.states.items()}
+        self.entries: dict[str, Entry] = {}
+        self.sequence = 0
+
+    def add(self, execution: Execution) -> Entry:
+        """Record a request."""
+        entry = Entry(execution, Running(execution.id, execution.skill))
+        self.entries[execution.id] = entry
+        self._publish([self._entered(execution)])
+        return entry
+
+    def running(self, execution_id: str) -> Entry | None:
+        """Return a running execution's entry."""
+        entry = self.entries.get(execution_id)
+        return entry if entry is not None and entry.execution.state is ExecutionState.RUNNING else None
+
+    def commit(self, step: Step, *, by_itself: Entry | None = None) -> list[Entry]:
+        """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
+        self.situation = step.situation
+        events: list[EngineEvent] = []
+        ended: list[Entry] = []
+        for happening in step.happenings:
+            if isinstance(happening, Change):
+                events.append(self._changed(happening))
+                continue
+            entry = self.entries[happening.execution.id]
+            _set_state(entry.execution, happening)
+            events.append(self._entered(entry.execution))
+            if entry.execution.done:
+                ended.append(entry)
+        self._publish(events)
+        for entry in ended:
+            self.forget_if_through(entry)
+        return [entry for entry in ended if entry is not by_itself and self._stop_now(entry)]
+
+    def end_request(self, entry: Entry, state: ExecutionState, message: str) -> None:
+        """End an execution that never started."""
+        _set_state(entry.execution, Entered(entry.key, state, "", message))
+        self._publish([self._entered(entry.execution)])
+        self.forget_if_through(entry)
+
+    def forget_if_through(self, entry: Entry) -> None:
+        """Drop an execution of which nothing is to come any more."""
+        if entry.execution.done and not entry.dispatching:
+            self.entries.pop(entry.key.id, None)
+
+    @staticmethod
+    def _stop_now(entry: Entry) -> bool:
+        """Decide on the stop hook of an execution that was ended, unless one is; tell whether it may be called at once."""
+        if entry.stop_hook:
+            return False
+        entry.stop_hook = "on_failure" if entry.execution.state is ExecutionState.FAILED else "on_violation"
+        return not entry.dispatching
+
+    def _changed(self, change: Change) -> TransitionEvent:
+        self.sequence += 1
+        now_ns = self._clock_ns()
+        self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns)
+        return TransitionEvent(self.sequence, now_ns, change.resource, change.source, change.target, change.cause)
+
+    def _entered(self, execution: Execution) -> ExecutionEvent:
+        self.sequence += 1
+        return ExecutionEvent(
+            sequence=self.sequence,
+            stamp_ns=self._clock_ns(),
+            skill=execution.skill,
+            id=execution.id,
+            state=execution.state,
+            result=execution.result,
+            message=execution.message,
+            inputs=execution.inputs,
+            outputs=dict(execution.outputs),
+        )
+
+
+def _set_state(execution: Execution, entered: Entered) -> None:
+    """Write the state last: who sees that the execution has ended sees why."""
+    execution.result = entered.result
+    execution.message = entered.message
+    execution.state = entered.state
