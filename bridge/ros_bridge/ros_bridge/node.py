@@ -45,15 +45,26 @@ def register_again() -> None:
         listeners.notify_added(name, uri, Registration.SRV)
 
 
+def require_types(config: BridgeConfig, types: Types) -> None:
+    """Check that every route's type can cross, before anything is opened.
+
+    Raises:
+        TypeUnknownError: A world does not have a type.
+        TypeDiffersError: The worlds lay a type out differently.
+    """
+    for topic in config.topics:
+        types.message(topic.type_name)
+        topics.interface_class(topic.type_name, "msg")
+    for service in config.services:
+        types.service(service.type_name)
+        topics.interface_class(service.type_name, "srv")
+
+
 class Bridge:
-    """All routes, running. rospy and rclpy have to be initialised."""
+    """All routes, running. rospy and rclpy have to be initialised, and the types checked."""
 
     def __init__(self, config: BridgeConfig, types: Types, master: Master) -> None:
-        """Open all routes.
-
-        Raises:
-            TypeUnknownError, TypeDiffersError: A route's type can't cross; no route is opened then.
-        """
+        """Open all routes."""
         self.stats = Stats()
         self._sequence = 0
         topic_types = [types.message(route.type_name) for route in config.topics]

@@ -427,7 +427,7 @@ def test_subscriber_that_does_not_read_loses_the_oldest_and_stalls_nobody(ros2, 
     for number in range(20):
         big.pose.position.x = float(number)
         publisher.publish(big)
-        while True:
+        while True:  # probes of wait_ros1_receives may be in between
             received = bytes.fromhex(alive.expect("message", topic="/bt/pose_down")["hex"])
             if len(received) > 1_000_000:
                 break
@@ -449,6 +449,14 @@ def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, r
         assert time.monotonic() - start < 2.0
         figures = {"count": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0}
         assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": figures}, "services": {}}
+
+
+def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):
+    nobody = Master(free_port())
+    process = BridgeProcess(nobody, tmp_path, "topics: []\n")
+    wait_until(lambda: any("waiting for a ROS master" in line for line in process.lines), "it says that it waits", 20.0)
+    process.process.send_signal(signal.SIGTERM)
+    assert process.process.wait(2.0) == 0
 
 
 def test_wrong_configuration_ends_with_2_and_wrong_type_with_1(master, ros2_domain, tmp_path):
