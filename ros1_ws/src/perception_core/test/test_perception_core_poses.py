@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -90,3 +92,13 @@ def test_range_limits_drop_points_together_with_their_times() -> None:
 def test_an_empty_sweep_stays_empty_without_any_pose() -> None:
     empty = Sweep(T0, np.empty((0, 3), np.float32), np.empty(0, np.float32))
     assert deskew(empty, PoseBuffer(), np.eye(4)).shape == (0, 3)
+
+
+def test_a_measurement_waits_for_the_pose_of_its_moment():
+    poses = PoseBuffer()
+    poses.add(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    assert not poses.wait_for(NS, timeout_s=0.01)
+    late = threading.Timer(0.05, poses.add, (NS, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    late.start()
+    assert poses.wait_for(NS, timeout_s=10.0)
+    late.join()

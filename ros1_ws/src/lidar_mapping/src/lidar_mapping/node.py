@@ -75,8 +75,9 @@ class LidarMappingNode:
             self._done.done(item[1].stamp_ns)
 
     def _register(self, frame: str, sweep: Sweep) -> None:
+        poses = self._vehicle.poses_at(sweep.end_ns)
         with self._lock:
-            registration = self._mapper.add(sweep, self._vehicle.poses, self._vehicle.mount(frame))
+            registration = self._mapper.add(sweep, poses, self._vehicle.mount(frame))
             full = self._mapper.map.full
         if full:
             rospy.logwarn_throttle(10.0, f"the map is full ({self._settings.max_voxels} voxels): new surfaces are left out")

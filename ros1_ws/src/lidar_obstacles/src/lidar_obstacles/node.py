@@ -71,7 +71,7 @@ class LidarObstaclesNode:
         nearest = obstacle_ahead(
             sweep,
             T_base_lidar=self._vehicle.mount(frame),
-            poses=self._vehicle.poses,
+            poses=self._vehicle.poses_at(sweep.end_ns),
             motion=self._vehicle.motion,
             settings=self._settings.ahead,
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from threading import Lock
+from threading import Condition
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +48,7 @@ class PoseBuffer:
         self._keep_ns = int(keep_s * NS)
         self._tolerance_ns = int(tolerance_s * NS)
         self._rows: deque[tuple[int, tuple[float, ...]]] = deque()
-        self._lock = Lock()
+        self._lock = Condition()
 
     def add(self, stamp_ns: int, position_m: Sequence[float], quat_xyzw: Sequence[float]) -> None:
         """Remember a pose; time that jumps backwards (a restarted clock) clears the memory."""
@@ -58,6 +58,15 @@ class PoseBuffer:
             self._rows.append((stamp_ns, (*position_m, *quat_xyzw)))
             while self._rows[0][0] < stamp_ns - self._keep_ns:
                 self._rows.popleft()
+            self._lock.notify_all()
+
+    def wait_for(self, stamp_ns: int, *, timeout_s: float) -> bool:
+        """Wait until a pose of this moment or later is known, at most ``timeout_s`` of wall clock; return whether it is.
+
+        A measurement and the pose of its moment come on different ways: without the wait, the pose before it would have to do.
+        """
+        with self._lock:
+            return self._lock.wait_for(lambda: bool(self._rows) and self._rows[-1][0] >= stamp_ns, timeout=timeout_s)
 
     def at(self, stamps_ns: Sequence[int]) -> Poses:
         """Return the poses at these moments, in any order; raise PoseUnavailableError when one of them is out of reach."""

@@ -103,7 +103,7 @@ class ZedDepthNode:
             pair.stamp_ns,
             geometry=geometry,
             T_base_camera=self._vehicle.mount(self._frame),
-            poses=self._vehicle.poses,
+            poses=self._vehicle.poses_at(pair.stamp_ns),
             motion=self._vehicle.motion,
             settings=self._settings.ahead,
         )

@@ -30,7 +30,8 @@ class ZedSettings:
     speckle_px: int = 120
     speckle_range_px: int = 2
     left_right_px: int = 1
-    min_texture: float = 2.5
+    texture_per_noise: float = 1.3
+    enough_texture: float = 2.5
     # corridor
     max_range_m: float = 8.0
     stride_px: int = 2
@@ -62,7 +63,8 @@ class ZedSettings:
             speckle_px=self.speckle_px,
             speckle_range_px=self.speckle_range_px,
             left_right_px=self.left_right_px,
-            min_texture=self.min_texture,
+            texture_per_noise=self.texture_per_noise,
+            enough_texture=self.enough_texture,
         )
 
     @property

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 MEDIAN_PX = 5
 TEXTURE_PX = 21
+NOISE_KERNEL = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,9 @@ class MatcherSettings:
     """Parameters of the matching.
 
     With fx 240 px and 0.12 m between the cameras, 64 disparities reach from 0.45 m, half the vehicle's radius. The image is widened by as
-    many columns at the left, or its left ``disparities`` columns would have no depth at all. ``min_texture`` is the mean gradient along the
-    row (grey levels a pixel) below which there is nothing to match: sky and blank walls would else be matched by chance.
+    many columns at the left, or its left ``disparities`` columns would have no depth at all. Where the mean gradient along the row is below
+    ``texture_per_noise`` times the image's noise there is nothing to match: sky and blank walls would else be matched by chance. A gradient of
+    ``enough_texture`` grey levels a pixel is texture whatever the noise seems to be.
     """
 
     disparities: int = 64
@@ -56,7 +58,8 @@ class MatcherSettings:
     speckle_px: int = 120
     speckle_range_px: int = 2
     left_right_px: int = 1
-    min_texture: float = 2.5
+    texture_per_noise: float = 1.3
+    enough_texture: float = 2.5
 
 
 class StereoMatcher:
@@ -93,11 +96,19 @@ class StereoMatcher:
         return disparity
 
     def _without_texture(self, image: Gray) -> NDArray[np.bool_]:
+        least = min(self._settings.texture_per_noise * noise_level(image), self._settings.enough_texture)
         gradient = np.abs(cv2.Sobel(image, cv2.CV_16S, 1, 0, ksize=1))
         mean = cv2.boxFilter(gradient, cv2.CV_32F, (TEXTURE_PX, 1))
         # The Sobel kernel [-1 0 1] spans two pixels.
-        flat: NDArray[np.bool_] = np.asarray(mean) < 2.0 * self._settings.min_texture
+        flat: NDArray[np.bool_] = np.asarray(mean) < 2.0 * least
         return flat
+
+
+def noise_level(image: Gray) -> float:
+    """Return the deviation of the noise in grey levels, seen where the image is flattest (Immerkaer 1996); texture everywhere raises it."""
+    response = np.abs(cv2.filter2D(image, cv2.CV_16S, NOISE_KERNEL))
+    local = cv2.boxFilter(response, cv2.CV_32F, (TEXTURE_PX, 5))
+    return float(np.percentile(np.asarray(local)[::4, ::4], 1.0) * np.sqrt(np.pi / 2.0) / 6.0)
 
 
 def depth_of(disparity_px: NDArray[np.float32], geometry: StereoGeometry) -> NDArray[np.float32]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 POSES_KEPT_S = 3.0
+POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
 
 class Vehicle:
@@ -32,6 +33,11 @@ class Vehicle:
             rospy.Subscriber("/uav_guidance/state", GuidanceState, self._on_state, queue_size=1, tcp_nodelay=True),
             rospy.Subscriber("/tf_static", TFMessage, self._on_static, queue_size=10),
         ]
+
+    def poses_at(self, stamp_ns: int) -> PoseBuffer:
+        """Return the poses, those up to ``stamp_ns`` included unless they are later than `POSE_WAIT_S`; may block for that long."""
+        self.poses.wait_for(stamp_ns, timeout_s=POSE_WAIT_S)
+        return self.poses
 
     def mount(self, frame: str) -> NDArray[np.float64]:
         """Return T_base_sensor, (4, 4); raise LookupError while ``/tf_static`` has not told it."""
