@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -40,6 +41,8 @@ from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
 from skill_runtime.ros2 import RosHooks, SkillsetClient, SkillsetNode  # noqa: E402
 from skill_runtime.ros2.hooks_ros import ServiceCaller, ServiceCallError  # noqa: E402
 from skill_runtime.ros2.names import EVENTS, LIVELINESS_LEASE_S  # noqa: E402
+from skill_runtime.ros2.presence import DOUBT_S  # noqa: E402
+from skill_runtime.ros2.pursuit import Pursuit  # noqa: E402
 from skill_runtime.ros2.spin import spin_until  # noqa: E402
 
 S = ExecutionState
@@ -400,7 +403,7 @@ def process(ros2_domain):
         one.stdout.close()
 
 
-@pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + 2.0)])
+@pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + DOUBT_S + 2.0)])
 def test_nobody_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
     served = process("--ros-args", "-p", "use_sim_time:=false", "__name:=from_roslaunch")
     node = Node(f"skill_runtime_tester_{next(NUMBERS)}")
@@ -430,5 +433,25 @@ def assert_that_new_managers_are_found(client, process):
     late = client.start("goto_straight", target=(1, 2, 3), speed=1)
     assert (late.state, late.message) == (S.FAILED, "the managers of navigation are not there")
     process()
-    assert client.wait_ready(READY_S), "the client finds managers that were started anew"
+    assert client.wait_ready(READY_S)
     assert client.start("land").wait(SOON_S)
+
+
+def test_the_loss_of_others_leaves_executions_alone_and_a_restart_does_not(spinning):
+    """Two managers at once, as DDS sees it for a while after a crash: the other's end is not this one's."""
+    navigation = Navigation(spinning)
+    navigation.bring(FLYING)
+    handle = navigation.fly_straight()
+    presence = navigation.client._presence
+    lost = SimpleNamespace(alive_count_change=-1, not_alive_count_change=1)
+    asked = threading.Event()
+    presence._on_answer, before = lambda: (before(), asked.set()), presence._on_answer
+    presence._on_liveliness(lost)
+    assert asked.wait(SOON_S)
+    assert navigation.client.ready
+    assert handle.state is S.RUNNING
+    unknown = Pursuit("navigation", "goto_straight", navigation_actions.GotoStraight, presence.clients["goto_straight"])
+    unknown._acknowledge()  # of managers that are no more
+    assert unknown.handle.wait(SOON_S)
+    assert "do not know this execution" in unknown.handle.message
+    assert handle.state is S.RUNNING

@@ -42,7 +42,9 @@ class SkillsetClient:
         self._resources: dict[str, str] = {}
         self._callbacks: list[OnChange] = []
         self._open: dict[str, Pursuit] = {}
-        self._presence = Presence(node, name, self._on_resources, self._on_gone)
+        self._presence = Presence(
+            node, name, on_resources=self._on_resources, on_doubt=self._wake, on_answer=self._ask_again, on_gone=self._on_gone
+        )
         node.create_subscription(Event, f"{name}/events", self._on_event, EVENTS)
         # Runs only while there is something to wait for.
         self._timer = node.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -149,16 +151,23 @@ class SkillsetClient:
             if pursuit.restless:
                 self._timer.reset()
 
+    def _wake(self) -> None:
+        self._timer.reset()
+
+    def _ask_again(self) -> None:
+        """Have each execution's result asked for anew: managers that were started anew answer that they do not know it."""
+        for pursuit in self._pursuits():
+            pursuit.ask_again()
+
     def _on_gone(self) -> None:
         reason = f"the managers of {self.skillset} have gone: they ended, or gave no sign of life for {LIVELINESS_LEASE_S:g} s"
         for pursuit in self._pursuits():
             pursuit.abandon(reason)
-        self._timer.reset()
 
     def _tick(self) -> None:
-        if not self.ready:
+        if self._presence.restless:
             self._presence.tick()
         for pursuit in self._pursuits():
             pursuit.tick()
-        if self.ready and not any(pursuit.restless for pursuit in self._pursuits()):
+        if not self._presence.restless and not any(pursuit.restless for pursuit in self._pursuits()):
             self._timer.cancel()

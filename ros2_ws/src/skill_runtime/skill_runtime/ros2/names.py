@@ -8,8 +8,8 @@ from types import ModuleType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-LIVELINESS_LEASE_S = 3.0
-"""Without a sign of life for so long (wall clock), a manager process is dead; DDS itself sends the signs."""
+LIVELINESS_LEASE_S = 2.0
+"""Without a sign of life for so long (wall clock), a manager process is taken for dead; DDS itself sends the signs."""
 
 LATCHED = QoSProfile(
     depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

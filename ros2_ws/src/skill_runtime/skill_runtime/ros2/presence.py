@@ -18,19 +18,41 @@ from skill_language.model import Skillset
 from skill_runtime.ros2.names import ALIVE, action_module, action_type
 
 DESCRIBE_AGAIN_S = 1.0
+DOUBT_S = 1.0
+"""Managers that do not answer for so long (wall clock) after a loss was noticed are gone."""
 
 
 class Presence:
-    """Whether the managers can be called: they are alive, have described themselves, and their actions are there.
+    """Whether the managers can be called: they have described themselves, their resources were heard, their actions are there.
 
-    ``on_resources`` gets each ``ResourceStates``; ``on_gone`` is called when a manager process has ended, or its signs of
-    life (sent by DDS itself, however busy the process is) have stayed away for the lease.
+    When a manager process has ended, or its signs of life (sent by DDS itself, however busy the process is) have stayed
+    away for the lease, whoever is there is asked for its description once more. The lost one may have been another one, of
+    long ago, that DDS had not forgotten yet, and a starved process may only have been late.
+
+    Args:
+        node: serves it.
+        skillset: the skillset's name.
+        on_resources: gets each ``ResourceStates``.
+        on_doubt: called when a loss was noticed; from then on ``tick`` must be called while ``restless``.
+        on_answer: called when somebody has answered after a loss; perhaps managers that were started anew.
+        on_gone: called when nobody has.
     """
 
-    def __init__(self, node: Node, skillset: str, on_resources: Callable[[Any], None], on_gone: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        skillset: str,
+        *,
+        on_resources: Callable[[Any], None],
+        on_doubt: Callable[[], None],
+        on_answer: Callable[[], None],
+        on_gone: Callable[[], None],
+    ) -> None:
         self._node = node
         self._skillset = skillset
         self._on_resources = on_resources
+        self._on_doubt = on_doubt
+        self._on_answer = on_answer
         self._on_gone = on_gone
         self.ready = threading.Event()
         self.model: Skillset | None = None
@@ -39,6 +61,7 @@ class Presence:
         self._heard = False
         self._answered = False
         self._asked_s = float("-inf")
+        self._doubt_ends_s: float | None = None
         self._describe = node.create_client(Describe, f"{skillset}/describe")
         node.create_subscription(
             ResourceStates,
@@ -48,12 +71,21 @@ class Presence:
             event_callbacks=SubscriptionEventCallbacks(liveliness=self._on_liveliness),
         )
 
+    @property
+    def restless(self) -> bool:
+        """Tell whether ``tick`` has to be called."""
+        return self._doubt_ends_s is not None or not self.ready.is_set()
+
     def tick(self) -> None:
-        """Take the next step towards being ready."""
+        """Take the next step towards being ready, or to certainty about a loss."""
         if not self._answered:
             self._ask()
         elif self._heard and all(client.server_is_ready() for client in self.clients.values()):
             self.ready.set()
+        if self._doubt_ends_s is not None and time.monotonic() > self._doubt_ends_s:
+            self._doubt_ends_s = None
+            self.ready.clear()
+            self._on_gone()
 
     def _ask(self) -> None:
         """Ask for the description, again after a while: the answer may be lost (see ``pursuit``)."""
@@ -68,6 +100,9 @@ class Presence:
         self._answered = True
         if self.model is None:
             self._use(answer.model_json)
+        if self._doubt_ends_s is not None:
+            self._doubt_ends_s = None
+            self._on_answer()
 
     def _use(self, model_json: str) -> None:
         model = from_json(model_json)
@@ -82,12 +117,9 @@ class Presence:
         self._on_resources(message)
 
     def _on_liveliness(self, info: Any) -> None:
-        """Notice a loss by the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).
-
-        Whether others are there, managers that were started anew say themselves by describing themselves again.
-        """
+        """Notice a loss by the changes: the counts are wrong where both sides are in one process (alive from 0 to -1)."""
         if info.alive_count_change < 0 or info.not_alive_count_change > 0:
             self._answered = False
             self._asked_s = float("-inf")
-            self.ready.clear()
-            self._on_gone()
+            self._doubt_ends_s = time.monotonic() + DOUBT_S
+            self._on_doubt()

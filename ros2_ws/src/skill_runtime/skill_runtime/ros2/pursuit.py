@@ -64,6 +64,11 @@ class Pursuit:
         elif not self._acknowledged and now - self._sent_s > ACKNOWLEDGE_TIMEOUT_S:
             self.handle.fail(f"the managers of {self._skillset} did not answer within {ACKNOWLEDGE_TIMEOUT_S:g} s")
 
+    def ask_again(self) -> None:
+        """Ask for the result once more; who does not know the goal answers at once."""
+        if self._acknowledged:
+            self._goal.get_result_async().add_done_callback(self._on_result)
+
     def abandon(self, reason: str) -> None:
         """End because the managers have gone: as they last said, or else as FAILED for this reason."""
         if self._last_event is not None:
