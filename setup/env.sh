@@ -1,6 +1,8 @@
 # Sourced: the environment of one ROS world in this shell, with nothing of the other.  usage: . setup/env.sh 1|2
 # ALULA_ROOT must be set. The caller's ROS_MASTER_URI, ROS_DOMAIN_ID, ROS_LOG_DIR and display settings are kept.
 unset PYTHONHOME AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH ROS_PACKAGE_PATH ROS_ROOT ROS_DISTRO VIRTUAL_ENV
+# The ROS 2 wheels set the loader's path once a process tree and mark that with this variable; we have just unset the path.
+unset _ROS_WHEELS_BOOTSTRAP_COMPLETE
 export ALULA_ROOT ALULA_STATE="${ALULA_STATE:-$ALULA_ROOT/.alula}"
 export PYTHONUNBUFFERED=1 PYTHONNOUSERSITE=1
 # Numeric libraries: many small processes share few cores, a pool of threads in each only makes them wait for one another.
