@@ -139,7 +139,7 @@ class BridgeProcess(Lines):
         (folder / "bridge.yaml").write_text(config)
         self.stats_file = folder / "bridge_stats.json"
         command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file)]
-        super().__init__([*command, "__log:=unused"], master.environment, errors=True)
+        super().__init__([*command, f"__log:={folder}/bridge.log"], master.environment, errors=True)
 
     def wait_running(self) -> None:
         wait_until(lambda: any("bridging" in line for line in self.lines), f"the bridge runs: {self.lines}", 20.0)
