@@ -77,11 +77,12 @@ class LidarMappingNode:
     def _register(self, frame: str, sweep: Sweep) -> None:
         poses = self._vehicle.poses_at(sweep.end_ns)
         with self._lock:
+            if not self._switch.enabled:
+                return
             registration = self._mapper.add(sweep, poses, self._vehicle.mount(frame))
-            full = self._mapper.map.full
-        if full:
+            self._publish_state(sweep.stamp_ns, registration)
+        if self._mapper.map.full:
             rospy.logwarn_throttle(10.0, f"the map is full ({self._settings.max_voxels} voxels): new surfaces are left out")
-        self._publish_state(sweep.stamp_ns, registration)
 
     def _publish_state(self, stamp_ns: int, registration: Registration | None) -> None:
         count = self._mapper.count
@@ -92,7 +93,8 @@ class LidarMappingNode:
         self._state.publish(message)
 
     def _on_switch(self, _enabled: bool) -> None:  # noqa: FBT001 -- a callback's signature
-        self._publish_state(rospy.Time.now().to_nsec(), None)
+        with self._lock:  # after the scan in work: nothing contradicts this state until the next change
+            self._publish_state(rospy.Time.now().to_nsec(), None)
 
     def _publish_map(self, _event: object) -> None:
         if not self._map.get_num_connections():

@@ -48,8 +48,8 @@ class MatcherSettings:
 
     With fx 240 px and 0.12 m between the cameras, 64 disparities reach from 0.45 m, half the vehicle's radius. The image is widened by as
     many columns at the left, or its left ``disparities`` columns would have no depth at all. Where the mean gradient along the row is below
-    ``texture_per_noise`` times the image's noise there is nothing to match: sky and blank walls would else be matched by chance. A gradient of
-    ``enough_texture`` grey levels a pixel is texture whatever the noise seems to be.
+    ``texture_per_noise`` times the image's noise there is nothing to match: sky and blank walls would else be matched by chance. A gradient
+    of ``enough_texture`` grey levels a pixel is texture whatever the noise seems to be.
     """
 
     disparities: int = 64

@@ -97,8 +97,12 @@ class FakeFlight:
             rospy.set_param("/use_sim_time", self._sim_time_before)
 
     def connected(self) -> bool:
-        """Whether the node listens to the clock and to the guidance, and its health is heard."""
-        return bool(self._clock.get_num_connections() and self._pose.get_num_connections() and self._listener.get_num_connections())
+        """Whether the node listens, and its health is heard."""
+        return bool(self.listens() and self._listener.get_num_connections())
+
+    def listens(self) -> bool:
+        """Whether the node listens to the clock and to the guidance."""
+        return bool(self._clock.get_num_connections() and self._pose.get_num_connections())
 
     def run(self, seconds: float, *, until: Callable[[], bool] = lambda: False) -> bool:
         """Let simulated time pass, at most so much, and return whether the condition came true.

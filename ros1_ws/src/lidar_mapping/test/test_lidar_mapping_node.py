@@ -1,0 +1,115 @@
+"""/lidar_mapping on a live graph with its neighbours faked; the clock is the test's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rospy
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import SetBool, Trigger
+from uav_msgs.msg import MappingState
+
+from alula_testing.ros1 import end_process, wait_until
+from lidar_mapping import read_ply
+from perception_core.testing import FakeFlight
+
+NODE = str(Path(__file__).parents[1] / "scripts" / "lidar_mapping_node")
+LIDAR_HEIGHT_M = 0.1
+
+
+class Walls:
+    """A LiDAR between a wall at x = 6, one at y = 4 and the ground, in the map; the vehicle hovers at 2 m."""
+
+    def __init__(self, flight: FakeFlight) -> None:
+        self.flight = flight
+        flight.at_10_hz = self
+
+    def __call__(self, stamp_ns: int) -> None:
+        rng = np.random.default_rng(stamp_ns // 1000 % 2**31)
+        a, b = rng.uniform(-6, 6, 2000), rng.uniform(0, 4, 2000)
+        walls = [(np.full(2000, 6.0), a, b), (a, np.full(2000, 4.0), b), (a, rng.permutation(a), np.zeros(2000))]
+        points = np.vstack([np.stack(wall, axis=1) for wall in walls]) - [*self.flight.position]
+        points = np.vstack([points - [0.0, 0.0, LIDAR_HEIGHT_M], rng.uniform(-0.5, 0.5, (50, 3))])
+        self.flight.publish_cloud(stamp_ns, (points + rng.normal(0.0, 0.01, points.shape)).astype(np.float32))
+
+
+@pytest.fixture
+def flight(ros_master, start_node, tmp_path):
+    with FakeFlight("lidar_mapping") as fake:
+        fake.process = start_node([NODE, "_enabled:=false", f"_map_path:={tmp_path / 'map.ply'}"])
+        wait_until(fake.listens, timeout_s=15.0, what="/lidar_mapping is up")
+        rospy.wait_for_service("/lidar_mapping/save", timeout=10.0)
+        yield fake
+
+
+@pytest.fixture
+def states():
+    seen: list[MappingState] = []
+    subscriber = rospy.Subscriber("/lidar_mapping/state", MappingState, seen.append)
+    yield seen
+    subscriber.unregister()
+
+
+def check_map(points) -> None:
+    off = np.min(np.abs([points[:, 0] - 6, points[:, 1] - 4, points[:, 2]]), axis=0)
+    assert len(points) > 5000
+    assert np.sqrt(np.mean(off**2)) < 0.03
+    assert np.linalg.norm(points - [0, 0, 2.1], axis=1).min() > 1.1
+
+
+def test_maps_while_enabled_and_saves_on_demand_as_it_goes_and_at_the_end(flight, states, tmp_path) -> None:
+    path = tmp_path / "map.ply"
+    enable = rospy.ServiceProxy("/lidar_mapping/enable", SetBool)
+    save = rospy.ServiceProxy("/lidar_mapping/save", Trigger)
+    Walls(flight)
+    flight.run(0.5)
+    assert not any(state.scans for state in states)
+    assert enable(True).success
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 12)
+    assert states[-1].running
+    assert states[-1].fitness > 0.8
+    assert states[-1].correction_m < 0.03
+    assert states[-1].header.stamp.to_nsec() <= flight.now_ns
+    answer = save()
+    assert answer.success, answer.message
+    check_map(read_ply(path))
+    clouds: list[PointCloud2] = []
+    listener = rospy.Subscriber("/lidar_mapping/map", PointCloud2, clouds.append)
+    assert flight.run(6.0, until=lambda: bool(clouds))
+    assert (clouds[0].header.frame_id, clouds[0].width > 5000) == ("map", True)
+    listener.unregister()
+    path.unlink()
+    assert flight.run(12.0, until=path.exists)
+    assert enable(False).success
+    assert flight.run(1.0, until=lambda: not states[-1].running)
+    scans = states[-1].scans
+    flight.run(0.5)
+    assert states[-1].scans == scans
+    path.unlink()
+    path.mkdir()  # a place that can't be written
+    answer = save()
+    assert (answer.success, "map.ply" in answer.message) == (False, True)
+    path.rmdir()
+    assert enable(True).success
+    assert flight.run(3.0, until=lambda: states[-1].scans > scans)
+    end_process(flight.process)
+    check_map(read_ply(path))
+
+
+def test_started_again_after_a_crash_it_goes_on_with_map_and_work(flight, states, start_node, tmp_path) -> None:
+    Walls(flight)
+    assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 6)
+    assert rospy.ServiceProxy("/lidar_mapping/save", Trigger)().success
+    flight.process.kill()
+    flight.process.wait()
+    wait_until(lambda: not flight.listens(), timeout_s=10.0, what="/lidar_mapping's connections are gone")
+    before = len(read_ply(tmp_path / "map.ply"))
+    states.clear()
+    start_node([NODE])
+    wait_until(flight.listens, timeout_s=15.0, what="/lidar_mapping is up again")
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 1)
+    assert states[-1].running
+    assert states[-1].points >= before
