@@ -44,7 +44,7 @@ def test_ctrl_c_lands_first(fly: StartFlight) -> None:
 
 def test_second_ctrl_c_ends_at_once(fly: StartFlight) -> None:
     flight = fly()
-    flight.wait_running("takeoff")
+    flight.wait_running("goto_straight")
     flight.process.send_signal(signal.SIGINT)
     flight.wait_for("the first Ctrl-C is heard", lambda: "Ctrl-C again" in flight.words())
     flight.process.send_signal(signal.SIGINT)

@@ -22,6 +22,7 @@ from alula_flight.spec import RunSpec
 
 GIVEN_UP = 1
 LANDING_PATIENCE_S = 90.0  # wall clock; a landing from 20 m takes about 40 s
+STATE_PATIENCE_S = 10.0  # wall clock until the guidance, perhaps just started again, says how things are
 ABORT_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 STANDSTILL_PATIENCE_S = 60.0  # wall clock without a tick of the mission clock
 START_PATIENCE_S = 120.0  # wall clock until the mission clock runs
@@ -155,6 +156,8 @@ class Supervisor:
             self._watch.changed.clear()
             self._look_for_the_front()
             if self._watch.mission_exit is not None:
+                if self._watch.mission_exit != 0:
+                    self._land()  # what the mission could not bring down
                 return self._watch.mission_exit if self._watch.worst is Consequence.GO_ON else GIVEN_UP
             if self._clock.stands_still:
                 log.error("the mission clock has stood still for too long; ending the run")
@@ -186,19 +189,28 @@ class Supervisor:
                     os.kill(launch.pm.get_process(name).popen.pid, signal.SIGINT)
 
     def _land(self) -> None:
-        """Land through the guidance, because nobody decides any more; return when the vehicle is down or it takes too long."""
+        """Land through the guidance, because nobody decides any more; return when the vehicle is down or it takes too long.
+
+        Nothing is done where the vehicle is down already, or where the pilot has it.
+        """
         import rospy
         from uav_msgs.msg import GuidanceState
         from uav_msgs.srv import Command
 
-        down = threading.Event()
+        heard, down = threading.Event(), threading.Event()
+        commanded = False
 
         def look(state: Any) -> None:
+            nonlocal commanded
+            commanded = state.authority
             if not state.armed:
                 down.set()
+            heard.set()
 
         rospy.Subscriber("/uav_guidance/state", GuidanceState, look, queue_size=1)
         end = time.monotonic() + LANDING_PATIENCE_S
+        if not heard.wait(STATE_PATIENCE_S) or down.is_set() or not commanded:
+            return
         try:
             rospy.wait_for_service("/uav_guidance/land", timeout=10.0)
             answer = rospy.ServiceProxy("/uav_guidance/land", Command)()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,8 +88,10 @@ def test_what_is_not_known_is_none():
 def test_rest():
     track, world, phases = flight((10, 0, 3))
     assert rests(track, world, phases) is True
-    assert rests(track.between(0.0, phases.touch_down_s - 1.5), world, phases) is False
-    assert rests(track.between(0.0, phases.landing_s), world, phases) is False
+    lied = replace(phases, touch_down_s=phases.landing_s)
+    assert rests(track.between(0.0, phases.touch_down_s - 1.5), world, lied) is False
+    assert rests(track.between(0.0, phases.landing_s + 0.1), world, lied) is False
+    assert rests(track.between(0.0, phases.touch_down_s - 1.5), world, phases) is None, "the recording broke off before"
     assert rests(track.between(phases.zero_s + 1.0, np.inf), world, phases) is None
     assert rests(track, None, phases) is None
 

@@ -49,6 +49,25 @@ def test_guided_is_taken_once_when_the_vehicle_is_ready(flight):
     assert flight.guidance.resources() == {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND", "homepoint_status": "VALID"}
 
 
+def test_a_guidance_started_again_in_flight_reports_nothing_before_it_knows(flying):
+    flying.guidance = Guidance(Settings())
+    reported = []
+    for _ in range(60):
+        flying.run(0.05)
+        reported.append(flying.guidance.resources())
+    known = [states for states in reported if states]
+    assert known, "in the end it knows"
+    assert known[0] == known[-1] == {"SDK_authority": "AVAILABLE", "flight_status": "IN_AIR", "homepoint_status": "VALID"}
+
+
+def test_a_guidance_without_a_vehicle_says_so_after_a_while():
+    guidance = Guidance(Settings())
+    guidance.step(10.0)
+    assert guidance.resources() == {}
+    guidance.step(10.0 + Settings().link_lost_s + 0.1)
+    assert guidance.resources() == {"SDK_authority": "UNAVAILABLE", "homepoint_status": "INVALID"}
+
+
 def test_guided_is_asked_for_again_only_while_nobody_answers(flight):
     flight.vehicle.deaf = True
     flight.run(12.0)

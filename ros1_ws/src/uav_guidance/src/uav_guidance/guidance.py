@@ -57,6 +57,8 @@ class Guidance:
         self.vehicle = Vehicle()
         self._settings = settings
         self._authority = Authority()
+        self._begun_s: float | None = None
+        self._introduced = False
         self._follower = Follower(settings)
         self._reference_id = 0
         self._procedure: Procedure | None = None
@@ -115,6 +117,7 @@ class Guidance:
     def step(self, now_s: float) -> list[Command | Setpoint]:
         """Go on to this time; return what has to be sent now. To be called at 20 Hz, and whenever something has come in."""
         self._check_authority(now_s)
+        self._introduce(now_s)
         self._take_authority_at_start(now_s)
         command = self._procedure.due(now_s) if self._procedure is not None else None
         self._drop_what_ended(now_s)
@@ -128,7 +131,13 @@ class Guidance:
         return heard_s is not None and abs(now_s - heard_s) <= self._settings.link_lost_s
 
     def resources(self) -> dict[str, str]:
-        """Return the states of navigation's resources that the hardware decides; what is not known is left out."""
+        """Return the states of navigation's resources that the hardware decides; what is not known is left out.
+
+        Nothing is known before the vehicle has introduced itself: a guidance that was started again in flight must not take away from
+        the skills what they rightly have, only because it has not heard of it yet.
+        """
+        if not self._introduced:
+            return {}
         states = {
             "SDK_authority": "AVAILABLE" if self._authority.held else "UNAVAILABLE",
             "homepoint_status": "VALID" if self.vehicle.home is not None else "INVALID",
@@ -245,6 +254,14 @@ class Guidance:
             self._procedure.abort(f"authority lost: {why}")
         self._follower.heading.locked = False
         self._follower.take(None, self.vehicle, now_s)
+
+    def _introduce(self, now_s: float) -> None:
+        """Note that mode, landed state and home are known, or that they don't come (no home yet, no link) although there was time."""
+        if self._begun_s is None or now_s < self._begun_s:  # a clock that was set back
+            self._begun_s = now_s
+        vehicle = self.vehicle
+        complete = self.link(now_s) and vehicle.landed is not Landed.UNDEFINED and vehicle.home is not None
+        self._introduced |= complete or now_s - self._begun_s > self._settings.link_lost_s
 
     def _take_authority_at_start(self, now_s: float) -> None:
         """Take GUIDED once, when the vehicle stands ready on the ground; try again only if nobody answered."""
