@@ -45,6 +45,11 @@ tree_digest() { # of all files below the given folders that decide what is built
     -o -path '*/scripts/*' \) -not -path '*/__pycache__/*' -print0 2>/dev/null | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
 }
 
+model_digest() { # of the models and of what generates from them
+  ( cd "$ALULA_ROOT" && find skillsets ros2_ws/src/skill_language -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
+      -not -path '*/.*' -not -path '*/test/*' -print0 | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16 )
+}
+
 check_machine() {
   command -v apt-get >/dev/null && command -v dpkg-query >/dev/null ||
     fail "this is not a Debian-like system: there is no apt-get" "use Debian 12, or the container in docker/"
@@ -108,10 +113,11 @@ make_ros2() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
     unset PYTHONPATH LD_LIBRARY_PATH
     export AMENT_PREFIX_PATH="$ALULA_STATE/venv2" CMAKE_PREFIX_PATH="$ALULA_STATE/venv2"
+    # Only Python uses these packages: C++ support is compiled because rosidl demands it, quickly rather than well.
     cd "$ALULA_STATE/ros2" &&
       colcon --log-base "$ALULA_STATE/ros2/log" build --merge-install --symlink-install --base-paths "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge/ros_bridge" "$ALULA_STATE/generated" \
         --build-base "$ALULA_STATE/ros2/build" --install-base "$ALULA_STATE/ros2/install" \
-        --event-handlers console_cohesion+ --cmake-args -DCMAKE_BUILD_TYPE=Release \
+        --event-handlers console_cohesion+ --cmake-args -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=-O0 -DCMAKE_C_FLAGS=-O1 \
         -DPython3_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DPYTHON_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DBUILD_TESTING=OFF )
 }
 
@@ -129,7 +135,7 @@ step apt "$(digest "$ALULA_ROOT/setup/apt.txt")" install_packages "Debian packag
 step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt")-$ALULA_STATE" make_venv1 "Python packages of the ROS 1 world"
 step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
 step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src")-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
-step generated "$(find "$ALULA_ROOT/skillsets" "$ALULA_ROOT/ros2_ws/src/skill_language" -type f -not -path '*/__pycache__/*' -not -path '*/test/*' -print0 | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16)" \
+step generated "$(model_digest)" \
   generate "skillsets: interfaces, managers, bridge configuration"
 step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(cat "$ALULA_STATE/stamps/venv2")" make_ros2 "ROS 2 workspace (colcon build)"
 [ $quiet = 1 ] || echo "Alula is ready ($((SECONDS - started)) s)"
