@@ -10,7 +10,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
-import numpy
+import numpy as np
 
 WHEEL_PYTHON = "/opt/python/cp311-cp311"
 
@@ -18,7 +18,7 @@ WHEEL_PYTHON = "/opt/python/cp311-cp311"
 def replacements() -> dict[str, str]:
     """Map each path baked into the wheels to this machine's, longest first."""
     return {
-        f"{WHEEL_PYTHON}/lib/python3.11/site-packages/numpy/_core/include": numpy.get_include(),
+        f"{WHEEL_PYTHON}/lib/python3.11/site-packages/numpy/_core/include": np.get_include(),
         f"{WHEEL_PYTHON}/include/python3.11": sysconfig.get_path("include"),
     }
 
