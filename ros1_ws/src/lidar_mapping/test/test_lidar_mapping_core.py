@@ -83,7 +83,7 @@ def test_two_real_scans_are_laid_onto_each_other() -> None:
     found = register(source, np.zeros(3), Surface(target, normal_radius_m=0.9, flat_m=0.08), wide)
     error = np.linalg.inv(truth) @ found.T_corrected_given
     assert found.believed, found.refusal
-    assert np.linalg.norm(error[:3, 3]) < 0.05
+    assert np.linalg.norm(error[:3, 3]) < 0.03
     assert np.degrees(Rotation.from_matrix(error[:3, :3]).magnitude()) < 0.2
 
 
@@ -116,7 +116,8 @@ def test_a_wrong_pose_is_corrected(shift, turn) -> None:
 def test_along_bare_walls_the_pose_is_left_as_it_was_given() -> None:
     surface = Surface(downsample(room(1, bare=True), 0.3), normal_radius_m=0.6, flat_m=0.05)
     points = downsample(room(2, bare=True), 0.3) + np.array([0.1, 0.1, 0.0])
-    shift = register(points, np.array([0.0, 0.0, 2.0]), surface, RegistrationSettings()).T_corrected_given[:3, 3]
+    firm = RegistrationSettings(effective_points=100.0)
+    shift = register(points, np.array([0.0, 0.0, 2.0]), surface, firm).T_corrected_given[:3, 3]
     assert abs(shift[0]) < 0.02
     assert shift[1] == pytest.approx(-0.1, abs=0.02)
 

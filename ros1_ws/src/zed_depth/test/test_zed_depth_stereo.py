@@ -38,8 +38,9 @@ def test_motorcycle_against_its_ground_truth() -> None:
     known = np.isfinite(truth)
     both = known & np.isfinite(disparity)
     bad = np.abs(disparity - truth)[both] > 2.0
-    assert bad.mean() < 0.06  # measured: see the package's description
-    assert both.sum() / known.sum() > 0.80
+    # Measured: 5.9 % of the pixels with a disparity are off by more than 2 px, and 89 % of those with ground truth have one.
+    assert bad.mean() < 0.07
+    assert both.sum() / known.sum() > 0.85
 
 
 @pytest.mark.parametrize("disparity_px", [3.6, 6.0, 10.5, 24.0])

@@ -39,7 +39,7 @@ class RegistrationSettings:
     pose_sigma_m: float = 0.05
     pose_sigma_rad: float = 0.01
     point_sigma_m: float = 0.05
-    effective_points: float = 30.0
+    effective_points: float = 10.0
 
 
 @dataclass(frozen=True)
