@@ -23,7 +23,7 @@ step() {
   printf '\n===== %s =====\n' "$title" >>"$log"
   rm -f "$stamp"
   "$function" >>"$log" 2>&1 &
-  local worker=$! width=0
+  local worker=$!
   while kill -0 $worker 2>/dev/null; do
     [ -t 1 ] && printf '\r  %-58s %3d s' "$title" $((SECONDS - begun))
     sleep 0.3
@@ -34,7 +34,7 @@ step() {
     printf '%s' "$key" >"$stamp"
   else
     printf '\n'
-    local reason; reason=$(tac "$log" | sed '/^===== /q' | grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |alula: )' | head -n 1)
+    local reason; reason=$(tac "$log" | sed '/^===== /q' | grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |.*: error ALU[0-9]+: |alula: )' | head -n 1)
     fail "'$title' failed: ${reason:-see the log}" "the last lines of $log tell more; './alula setup' goes on where it stopped"
   fi
 }

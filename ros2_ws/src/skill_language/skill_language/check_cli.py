@@ -1,6 +1,7 @@
 """`python -m skill_language.check_cli FILE... [--json]`: read models and say what is wrong with them.
 
-Ends with 0 when all is well (warnings do not count), 1 when a model has errors, 2 when a file can't be read.
+Ends with 0 when all is well (warnings do not count), 1 when a model has errors, 2 when a file can't be read: because it is not
+there, is no text, or is not in the notation (ALU0.. and ALU1..).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from skill_language.errors import Diagnostic, Severity, has_errors
 from skill_language.load import check_file
 
-UNREADABLE = frozenset({"ALU001", "ALU002", "ALU003"})
+UNREADABLE = ("ALU0", "ALU1")  # files, syntax
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -32,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def exit_code(findings: Sequence[Diagnostic]) -> int:
     """Return 0, 1 or 2 as in this module's docstring."""
-    if any(finding.code in UNREADABLE for finding in findings):
+    if any(finding.code.startswith(UNREADABLE) for finding in findings):
         return 2
     return 1 if has_errors(findings) else 0
 
