@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
+from skill_language.units import UNIT_IN_SI
 from skill_runtime.core.errors import DataMissingError, UnsupportedModelError
 
 States = Mapping[str, str]
@@ -19,26 +20,6 @@ _COMPARE: dict[Comparison, Callable[[Any, Any], Any]] = {
     Comparison.LE: operator.le,
     Comparison.GT: operator.gt,
     Comparison.GE: operator.ge,
-}
-
-# Messages carry SI units (REP 103); a condition may be written in others.
-UNIT_IN_SI: dict[str, float] = {
-    "": 1.0,
-    "m": 1.0,
-    "km": 1000.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "m/s": 1.0,
-    "km/h": 1 / 3.6,
-    "s": 1.0,
-    "sec": 1.0,
-    "ms": 0.001,
-    "min": 60.0,
-    "h": 3600.0,
-    "rad": 1.0,
-    "deg": 0.017453292519943295,
-    "V": 1.0,
-    "%": 0.01,
 }
 
 

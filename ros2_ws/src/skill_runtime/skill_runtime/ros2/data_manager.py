@@ -13,13 +13,13 @@ from rclpy.qos import QoSProfile
 from skillset_interfaces.srv import GetData
 
 from skill_language.model import Data, Skillset
+from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.ros2.convert import message_class, to_plain
 from skill_runtime.ros2.names import LATCHED
 
 STALE_PERIODS = 3.0
 """A value is stale when it is older than so many of the periods that the model promises."""
-
 
 QUEUE = 10
 DataBindings = Mapping[str, tuple[str, str]]
@@ -30,6 +30,11 @@ DataBindings = Mapping[str, tuple[str, str]]
 class _Received:
     value: Any
     stamp_ns: int
+
+
+def plain_value(data: Data, message: Any) -> Any:
+    """Return the message, or what it carries where the model's type is a primitive: that comes as std_msgs/Float64 and the like."""
+    return message.data if data.type in PRIMITIVES else message
 
 
 class DataManager(Mapping[str, object]):
@@ -78,7 +83,8 @@ class DataManager(Mapping[str, object]):
     def _fresh(self) -> dict[str, object]:
         with self._lock:
             received = dict(self._received)
-        return {name: value.value for name, value in received.items() if not self._stale(self._data[name], value)}
+        fresh = {name: value for name, value in received.items() if not self._stale(self._data[name], value)}
+        return {name: plain_value(self._data[name], value.value) for name, value in fresh.items()}
 
     def __getitem__(self, name: str) -> object:
         return self._fresh()[name]
