@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import socket
-import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 # DDS derives its UDP ports from the domain (RTPS 2.5, section 9.6.2.3: 7400 + 250 * domain + ...); above 101 they fall
 # into Linux's ephemeral range. 0 is everybody's default and left alone.
 DOMAINS = range(1, 102)
+RTPS_PORT, RTPS_PORTS_PER_DOMAIN = 7400, 250
 
 
 class NoFreeDomainError(Exception):
@@ -28,30 +26,34 @@ def free_port() -> int:
 
 @dataclass(frozen=True)
 class DomainClaim:
-    """A DDS domain that no other run uses as long as the lock file's descriptor is open (so also not after a crash)."""
+    """A DDS domain that no other run uses as long as the socket is open in any process (so also not after a crash)."""
 
     domain: int
-    descriptor: int
+    lock: socket.socket
 
     def release(self) -> None:
-        """Give the domain back."""
-        os.close(self.descriptor)
+        """Give the domain back, as far as this process is concerned."""
+        self.lock.close()
 
 
-def claim_domain(folder: Path | None = None) -> DomainClaim:
-    """Claim the first free domain; the kernel gives it back when the process ends, however it ends.
+def claim_domain(domains: Iterable[int] = DOMAINS) -> DomainClaim:
+    """Claim the first free domain; the kernel gives it back when the last process that has the claim ends, however it ends.
+
+    The claim is the domain's first RTPS port, but of TCP, on loopback: it reaches exactly as far as the domain does, over all users
+    and containers that share the network.
 
     Raises:
-        NoFreeDomainError: 101 runs hold one each.
+        NoFreeDomainError: all are taken.
     """
-    folder = folder or Path(tempfile.gettempdir()) / f"alula-domains-{os.getuid()}"
-    folder.mkdir(parents=True, exist_ok=True)
-    for domain in DOMAINS:
-        descriptor = os.open(folder / str(domain), os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    tried = 0
+    for domain in domains:
+        lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
+            lock.bind(("127.0.0.1", RTPS_PORT + RTPS_PORTS_PER_DOMAIN * domain))
+            lock.listen(1)
+        except OSError:
+            lock.close()
+            tried += 1
         else:
-            return DomainClaim(domain, descriptor)
-    raise NoFreeDomainError(f"all DDS domains {DOMAINS.start} to {DOMAINS.stop - 1} are in use; end some runs first")
+            return DomainClaim(domain, lock)
+    raise NoFreeDomainError(f"all {tried} DDS domains are in use by other runs on this machine; end some first")

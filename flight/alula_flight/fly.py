@@ -20,7 +20,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from alula_flight.claims import claim_domain, free_port
+from alula_flight.claims import DomainClaim, NoFreeDomainError, claim_domain, free_port
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run, sweep_shared_memory
@@ -93,8 +93,8 @@ def _die_with_parent() -> None:
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
-def start_supervisor(spec: RunSpec, spec_path: Path) -> subprocess.Popen[bytes]:
-    """Start the supervisor in a session of its own, so that a Ctrl-C reaches the front only."""
+def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subprocess.Popen[bytes]:
+    """Start the supervisor in a session of its own, so that a Ctrl-C reaches the front only; it shares the claim."""
     out = Path(spec.out_dir)
     environment = {
         **os.environ,
@@ -113,6 +113,7 @@ def start_supervisor(spec: RunSpec, spec_path: Path) -> subprocess.Popen[bytes]:
             stdout=log,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            pass_fds=(claim.lock.fileno(),),
             preexec_fn=_die_with_parent,  # noqa: PLW1509  (one prctl, no allocation)
         )
 
@@ -120,8 +121,9 @@ def start_supervisor(spec: RunSpec, spec_path: Path) -> subprocess.Popen[bytes]:
 class Front:
     """Watches the supervisor; the first Ctrl-C lands the vehicle, the second ends everything at once."""
 
-    def __init__(self, spec: RunSpec, say: Callable[[str], None]) -> None:
+    def __init__(self, spec: RunSpec, claim: DomainClaim, say: Callable[[str], None]) -> None:
         self._spec = spec
+        self._claim = claim
         self._say = say
         self._interrupts = 0
         self._supervisor: subprocess.Popen[bytes] | None = None
@@ -130,7 +132,7 @@ class Front:
         """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, lambda *_: self._interrupted())
-        supervisor = self._supervisor = start_supervisor(self._spec, spec_path)
+        supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
         live = LiveEvents(Path(self._spec.out_dir), self._say)
         try:
             while supervisor.poll() is None and self._interrupts < 2:
@@ -204,10 +206,10 @@ def main(arguments: list[str]) -> int:
     """Fly; return 0 accomplished, 1 given up, 2 could not start."""
     try:
         request = parse(arguments)
-    except RequestError as error:
+        claim = claim_domain()
+    except (RequestError, NoFreeDomainError) as error:
         sys.stderr.write(f"alula fly: {error}\n")
         return CANNOT_START
-    claim = claim_domain()
     spec = RunSpec(**{**request.__dict__, "domain": claim.domain})
     out = Path(spec.out_dir)
     try:
@@ -225,7 +227,7 @@ def main(arguments: list[str]) -> int:
 
     failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
     say(f"flying '{spec.scenario}', seed {spec.seed}{failing}; results in {out}")
-    code = Front(spec, say).fly(spec_path)
+    code = Front(spec, claim, say).fly(spec_path)
     say("making the report")
     return finish(spec, code)
 

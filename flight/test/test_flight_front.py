@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula_flight.claims import claim_domain, free_port
+from alula_flight.claims import NoFreeDomainError, claim_domain, free_port
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
@@ -85,14 +85,26 @@ def test_real_autopilot_takes_the_place_of_the_simulator(tmp_path):
     assert {"simulate:=false", "autopilot:=udpin:127.0.0.1:14550"} <= set(spec.launch_arguments())
 
 
-def test_parallel_runs_get_different_domains_and_give_them_back(tmp_path):
-    first, second = claim_domain(tmp_path), claim_domain(tmp_path)
+def test_parallel_runs_get_different_domains_and_give_them_back():
+    first, second = claim_domain(), claim_domain()
     assert first.domain != second.domain
+    with pytest.raises(NoFreeDomainError):
+        claim_domain([first.domain, second.domain])
     first.release()
-    third = claim_domain(tmp_path)
-    assert third.domain == first.domain
+    again = claim_domain([second.domain, first.domain])
+    assert again.domain == first.domain
     second.release()
-    third.release()
+    again.release()
+
+
+def test_a_domain_stays_claimed_as_long_as_anybody_has_the_claim():
+    claim = claim_domain()
+    heir = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, pass_fds=(claim.lock.fileno(),))
+    claim.release()
+    with pytest.raises(NoFreeDomainError):
+        claim_domain([claim.domain])
+    heir.communicate(b"\n")
+    claim_domain([claim.domain]).release()
 
 
 def test_free_port_can_be_bound():
