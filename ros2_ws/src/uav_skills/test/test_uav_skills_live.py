@@ -40,7 +40,7 @@ def test_a_takeoff_that_does_not_climb_is_blocked_and_stopped(rig):
     rig.functional.vehicle.stuck = True
     handle = rig.start("navigation", "takeoff", height=3.0, speed=2.0)
     assert rig.ended(handle) == ("TERMINATED", "BLOCKED")
-    assert rig.functional.names() == ["takeoff", "hover"]
+    rig.wait(lambda: rig.functional.names() == ["takeoff", "hover"])
     assert rig.functional.vehicle.still_s < 7.0
 
 
@@ -78,7 +78,7 @@ def test_interrupting_at_once_still_stops_last(rig):
     handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
     handle.interrupt()
     assert rig.ended(handle)[0] == "INTERRUPTED"
-    rig.wait(lambda: not rig.functional.names() or rig.functional.names()[-1] == "hover")
+    rig.wait(lambda: rig.functional.names()[-1:] == ["hover"])
 
 
 def test_a_refused_flight_carries_the_reason(rig):
@@ -111,6 +111,7 @@ def test_a_flight_whose_reference_is_lost_aborts(rig, how):
         vehicle.silent = True
     assert rig.ended(handle) == ("TERMINATED", "ABORTED")
     assert "does not follow this reference" in handle.message
+    rig.wait(lambda: rig.functional.names()[-1:] == ["hover"])
 
 
 def test_losing_the_authority_ends_the_flight_without_another_command(rig):

@@ -31,10 +31,11 @@ class Rig:
         self.executor = SingleThreadedExecutor()
         sim_time = [Parameter("use_sim_time", value=True)]
         self.nodes = []
+        self._hooks: list[object] = []
         for name in ("navigation", "perception", "mapping"):
             model = importlib.import_module(f"{name}_managers.model")
             interfaces = importlib.import_module(f"{name}_interfaces.action")
-            make_hooks = importlib.import_module(f"uav_skills.{name}").make_hooks
+            make_hooks = self._kept(importlib.import_module(f"uav_skills.{name}").make_hooks)
             self.nodes.append(
                 SkillsetNode(model.SKILLSET, interfaces, make_hooks, data_bindings=model.DATA_TOPICS, parameter_overrides=sim_time)
             )
@@ -47,7 +48,22 @@ class Rig:
         self._thread.start()
         assert all(client.wait_ready(20.0) for client in self.clients.values())
 
+    def _kept(self, make_hooks):
+        def make(node):
+            hooks = make_hooks(node)
+            self._hooks += hooks.values()
+            return hooks
+
+        return make
+
+    def _calls_are_answered(self) -> bool:
+        """Tell whether no call of a test before is still on its way: it would look like one of the next test's."""
+        apis = [api for hook in self._hooks for api in vars(hook).values() if hasattr(api, "_calls")]
+        assert apis, "the hooks have no functional interface any more: look here"
+        return not any(api._calls._calls for api in apis)
+
     def prepare(self) -> None:
+        self.wait(self._calls_are_answered)
         self.functional.reset()
         for (skillset, resource), state in READY.items():
             self.set(skillset, resource, state)
