@@ -23,6 +23,7 @@ from skill_language.model import Skillset, Span
 _CONDITIONS: dict[str, type] = {
     "resource": model.ResourceIs,
     "data": model.DataIs,
+    "running": model.SkillRuns,
     "constant": model.Constant,
     "not": model.Not,
     "and": model.And,
