@@ -171,7 +171,10 @@ class Transition:
 
 @dataclass(frozen=True)
 class Resource:
-    """A state machine. ``states`` keeps the order of the source; ``all_transitions`` tells that they were written ``all``."""
+    """A state machine. ``states`` keeps the order of the source.
+
+    ``all_transitions`` tells that every arrow that is not extern was asked for by ``transition all``; they are in ``transitions``.
+    """
 
     name: str
     states: tuple[str, ...]
@@ -258,7 +261,9 @@ class Invariant:
 
 @dataclass(frozen=True)
 class Progress:
-    """Every ``period_s`` seconds a running skill reports; ``message`` names the type of the report, or is empty.
+    """Every ``period_s`` seconds a running skill reports.
+
+    ``message`` names the type of the report, or is empty; ``outputs`` are the values in it that have names of their own.
 
     An execution that has not made progress for ``deadline_s`` seconds is stuck; None where no deadline is given.
     """
@@ -266,6 +271,7 @@ class Progress:
     period_s: float
     message: str = ""
     deadline_s: float | None = None
+    outputs: tuple[Parameter, ...] = ()
     span: Span = field(default=NOWHERE, compare=False)
 
 
