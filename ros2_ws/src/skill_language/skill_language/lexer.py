@@ -84,7 +84,7 @@ _TOKEN = re.compile(
     r"""(?P<space>[ \t\r\f\v]+)
       | (?P<newline>\n)
       | (?P<comment>//[^\n]*)
-      | (?P<block>/\*(?:[^*]|\*(?!/))*\*/)
+      | (?P<block>/\*(?s:.*?)\*/)
       | (?P<endless>/\*)
       | (?P<NAME>[A-Za-z_][A-Za-z0-9_]*)
       | (?P<NUMBER>-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)

@@ -236,7 +236,7 @@ class Hold:
     """How patient an invariant is (``fps >= 10 for 2 s recovers at 12``).
 
     It is broken when its condition has been false for ``for_s`` seconds without a break. With ``hysteresis`` a value that fell
-    through the condition's threshold is good again only from that value on (in ``unit``, empty for the SI unit).
+    through the condition's threshold is good again only from that value on (in ``unit``, empty for the condition's own).
     """
 
     for_s: float = 0.0
