@@ -12,7 +12,9 @@ Variables: the bits of each resource's state; for each skill ``runs k``: at leas
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -50,6 +52,16 @@ class Update:
     starts: str = ""
 
 
+@dataclass(frozen=True)
+class Cluster:
+    """Skills whose violations touch what another of them needs; those of different clusters take effect in any order alike."""
+
+    skills: tuple[str, ...]
+    broken: tuple[str, ...]
+    idle: Any
+    """None of its executions is found broken."""
+
+
 @dataclass
 class Encoded:
     """A skillset in diagrams: its steps, its marks (which invariant breaks first) and violations, and what can go wrong."""
@@ -69,6 +81,7 @@ class Encoded:
     inner: dict[tuple[str, ...], Any] = field(default_factory=dict)
     startable: dict[str, Any] = field(default_factory=dict)
     crowded: dict[str, Any] = field(default_factory=dict)
+    clusters: list[Cluster] = field(default_factory=list)
     idle: Any = None
     """No execution is found broken: the step is over."""
 
@@ -184,24 +197,55 @@ def encode(abstraction: Abstraction, copies: int) -> Encoded:
     for breaker in abstraction.breakers:
         name = broken_name(breaker.skill, breaker.invariant)
         model.steps.append(Update(model.runs(breaker.skill) & model.term(breaker.when), {name: True}))
-    model.idle = model.all_of(~model.bdd.var(name) for name in model.violations)
+    model.steps = _distinct(model)
+    model.clusters = [_cluster(model, skills) for skills in _entangled(model.skillset)]
+    model.idle = model.all_of(cluster.idle for cluster in model.clusters)
     return model
 
 
+def _distinct(model: Encoded) -> list[Update]:
+    """Return the steps that can be taken at all, those that do the same once."""
+    steps = {(step.guard, tuple(sorted(step.values.items())), step.ends): step for step in model.steps if step.guard != model.bdd.false}
+    return list(steps.values())
+
+
+def _cluster(model: Encoded, skills: Sequence[Skill]) -> Cluster:
+    broken = tuple(broken_name(skill.name, invariant.name) for skill in skills for invariant in skill.invariants)
+    idle = model.all_of(~model.bdd.var(name) for name in broken)
+    return Cluster(tuple(skill.name for skill in skills), broken, idle)
+
+
+def _entangled(skillset: Skillset) -> list[list[Skill]]:
+    """Return groups of skills with invariants: two are together when what one's violations write concerns the other."""
+    groups: list[tuple[list[Skill], set[str], set[str]]] = []
+    for skill in skillset.skills:
+        if not skill.invariants:
+            continue
+        writes = {change.resource for invariant in skill.invariants for change in invariant.effect.assignments}
+        asked = [atom for invariant in skill.invariants for atom in atoms(invariant.condition)]
+        concerns = writes | {atom.resource for atom in asked if isinstance(atom, ResourceIs)}
+        joined, apart = [skill], []
+        for others, written, concerned in groups:
+            if writes & concerned or written & concerns:
+                joined, writes, concerns = [*others, *joined], writes | written, concerns | concerned
+            else:
+                apart.append((others, written, concerned))
+        groups = [*apart, (joined, writes, concerns)]
+    return [group for group, _, _ in groups]
+
+
 def _declared(skillset: Skillset, copies: int) -> Encoded:
-    """Declare the variables: a skill's beside the first resource that it is about."""
+    """Declare the variables: a skill's beside the resource that the fewest others are about, for small diagrams."""
     model = Encoded(skillset, cudd.BDD())
     model.bdd.configure(reordering=True)
-    placed: set[str] = set()
-    for resource in skillset.resources:
-        model.bdd.declare(*bits(skillset, resource.name))
+    about = {skill.name: _about(skill) for skill in skillset.skills}
+    wanted = Counter(itertools.chain.from_iterable(about.values()))
+    beside = {name: min(sorted(names), key=lambda one: wanted[one], default="") for name, names in about.items()}
+    for place in ("", *(resource.name for resource in skillset.resources)):
+        model.bdd.declare(*(bits(skillset, place) if place else ()))
         for skill in skillset.skills:
-            if skill.name not in placed and resource.name in _about(skill):
-                placed.add(skill.name)
+            if beside[skill.name] == place:
                 _declare_skill(model, skill, copies)
-    for skill in skillset.skills:
-        if skill.name not in placed:
-            _declare_skill(model, skill, copies)
     model.bdd.declare(ENDED)
     model.copies = {s.name: 1 if _alone(model, s) else copies for s in skillset.skills}
     return model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from skill_language.prove.bdd_model import ENDED, Encoded, Update
+from skill_language.prove.bdd_model import ENDED, Cluster, Encoded, Update
 from skill_language.prove.limits import Deadline
 from skill_language.prove.steps import State
 
@@ -70,17 +70,23 @@ class Sets:
         return situations
 
     def _settled(self, situations: Any) -> Any:
+        """End all broken executions; those of one cluster know nothing of the others', so that one follows the other."""
+        for cluster in self.model.clusters:
+            if situations & ~cluster.idle != self.bdd.false:
+                situations = self._settled_in(cluster, situations)
+        return situations
+
+    def _settled_in(self, cluster: Cluster, situations: Any) -> Any:
         done = self.bdd.false
         while situations != self.bdd.false:
-            done |= situations & self.model.idle
-            situations &= ~self.model.idle
+            self.deadline.check()
+            done |= situations & cluster.idle
+            situations &= ~cluster.idle
             self.inside |= situations
             following = self.bdd.false
-            for name, updates in self.model.violations.items():
+            for name in cluster.broken:
                 broken = situations & self.bdd.var(name)
-                if broken == self.bdd.false:
-                    continue
-                for update in updates:
+                for update in self.model.violations[name] if broken != self.bdd.false else ():
                     watching = {skill for resource in update.changed for skill in self.model.watchers.get(resource, ())}
                     following |= self._marked(self._updated(broken, update), watching)
             situations = following
@@ -94,10 +100,9 @@ class Sets:
         With ``ending`` only steps that end an execution of this skill count.
         """
         goal = situations & self.model.idle
-        if within is not None:
-            goal |= within & self.inside
-        ended = self.bdd.var(ENDED)
-        unsettled = self._before_settling(goal & ended if ending else goal, ending)
+        if ending:
+            goal &= self.bdd.var(ENDED)
+        unsettled = self._before_settling(goal, self.bdd.false if within is None else within, ending)
         result = self.bdd.false
         for update in self.model.steps:
             self.deadline.check()
@@ -112,25 +117,32 @@ class Sets:
             values = {**values, ENDED: True}
         return update.guard & self.bdd.let(dict(values), situations)
 
-    def _before_settling(self, goal: Any, ending: str) -> Any:
-        """Return the situations, right after an update, that settle to the goal."""
-        marked = goal
-        while True:
-            self.deadline.check()
-            unmarked = self._before_marking(marked)
-            earlier = self.bdd.false
-            for name, updates in self.model.violations.items():
-                for update in updates:
-                    earlier |= self._undone(unmarked, update, ending) & self.bdd.var(name) & self.inside
-            if earlier & ~marked == self.bdd.false:
-                return unmarked
-            marked |= earlier
+    def _before_settling(self, goal: Any, within: Any, ending: str) -> Any:
+        """Return the situations, right after an update, that settle to the goal or come to be within on the way."""
+        for cluster in reversed(self.model.clusters):
+            seeds = within & self.inside & ~cluster.idle
+            goal = self._before_settling_in(cluster, goal | seeds, ending)
+        return self._before_marking(goal, self.model.marks)
 
-    def _before_marking(self, situations: Any) -> Any:
-        for marks in self.model.marks.values():
+    def _before_settling_in(self, cluster: Cluster, goal: Any, ending: str) -> Any:
+        fresh = goal
+        while fresh != self.bdd.false:
+            self.deadline.check()
+            unmarked = self._before_marking(fresh, cluster.skills)
+            earlier = self.bdd.false
+            for name in cluster.broken:
+                here = self.inside & self.bdd.var(name)
+                for update in self.model.violations[name]:
+                    earlier |= self._undone(unmarked, update, ending) & here
+            fresh = earlier & ~goal
+            goal |= fresh
+        return goal
+
+    def _before_marking(self, situations: Any, skills: Iterable[str]) -> Any:
+        for skill in skills:
+            marks = self.model.marks.get(skill, [])
             unmarked = self.model.all_of(~self.bdd.var(name) for name, _ in marks)
-            changed = self.bdd.false
-            left = situations
+            changed, left = self.bdd.false, situations
             for name, first_false in marks:
                 found = unmarked & first_false
                 changed |= found & self.bdd.let({name: True}, situations)
@@ -144,14 +156,29 @@ class Sets:
         found = goal & self.reached
         fresh = found
         while fresh != self.bdd.false:
-            fresh = self.before(fresh) & allowed & ~found
-            found |= fresh
+            # What is found goes on being used in the same round: right after an update, a situation of ``found`` is settled.
+            ways = self._before_settling(fresh & self.model.idle, self.bdd.false, "")
+            before = found
+            for update in self.model.steps:
+                self.deadline.check()
+                earlier = self._undone(ways, update, "") & allowed & ~found
+                found |= earlier
+                ways |= earlier
+            fresh = found & ~before
         return found
 
     # --- single situations ----------------------------------------------------------------------------------------
 
     def contains(self, situations: Any, state: State) -> bool:
         """Tell whether a situation is in a set."""
+        return bool(self.bdd.let(self._values(state), situations) == self.bdd.true)
+
+    def only(self, states: Iterable[State]) -> Any:
+        """Return the set of these situations."""
+        values = ({name: value for name, value in self._values(state).items() if name != ENDED} for state in states)
+        return self.model.any_of(self.bdd.cube(one) for one in values)
+
+    def _values(self, state: State) -> dict[str, bool]:
         values: dict[str, bool] = dict.fromkeys(self.bdd.vars, False)
         for resource, value in zip(self.model.skillset.resources, state.resources, strict=True):
             values |= self.model.values_of(resource.name, value)
@@ -160,7 +187,7 @@ class Sets:
         for skill in set(state.running):
             for count in range(2, state.running.count(skill) + 1):
                 values[f"runs {skill} {count}"] = True
-        return bool(self.bdd.let(values, situations) == self.bdd.true)
+        return values
 
     def count(self) -> int:
         """Return how many situations are reachable, ages of executions aside."""

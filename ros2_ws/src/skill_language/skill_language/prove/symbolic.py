@@ -17,7 +17,7 @@ from skill_language.prove.local import Suspect
 from skill_language.prove.properties import failed, lasso, true_in
 from skill_language.prove.sets import Sets
 from skill_language.prove.steps import Key, World
-from skill_language.prove.walk import Walker
+from skill_language.prove.walk import MOST_IN_A_LOOP, Walker
 
 
 def search(skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int) -> list[Finding]:
@@ -144,13 +144,20 @@ class _Search:
         avoiding = self._for_ever(goal, fair=wanted.fair)
         if not self._reaches(begins & avoiding):
             return None
-        moves = self.walker.to(begins & avoiding)
-        if moves is None:
-            return _unsure(wanted)
-        graph, looked = self.walker.graph(moves, avoiding)
         condition = wanted.condition if wanted.kind is PropertyKind.EVENTUALLY else wanted.consequence or Constant(value=False)
-        closed = [n not in looked or true_in(self.world, condition, state) for n, state in enumerate(graph.states)]
-        return lasso(graph, wanted, [len(moves)], closed) or _unsure(wanted)
+        suspected = begins & avoiding & self.sets.reached
+        while suspected != self.sets.bdd.false:
+            moves = self.walker.to(suspected)
+            if moves is None:
+                return _unsure(wanted)
+            graph, looked = self.walker.graph(moves, avoiding)
+            closed = [n not in looked or true_in(self.world, condition, state) for n, state in enumerate(graph.states)]
+            refuted = lasso(graph, wanted, [len(moves)], closed)
+            if refuted is not None or len(looked) >= MOST_IN_A_LOOP:
+                return refuted or _unsure(wanted)
+            # All that can follow was looked at: what led here are steps that come back to where they began.
+            suspected &= ~self.sets.only(graph.states[number] for number in looked)
+        return None
 
     def _for_ever(self, goal: Any, *, fair: bool) -> Any:
         """Return all from which a run may avoid the goal for ever (Emerson and Lei's greatest fixpoint), or more."""

@@ -13,7 +13,7 @@ from skill_language.prove.explore import Edge, Graph
 from skill_language.prove.sets import Sets
 from skill_language.prove.steps import Key, Move, State, World
 
-_MOST_IN_A_LOOP = 500
+MOST_IN_A_LOOP = 500
 
 
 class Walker:
@@ -77,7 +77,7 @@ class Walker:
         graph.numbers[path[-1]] = len(moves)
         looked: set[int] = set()
         todo = deque([len(moves)])
-        while todo and len(looked) < _MOST_IN_A_LOOP:
+        while todo and len(looked) < MOST_IN_A_LOOP:
             self.sets.deadline.check()
             number = todo.popleft()
             if number in looked or not self.sets.contains(inside, graph.states[number]):
