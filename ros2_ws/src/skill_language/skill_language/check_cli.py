@@ -1,5 +1,6 @@
 """`python -m skill_language.check_cli FILE... [--json] [--strict] [--to rl|paper]`: read models and say what is wrong with them.
 
+A model without errors is handed to the prover (``--no-proofs`` leaves that out), what that finds is told with the rest.
 Ends with 0 when all is well (warnings do not count, unless ``--strict``), 1 when a model has errors, 2 when a file can't be read.
 With ``--to`` the models are printed in that notation instead, findings go to the standard error stream.
 """
@@ -24,6 +25,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
     options = _parser().parse_args(arguments)
     files = check_files(list(dict.fromkeys(options.files)))
+    if options.proofs and options.to is None:
+        _prove(files, options.time)
     for file in files:
         file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
     findings = [finding for file in files for finding in file.findings]
@@ -45,9 +48,22 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="alula check", description="Check skill models.")
     parser.add_argument("files", nargs="+", metavar="FILE", help="skillsets in the paper's notation (*.skill) or the Robot Language (*.rl)")
     parser.add_argument("--json", action="store_true", help="print the findings as one JSON object instead of text")
+    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
+    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long a skillset's proofs may take (30)")
     parser.add_argument("--strict", action="store_true", help="make errors of warnings")
     parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
     return parser
+
+
+def _prove(files: Sequence[ModelFile], timeout_s: float) -> None:
+    """Add the prover's findings about every skillset of a file that is free of errors."""
+    # The prover brings its solvers along, which nobody should wait for who only converts.
+    from skill_language.prove import prove
+
+    for file in files:
+        if not has_errors(file.findings) and not file.damaged:
+            for skillset in file.skillsets:
+                file.add(finding.diagnostic() for finding in prove(skillset, timeout_s=timeout_s))
 
 
 def _convert(files: Sequence[ModelFile], notation: Notation, code: int) -> int:

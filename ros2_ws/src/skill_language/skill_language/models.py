@@ -6,7 +6,7 @@ A skillset that says `use other` knows the types of skillset `other`, which is i
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -39,6 +39,12 @@ class ModelFile:
         """Something could not be read."""
         return self.document is None or self.document.damaged
 
+    def add(self, findings: Iterable[Diagnostic]) -> None:
+        """Add findings, in the order of the source, each with the line that it is about."""
+        lines = self.text.split("\n")
+        found = [_with_line(finding, lines) for finding in findings]
+        self.findings = sorted((*self.findings, *found), key=lambda d: (d.span.line, d.span.column, d.code))
+
 
 def check_files(paths: Sequence[str | Path]) -> list[ModelFile]:
     """Read and check files together; all trouble is in their findings, in the order of the source."""
@@ -54,9 +60,7 @@ def check_texts(files: Sequence[ModelFile], notation: Notation | None = None) ->
             file.findings += source.diagnostics
     _resolve(files)
     for file in files:
-        lines = file.text.split("\n")
-        found = [_with_line(finding, lines) for finding in _meaning(file)]
-        file.findings = sorted((*file.findings, *found), key=lambda d: (d.span.line, d.span.column, d.code))
+        file.add(_meaning(file))
     return list(files)
 
 
@@ -125,7 +129,7 @@ def _resolved(file: ModelFile, skillset: Skillset, known: Mapping[str, Skillset]
         if types is None:
             message = f"`{skillset.name}` uses `{use}`, which is no skillset of these files, nor a file beside this one"
             hint = nearest(use, set(known) - {skillset.name})
-            file.findings.append(_with_line(Diagnostic("ALU224", message, skillset.span, hint=hint), file.text.split("\n")))
+            file.add([Diagnostic("ALU224", message, skillset.span, hint=hint)])
         names += types or ()
     return with_known_types(skillset, names)
 

@@ -118,5 +118,10 @@ def occurring(initial: str, transitions: tuple[Transition, ...]) -> tuple[str, .
 
 
 def every_arrow(states: tuple[str, ...], *, extern: bool = False) -> tuple[Transition, ...]:
-    """Return what `transition all` (or `extern all`) stands for: each state to each other."""
-    return tuple(Transition(source, target, extern) for source in states for target in states if source != target)
+    """Return what `transition all` (or `extern all`) stands for.
+
+    Skills may take the resource from each state to each, to the one that it is in as well: nothing is wrong with an effect that
+    finds it there. The functional layer reports changes, and from a state to itself there is none.
+    """
+    pairs = ((source, target) for source in states for target in states if source != target or not extern)
+    return tuple(Transition(source, target, extern) for source, target in pairs)
