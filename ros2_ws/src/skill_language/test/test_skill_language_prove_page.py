@@ -12,8 +12,8 @@ from skill_language.models import check_files
 from skill_language.prove import CODES, prove
 
 PAGE = next(p / "skillsets" / "PROOFS.md" for p in Path(__file__).resolve().parents if (p / "skillsets" / "PROOFS.md").exists())
-SECTION = re.compile(r"^### (ALU\d+): (.*?)\n(.*?)(?=^### |\Z)", re.M | re.S)
-BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.S)
+SECTION = re.compile(r"^### (ALU\d+): (.*?)\n(.*?)(?=^### |\Z)", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 SECTIONS = {code: (title, BLOCK.findall(body)) for code, title, body in SECTION.findall(PAGE.read_text())}
 WITH_EXAMPLE = sorted(set(CODES) - {"ALU540"})
 

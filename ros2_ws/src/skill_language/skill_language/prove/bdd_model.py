@@ -237,7 +237,7 @@ def _entangled(skillset: Skillset) -> list[list[Skill]]:
 def _declared(skillset: Skillset, copies: int) -> Encoded:
     """Declare the variables: a skill's beside the resource that the fewest others are about, for small diagrams."""
     model = Encoded(skillset, cudd.BDD())
-    model.bdd.configure(reordering=True)
+    model.bdd.configure(reordering=False)
     about = {skill.name: _about(skill) for skill in skillset.skills}
     wanted = Counter(itertools.chain.from_iterable(about.values()))
     beside = {name: min(sorted(names), key=lambda one: wanted[one], default="") for name, names in about.items()}

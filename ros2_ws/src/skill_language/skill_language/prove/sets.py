@@ -10,6 +10,10 @@ from skill_language.prove.limits import Deadline
 from skill_language.prove.steps import State
 
 
+MANY_NODES = 200_000
+"""From here on CUDD may look for a better order of the variables; below, its looking costs more than it gains (see ``bench``)."""
+
+
 class Sets:
     """The reachable situations of a skillset as one diagram, ``reached``."""
 
@@ -42,13 +46,15 @@ class Sets:
                     self.deadline.check()
                     fresh = self.after(fresh, update) & ~reached
                     reached |= fresh
+                    if len(self.bdd) > MANY_NODES:
+                        self.bdd.configure(reordering=True)
         return reached
 
     def after(self, situations: Any, update: Update) -> Any:
         """Return what a step makes of situations."""
         changed = self._updated(situations, update)
         watching = {skill for resource in update.changed for skill in self.model.watchers.get(resource, ())}
-        return self._settled(self._marked(changed, {*watching, *([update.starts] if update.starts else [])}))
+        return self._settled(changed, {*watching, *([update.starts] if update.starts else [])})
 
     def _updated(self, situations: Any, update: Update) -> Any:
         taken = situations & update.guard
@@ -69,9 +75,11 @@ class Sets:
                     situations = (situations & ~found) | (self.bdd.exist([name], found) & self.bdd.var(name))
         return situations
 
-    def _settled(self, situations: Any) -> Any:
-        """End all broken executions; those of one cluster know nothing of the others', so that one follows the other."""
+    def _settled(self, situations: Any, skills: set[str]) -> Any:
+        """Mark and end all broken executions; those of one cluster know nothing of the others', so that one follows the other."""
         for cluster in self.model.clusters:
+            self.deadline.check()
+            situations = self._marked(situations, skills.intersection(cluster.skills))
             if situations & ~cluster.idle != self.bdd.false:
                 situations = self._settled_in(cluster, situations)
         return situations
@@ -121,8 +129,8 @@ class Sets:
         """Return the situations, right after an update, that settle to the goal or come to be within on the way."""
         for cluster in reversed(self.model.clusters):
             seeds = within & self.inside & ~cluster.idle
-            goal = self._before_settling_in(cluster, goal | seeds, ending)
-        return self._before_marking(goal, self.model.marks)
+            goal = self._before_marking(self._before_settling_in(cluster, goal | seeds, ending), cluster.skills)
+        return goal
 
     def _before_settling_in(self, cluster: Cluster, goal: Any, ending: str) -> Any:
         fresh = goal
