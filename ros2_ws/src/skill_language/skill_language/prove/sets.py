@@ -9,7 +9,6 @@ from skill_language.prove.bdd_model import ENDED, Cluster, Encoded, Update
 from skill_language.prove.limits import Deadline
 from skill_language.prove.steps import State
 
-
 MANY_NODES = 200_000
 """From here on CUDD may look for a better order of the variables; below, its looking costs more than it gains (see ``bench``)."""
 
