@@ -40,11 +40,13 @@ class Solver:
         self._solver = z3.Solver(ctx=self._context)
         self._resources = {resource.name: resource for resource in skillset.resources}
         self._variables: dict[str, Any] = {}
+        self._values: dict[str, dict[str, Any]] = {}
         self._texts: dict[str, int] = {}
         for resource in skillset.resources:
-            variable = z3.Int(f"resource {resource.name}", self._context)
-            self._variables[resource.name] = variable
-            self._solver.add(variable >= 0, variable < len(resource.states))
+            # An enumeration needs no bounds, so that a question costs what it asks and not what the skillset has.
+            sort, values = z3.EnumSort(f"resource {resource.name}", [f"{resource.name} {s}" for s in resource.states], ctx=self._context)
+            self._variables[resource.name] = z3.Const(f"state {resource.name}", sort)
+            self._values[resource.name] = dict(zip(resource.states, values, strict=True))
 
     # --- questions ------------------------------------------------------------------------------------------------
 
@@ -97,8 +99,8 @@ class Solver:
 
     def state_is(self, resource: str, state: str) -> Any:
         """Return that a resource is in a state."""
-        states = self._resources[resource].states
-        return self._variables[resource] == states.index(state) if state in states else self.constant(value=False)
+        value = self._values[resource].get(state)
+        return self.constant(value=False) if value is None else self._variables[resource] == value
 
     def negation(self, term: Any) -> Any:
         """Return the opposite of a term."""
@@ -142,8 +144,8 @@ class Solver:
         return {name: self._state(model, name) for name in self._resources}
 
     def _state(self, model: Any, name: str) -> str:
-        number: int = model.eval(self._variables[name], model_completion=True).as_long()
-        return self._resources[name].states[number]
+        value: str = model.eval(self._variables[name], model_completion=True).decl().name()
+        return value.removeprefix(f"{name} ")
 
     def _told_data(self, model: Any) -> Iterator[str]:
         texts = {number: text for text, number in self._texts.items()}
