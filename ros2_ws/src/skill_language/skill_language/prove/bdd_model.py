@@ -49,7 +49,8 @@ class Update:
     values: Mapping[str, bool]
     changed: tuple[str, ...] = ()
     ends: str = ""
-    starts: str = ""
+    touches: str = ""
+    """The skill that it starts or finds broken."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ def encode(abstraction: Abstraction, copies: int) -> Encoded:
         _ends(model, skill)
     for breaker in abstraction.breakers:
         name = broken_name(breaker.skill, breaker.invariant)
-        model.steps.append(Update(model.runs(breaker.skill) & model.term(breaker.when), {name: True}))
+        model.steps.append(Update(model.runs(breaker.skill) & model.term(breaker.when), {name: True}, touches=breaker.skill))
     model.steps = _distinct(model)
     model.clusters = [_cluster(model, skills) for skills in _entangled(model.skillset)]
     model.idle = model.all_of(cluster.idle for cluster in model.clusters)
@@ -306,7 +307,7 @@ def _starts(model: Encoded, skill: Skill) -> None:
     for count in range(1, most + 1):
         room = ~model.runs(skill.name, count) & (model.runs(skill.name, count - 1) if count > 1 else model.bdd.true)
         values = model.changes(skill.start) | {runs_name(skill.name, count): True}
-        model.steps.append(Update(ready & applies & room, values, _changed(skill.start), starts=skill.name))
+        model.steps.append(Update(ready & applies & room, values, _changed(skill.start), touches=skill.name))
     for (name, first_false), invariant in zip(model.marks.get(skill.name, []), skill.invariants, strict=True):
         after = model.bdd.let(model.changes(skill.start) | {runs_name(skill.name, 1): True}, first_false)
         model.faults["after start", skill.name, invariant.name] = model.startable[skill.name] & after

@@ -120,7 +120,7 @@ def _held_twice(skillset: Skillset, graph: Graph) -> list[Finding]:
     findings: dict[tuple[str, str, str], Finding] = {}
     for number, state in enumerate(graph.states):
         for resource, first, second in _pairs(skillset, state, taken):
-            key = (resource, min(first, second), max(first, second))
+            key = (resource, first, second)
             if key not in findings:
                 value = taken[first][resource]
                 findings[key] = held_twice(skillset, resource, value, (first, second), story.to(graph, number))
@@ -131,7 +131,13 @@ def _pairs(skillset: Skillset, state: State, taken: Mapping[str, Mapping[str, st
     if len(state.running) < 2:
         return
     for resource, value in zip(skillset.resources, state.resources, strict=True):
-        holders = [name for name in state.running if taken[name].get(resource.name) == value]
+        # In the model's order, so that a pair has one name whoever started first.
+        holders = [
+            skill.name
+            for skill in skillset.skills
+            for name in state.running
+            if name == skill.name and taken[name].get(resource.name) == value
+        ]
         for index, first in enumerate(holders):
             for second in holders[index + 1 :]:
                 yield resource.name, first, second

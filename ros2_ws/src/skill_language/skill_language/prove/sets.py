@@ -39,21 +39,21 @@ class Sets:
         reached, before = self.initial, self.bdd.false
         while reached != before:
             before = reached
+            if len(self.bdd) > MANY_NODES:
+                self.bdd.configure(reordering=True)
             for update in self.model.steps:
                 fresh = reached
                 while fresh != self.bdd.false:
                     self.deadline.check()
                     fresh = self.after(fresh, update) & ~reached
                     reached |= fresh
-                    if len(self.bdd) > MANY_NODES:
-                        self.bdd.configure(reordering=True)
         return reached
 
     def after(self, situations: Any, update: Update) -> Any:
         """Return what a step makes of situations."""
         changed = self._updated(situations, update)
         watching = {skill for resource in update.changed for skill in self.model.watchers.get(resource, ())}
-        return self._settled(changed, {*watching, *([update.starts] if update.starts else [])})
+        return self._settled(changed, {*watching, *([update.touches] if update.touches else [])})
 
     def _updated(self, situations: Any, update: Update) -> Any:
         taken = situations & update.guard
@@ -74,11 +74,11 @@ class Sets:
                     situations = (situations & ~found) | (self.bdd.exist([name], found) & self.bdd.var(name))
         return situations
 
-    def _settled(self, situations: Any, skills: set[str]) -> Any:
+    def _settled(self, situations: Any, concerned: set[str]) -> Any:
         """Mark and end all broken executions; those of one cluster know nothing of the others', so that one follows the other."""
-        for cluster in self.model.clusters:
+        for cluster in (one for one in self.model.clusters if concerned.intersection(one.skills)):
             self.deadline.check()
-            situations = self._marked(situations, skills.intersection(cluster.skills))
+            situations = self._marked(situations, concerned.intersection(cluster.skills))
             if situations & ~cluster.idle != self.bdd.false:
                 situations = self._settled_in(cluster, situations)
         return situations
