@@ -12,8 +12,10 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from time import monotonic
 
 from skill_language.errors import Diagnostic, Severity, has_errors, render
+from skill_language.model import Skillset
 from skill_language.models import ModelFile, check_files
 from skill_language.notation import Notation
 from skill_language.printer import print_file
@@ -49,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("files", nargs="+", metavar="FILE", help="skillsets in the paper's notation (*.skill) or the Robot Language (*.rl)")
     parser.add_argument("--json", action="store_true", help="print the findings as one JSON object instead of text")
     parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
-    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long a skillset's proofs may take (30)")
+    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
     parser.add_argument("--strict", action="store_true", help="make errors of warnings")
     parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
     return parser
@@ -61,9 +63,23 @@ def _prove(files: Sequence[ModelFile], timeout_s: float) -> None:
     from skill_language.prove import prove
 
     for file in files:
-        if not has_errors(file.findings) and not file.damaged:
-            for skillset in file.skillsets:
-                file.add(finding.diagnostic() for finding in prove(skillset, timeout_s=timeout_s))
+        if has_errors(file.findings) or file.damaged:
+            continue
+        found: list[Diagnostic] = []
+        end = monotonic() + timeout_s
+        for number, skillset in enumerate(file.skillsets):
+            if number and monotonic() >= end:
+                found.append(_not_begun(file.skillsets[number:], timeout_s))
+                break
+            found += [finding.diagnostic() for finding in prove(skillset, timeout_s=max(0.0, end - monotonic()))]
+        file.add(found)
+
+
+def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
+    """Return the prover's own finding for a lack of time, for skillsets that it was not even asked about."""
+    severity = Severity.ERROR if any(skillset.properties for skillset in skillsets) else Severity.WARNING
+    message = f"nothing is proved of this skillset and {len(skillsets) - 1} more: the {timeout_s:g} s for the file are over"
+    return Diagnostic("ALU540", message, skillsets[0].span, severity, "allow more with `--time`, or divide the file")
 
 
 def _convert(files: Sequence[ModelFile], notation: Notation, code: int) -> int:

@@ -28,6 +28,7 @@ CODES: Mapping[str, str] = {
     "ALU106": "a block or setting given twice",
     "ALU107": "too many errors to go on",
     "ALU108": "a comment without its end",
+    "ALU109": "more states than a resource can have",
     "ALU201": "a name defined twice",
     "ALU202": "unknown resource",
     "ALU203": "unknown state",
@@ -139,7 +140,7 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return a hint that names the known name nearest to this one, or lists the few there are, or is empty."""
-    candidates = sorted(set(known))
+    candidates = sorted(set(known))[:_MANY]
     # Names are compared without case: AVAILABLE for available is the commonest slip.
     folded: dict[str, str] = {}
     for candidate in candidates:
@@ -158,6 +159,8 @@ def quoted(names: Sequence[str]) -> str:
 
 
 _FEW = 8
+_MANY = 500
+"""More names than this are not looked through for a hint: it has to come at once."""
 _WIDTH = 120
 
 

@@ -309,6 +309,38 @@ def test_the_largest_text_takes_seconds_at_most(junk):
     assert time.process_time() - start < 20.0
 
 
+LARGE = {
+    "states": ("resource q { state { @ } initial s0 transition all }", "s{} "),
+    "arrows": ("resource q { initial A @ }", "A -> B "),
+    "types": ("@", "type T{} "),
+    "data of unknown types": ("@", "data d{0}: T{0} "),
+    "unknown resources": ("skill f { start { @ } }", "q{} -> A "),
+    "conditions without a name": ("skill f { precondition { @ } }", "(r == A) "),
+    "unknown states": ("skill f { precondition { @ } }", "p{0}: r == S{0} "),
+    "inputs that are outputs": ("skill f { input { @ } output { @ } }", "x{}: bool "),
+    "events": ("@", "event e{} {{ effect q -> A }} "),
+    "skills": ("@", "skill f{} {{}} "),
+    "a long condition": ("skill f { precondition p: @ true }", "r == A and "),
+}
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_the_largest_models_are_checked_soon(name):
+    text, one = LARGE[name]
+    resources = " ".join(f"resource r{i} {{ state {{ A B }} initial A transition all }}" for i in range(500))
+    entries = "".join(one.format(i) for i in range(120_000 // len(one)))
+    whole = f"skillset s {{ resource r {{ state {{ A B }} initial A transition all }} {resources} {text} }}".replace("@", entries)
+    start = time.process_time()
+    survives(whole)
+    assert time.process_time() - start < 10.0
+
+
+def test_a_resource_of_too_many_states():
+    states = " ".join(f"s{i}" for i in range(251))
+    (file,) = check_texts([ModelFile("x.rl", f"skillset s {{ resource ^r {{ state {{ {states} }} initial s0 }} }}".replace("^", ""))])
+    assert [(d.code, d.span.column) for d in file.findings] == [("ALU109", 23)]
+
+
 def test_ten_megabytes_and_wrong_encodings(tmp_path, capsys):
     for name, content in {"large.rl": b"skillset s { " * 800_000, "utf16.rl": WHOLE.encode("utf-16"), "latin.rl": b"// \xe9"}.items():
         (tmp_path / name).write_bytes(content)

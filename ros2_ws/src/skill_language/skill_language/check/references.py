@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from skill_language import ros_types
@@ -29,9 +29,10 @@ def condition_findings(
     skillset: Skillset, condition: Expression, where: str, *, data_allowed: bool, executions_allowed: bool = False
 ) -> Iterator[Diagnostic]:
     """Yield what is wrong with the resources, states, data and skills that a condition asks; ``where`` names the condition."""
+    resources = {resource.name: resource for resource in skillset.resources}
     for atom in atoms(condition):
         if isinstance(atom, ResourceIs):
-            yield from _resource_atom(skillset, atom)
+            yield from _resource_atom(skillset, resources, atom)
         elif isinstance(atom, DataIs):
             if not data_allowed:
                 hint = "let the functional layer report it as a state of a resource"
@@ -47,8 +48,7 @@ def condition_findings(
                 yield error("ALU222", message, atom.span, hint=nearest(atom.skill, known))
 
 
-def _resource_atom(skillset: Skillset, atom: ResourceIs) -> Iterator[Diagnostic]:
-    resources = {resource.name: resource for resource in skillset.resources}
+def _resource_atom(skillset: Skillset, resources: Mapping[str, Resource], atom: ResourceIs) -> Iterator[Diagnostic]:
     if atom.resource in resources:
         if atom.state not in resources[atom.resource].states:
             yield unknown_state(resources[atom.resource], atom.state, atom.span)

@@ -34,8 +34,9 @@ def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
         if parameter.name in shared:
             message = f"`{parameter.name}` of `{skill.name}` has the name of a {shared[parameter.name]}, and hides it from no condition"
             yield warning("ALU304", message, parameter.span, hint="conditions speak of resources and data, never of inputs")
+    inputs = {given.name for given in skill.inputs}
     for output in skill.outputs:
-        if any(output.name == given.name for given in skill.inputs):
+        if output.name in inputs:
             yield error("ALU201", f"`{output.name}` is an input and an output of `{skill.name}`", output.span)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from skill_language import ros_types
@@ -29,8 +30,8 @@ def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:
     yield from duplicates("event", skillset.events)
     yield from duplicates("parameter", skillset.parameters)
     yield from duplicates("property", skillset.properties)
-    for index, name in enumerate(skillset.types):
-        if name in skillset.types[:index]:
+    for name, times in Counter(skillset.types).items():
+        if times > 1:
             yield error("ALU201", f"type `{name}` is declared twice", skillset.span)
     yield from one_in_code("skill", skillset.skills, ros_types.camel)
     if not ros_types.is_package_name(skillset.name):
@@ -48,8 +49,8 @@ def _resources(skillset: Skillset) -> Iterator[Diagnostic]:
 
 
 def _states(resource: Resource) -> Iterator[Diagnostic]:
-    for index, state in enumerate(resource.states):
-        if state in resource.states[:index]:
+    for state, times in Counter(resource.states).items():
+        if times > 1:
             yield error("ALU201", f"state `{state}` of `{resource.name}` is listed twice", resource.span)
     seen: set[tuple[str, str, bool]] = set()
     for arrow in resource.transitions:
@@ -95,13 +96,14 @@ def _reach(resource: Resource) -> Iterator[Diagnostic]:
 
 def _types(skillset: Skillset) -> Iterator[Diagnostic]:
     used: set[str] = set()
+    known = {*skillset.types, *ros_types.PRIMITIVES}
     messages = [s.progress for s in skillset.skills if s.progress and s.progress.message]
     typed: list[tuple[str, Span]] = [(element.type, element.span) for element in typed_elements(skillset)]
     typed += [(progress.message, progress.span) for progress in messages]
     for name, span in typed:
         used.add(name)
-        if name not in skillset.types and name not in ros_types.PRIMITIVES:
-            hint = nearest(name, [*skillset.types, *ros_types.PRIMITIVES])
+        if name not in known:
+            hint = nearest(name, known)
             hint = hint if hint.startswith("did") else f"declare it with `type {name}`"
             yield error("ALU205", f"unknown type `{name}`", span, hint=hint)
     for name in skillset.types:

@@ -7,7 +7,8 @@ invariant may be patient (`guard fps >= 10 for 2 s recovers at 12`), and `progre
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable
 
 from skill_language.errors import nearest
 from skill_language.lexer import Kind, Token
@@ -62,6 +63,7 @@ class _SkillReader:
         self.cursor = cursor
         self.parts = SkillParts()
         self._seen: set[str] = set()
+        self._nameless: Counter[str] = Counter()
 
     def member(self) -> None:
         """Read one block, or one entry without braces."""
@@ -129,7 +131,7 @@ class _SkillReader:
             name = cursor.name("a precondition").text
             cursor.advance()
         else:
-            name = self._free_name("precondition", [known.name for known in self.parts.preconditions])
+            name = self._free_name("precondition")
         self.parts.preconditions.append(Precondition(name, bare_condition(cursor), span=cursor.span(first)))
 
     def _start(self) -> None:
@@ -175,7 +177,7 @@ class _SkillReader:
         self._add_invariant(Invariant(name, body.condition, effect, body.patience, span=cursor.span(first)))
 
     def _add_invariant(self, invariant: Invariant) -> None:
-        name = invariant.name or self._free_name("invariant", [known.name for known in self.parts.invariants])
+        name = invariant.name or self._free_name("invariant")
         held = Invariant(name, invariant.condition, invariant.effect, invariant.hold, span=invariant.span)
         self.parts.invariants.append(held)
 
@@ -208,15 +210,11 @@ class _SkillReader:
         effect, comment = body.effect(cursor, name), cursor.previous.comment
         self.parts.results.append(Result(name.text, kind, effect, body.postcondition, comment, span=cursor.span(name)))
 
-    @staticmethod
-    def _free_name(stem: str, taken: Sequence[str]) -> str:
-        """Return a name for what was written without one."""
-        number = len(taken) + 1
-        name = stem if stem not in taken else f"{stem}_{number}"
-        while name in taken:
-            number += 1
-            name = f"{stem}_{number}"
-        return name
+    def _free_name(self, stem: str) -> str:
+        """Return a name for what was written without one; `check` tells if somebody else has it."""
+        self._nameless[stem] += 1
+        number = self._nameless[stem]
+        return stem if number == 1 else f"{stem}_{number}"
 
 
 _PROGRESS = ("period", "message", "output", "deadline")

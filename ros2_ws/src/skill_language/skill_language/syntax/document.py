@@ -283,8 +283,9 @@ def _with_shared_types(document: Document) -> list[Skillset]:
 
 def with_known_types(skillset: Skillset, names: Collection[str]) -> Skillset:
     """Add those of the names to a skillset's types that it uses and does not declare."""
+    known, own = set(names), set(skillset.types)
     used = dict.fromkeys(element.type for element in typed_elements(skillset))
-    added = tuple(name for name in used if name in names and name not in skillset.types)
+    added = tuple(name for name in used if name in known and name not in own)
     return replace(skillset, types=added + skillset.types) if added else skillset
 
 

@@ -11,6 +11,9 @@ from skill_language.lexer import Kind, Token
 from skill_language.model import Resource, Transition
 from skill_language.syntax.cursor import Cursor
 
+MAX_STATES = 250
+"""`transition all` of so many states has 62,500 arrows; state machines of people have a dozen states."""
+
 _WORDS = frozenset({"initial", "transition", "state", "extern"})
 
 
@@ -59,10 +62,15 @@ class _ResourceReader:
         """Put the parts together."""
         arrows = tuple(self.transitions)
         states = tuple(self.states) if self.states is not None else occurring(self.initial, arrows)
+        if len(states) > MAX_STATES:
+            message = f"resource `{name.text}` has {len(states)} states; there may be {MAX_STATES}"
+            hint = "numbers are data, not states: let the functional layer publish them"
+            self.cursor.source.report("ALU109", message, self.cursor.span(name), hint=hint)
+            return Resource(name.text, states[:MAX_STATES], self.initial, (), span=self.cursor.span(name))
         if self.extern_all:
-            arrows += tuple(arrow for arrow in every_arrow(states, extern=True) if arrow not in arrows)
+            arrows += _missing(every_arrow(states, extern=True), arrows)
         if self.all:
-            arrows += tuple(arrow for arrow in every_arrow(states) if arrow not in arrows)
+            arrows += _missing(every_arrow(states), arrows)
         return Resource(name.text, states, self.initial, arrows, self.all, span=self.cursor.span(name))
 
     def _states(self) -> None:
@@ -115,6 +123,11 @@ def occurring(initial: str, transitions: tuple[Transition, ...]) -> tuple[str, .
     for transition in transitions:
         names += [transition.source, transition.target]
     return tuple(dict.fromkeys(names))
+
+
+def _missing(wanted: tuple[Transition, ...], given: tuple[Transition, ...]) -> tuple[Transition, ...]:
+    known = set(given)
+    return tuple(arrow for arrow in wanted if arrow not in known)
 
 
 def every_arrow(states: tuple[str, ...], *, extern: bool = False) -> tuple[Transition, ...]:
