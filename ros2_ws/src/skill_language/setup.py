@@ -14,12 +14,13 @@ setup(
     zip_safe=True,
     maintainer="The Alula developers",
     maintainer_email="alula@alula-robotics.org",
-    description="The skill language: model, paper notation, checks, JSON form and code generator.",
+    description="The skill language: model, two notations, checks, proofs, JSON form, code generator and language server.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
             "skill_check = skill_language.check_cli:main",
             "skill_generate = skill_language.generate.__main__:main",
+            "skill_server = skill_language.server:main",
         ],
     },
 )

@@ -8,11 +8,13 @@ from skill_language.errors import Diagnostic, LanguageError, Severity
 from skill_language.json_form import from_json, to_json
 from skill_language.load import load_robot, load_skillset
 from skill_language.model import Skillset
+from skill_language.notation import Notation
 from skill_language.printer import print_skillset
 
 __all__ = [
     "Diagnostic",
     "LanguageError",
+    "Notation",
     "Severity",
     "Skillset",
     "from_json",

@@ -1,7 +1,9 @@
-"""`python -m skill_language.check_cli FILE... [--json]`: read models and say what is wrong with them.
+"""`python -m skill_language.check_cli FILE... [--json] [--strict] [--to rl|paper]`: read models and say what is wrong with them.
 
-Ends with 0 when all is well (warnings do not count), 1 when a model has errors, 2 when a file can't be read: because it is not
-there, is no text, or is not in the notation (ALU0.. and ALU1..).
+A model without errors is handed to the prover (``--no-proofs`` leaves that out), what that finds is told with the rest.
+Ends with 0 when all is well (warnings do not count, unless ``--strict``), 1 when a model has errors, 2 when a file can't be read:
+because it is not there, is no text, or is not in a notation (ALU0.. and ALU1..).
+With ``--to`` the models are printed in that notation instead, findings go to the standard error stream.
 """
 
 from __future__ import annotations
@@ -10,47 +12,114 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
+from time import monotonic
 
-from skill_language.errors import Diagnostic, Severity, has_errors
-from skill_language.load import check_file
+from skill_language.errors import Diagnostic, Severity, has_errors, render
+from skill_language.model import Skillset
+from skill_language.models import ModelFile, check_files
+from skill_language.notation import Notation
+from skill_language.printer import print_file
 
 UNREADABLE = ("ALU0", "ALU1")  # files, syntax
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula check", description="Check skill models.")
-    parser.add_argument("files", nargs="+", metavar="FILE", help="a skillset in the paper's notation (*.skill)")
-    parser.add_argument("--json", action="store_true", help="print the findings as one JSON object instead of text")
-    options = parser.parse_args(arguments)
-    results = {file: check_file(file)[1] for file in options.files}
-    findings = [finding for found in results.values() for finding in found]
+    options = _parser().parse_args(arguments)
+    files = check_files(list(dict.fromkeys(options.files)))
+    if options.proofs and options.to is None:
+        _prove(files, options.time)
+    for file in files:
+        file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
+    findings = [finding for file in files for finding in file.findings]
     code = exit_code(findings)
-    text = _as_json(results, code) if options.json else _as_text(results)
-    sys.stdout.write(text + "\n")
+    if options.to is not None:
+        return _convert(files, Notation(options.to), code)
+    _write(_as_json(files, code) if options.json else _as_text(files))
     return code
 
 
 def exit_code(findings: Sequence[Diagnostic]) -> int:
     """Return 0, 1 or 2 as in this module's docstring."""
-    if any(finding.code.startswith(UNREADABLE) for finding in findings):
+    if any(finding.severity is Severity.ERROR and finding.code.startswith(UNREADABLE) for finding in findings):
         return 2
     return 1 if has_errors(findings) else 0
 
 
-def _as_json(results: dict[str, list[Diagnostic]], code: int) -> str:
-    files = [{"file": file, "findings": [f.as_json() for f in found]} for file, found in results.items()]
-    return json.dumps({"exit_code": code, "files": files}, indent=2)
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="alula check", description="Check skill models.")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="skillsets in the paper's notation (*.skill) or the Robot Language (*.rl)")
+    parser.add_argument("--json", action="store_true", help="print the findings as one JSON object instead of text")
+    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
+    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
+    parser.add_argument("--strict", action="store_true", help="make errors of warnings")
+    parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
+    return parser
 
 
-def _as_text(results: dict[str, list[Diagnostic]]) -> str:
+def _prove(files: Sequence[ModelFile], timeout_s: float) -> None:
+    """Add the prover's findings about every skillset of a file that is free of errors."""
+    # The prover brings its solvers along, which nobody should wait for who only converts.
+    from skill_language.prove import prove
+
+    for file in files:
+        if has_errors(file.findings) or file.damaged:
+            continue
+        found: list[Diagnostic] = []
+        end = monotonic() + timeout_s
+        for number, skillset in enumerate(file.skillsets):
+            if number and monotonic() >= end:
+                found.append(_not_begun(file.skillsets[number:], timeout_s))
+                break
+            found += [finding.diagnostic() for finding in prove(skillset, timeout_s=max(0.0, end - monotonic()))]
+        file.add(found)
+
+
+def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
+    """Return the prover's own finding for a lack of time, for skillsets that it was not even asked about."""
+    severity = Severity.ERROR if any(skillset.properties for skillset in skillsets) else Severity.WARNING
+    message = f"nothing is proved of this skillset and {len(skillsets) - 1} more: the {timeout_s:g} s for the file are over"
+    return Diagnostic("ALU540", message, skillsets[0].span, severity, "allow more with `--time`, or divide the file")
+
+
+def _convert(files: Sequence[ModelFile], notation: Notation, code: int) -> int:
+    """Print what could be read whole in a notation, findings beside it; one of several files begins with its name."""
+    for file in files:
+        if file.findings:
+            sys.stderr.write(render(file.findings) + "\n")
+    whole = [file for file in files if not file.damaged]
+    for file in whole:
+        title = f"// {file.path}\n" if len(files) > 1 else ""
+        types = [kind.name for kind in file.document.types] if file.document else []
+        _write(title + print_file(file.declared, notation, types).rstrip("\n"))
+    # A model with errors of meaning is converted, too, but not silently.
+    return code
+
+
+def _strict(finding: Diagnostic) -> Diagnostic:
+    return replace(finding, severity=Severity.ERROR)
+
+
+def _write(text: str) -> None:
+    """Write to the standard output whatever its encoding; names and paths may hold anything."""
+    encoding = sys.stdout.encoding or "utf-8"
+    sys.stdout.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+
+
+def _as_json(files: Sequence[ModelFile], code: int) -> str:
+    found = [{"file": file.path, "findings": [f.as_json() for f in file.findings]} for file in files]
+    return json.dumps({"exit_code": code, "files": found}, indent=2)
+
+
+def _as_text(files: Sequence[ModelFile]) -> str:
     parts: list[str] = []
-    for file, found in results.items():
-        errors = sum(finding.severity is Severity.ERROR for finding in found)
-        warnings = len(found) - errors
+    for file in files:
+        errors = sum(finding.severity is Severity.ERROR for finding in file.findings)
+        warnings = len(file.findings) - errors
         counts = [f"{n} {word}{'s' if n > 1 else ''}" for n, word in ((errors, "error"), (warnings, "warning")) if n]
-        parts += [finding.render() + "\n" for finding in found]
-        parts.append(f"{file}: {', '.join(counts) or 'ok'}")
+        parts += [finding.render() + "\n" for finding in file.findings]
+        parts.append(f"{file.path}: {', '.join(counts) or 'ok'}")
     return "\n".join(parts)
 
 

@@ -27,6 +27,8 @@ CODES: Mapping[str, str] = {
     "ALU105": "a condition nested too deeply",
     "ALU106": "a block or setting given twice",
     "ALU107": "too many errors to go on",
+    "ALU108": "a comment without its end",
+    "ALU109": "more states than a resource can have",
     "ALU201": "a name defined twice",
     "ALU202": "unknown resource",
     "ALU203": "unknown state",
@@ -46,6 +48,11 @@ CODES: Mapping[str, str] = {
     "ALU217": "two names that become one in generated code",
     "ALU218": "a skill that can't end by itself nor be ended",
     "ALU219": "a unit that is not known",
+    "ALU220": "a progress deadline that is no longer than the period",
+    "ALU221": "a duration or a recovery value that makes no sense",
+    "ALU222": "unknown skill",
+    "ALU223": "an execution asked where only properties may",
+    "ALU224": "unknown skillset",
     "ALU301": "an effect that is never used",
     "ALU302": "a state that can't be reached",
     "ALU303": "a type that is never used",
@@ -55,6 +62,7 @@ CODES: Mapping[str, str] = {
     "ALU403": "data that no topic is bound to",
     "ALU404": "two skillsets of one name",
     "ALU405": "data of a type that no topic can carry",
+    "ALU406": "a file that does not hold exactly one skillset where one is needed",
 }
 
 
@@ -67,7 +75,11 @@ class Severity(Enum):
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One finding. ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about."""
+    """One finding.
+
+    ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about.
+    ``counterexample`` tells a proof's way to the fault, a line for each state or step; empty where there is none.
+    """
 
     code: str
     message: str
@@ -75,6 +87,7 @@ class Diagnostic:
     severity: Severity = Severity.ERROR
     hint: str = ""
     expected: tuple[str, ...] = ()
+    counterexample: tuple[str, ...] = ()
     source_line: str = field(default="", compare=False)
 
     def render(self) -> str:
@@ -84,6 +97,9 @@ class Diagnostic:
             lines += _excerpt(self.span, self.source_line)
         if self.expected:
             lines.append(f"      = expected {'one of ' if len(self.expected) > 1 else ''}{', '.join(self.expected)}")
+        if self.counterexample:
+            lines.append("      = counterexample:")
+            lines += [f"          {line}" for line in self.counterexample]
         if self.hint:
             lines.append(f"      = hint: {self.hint}")
         return "\n".join(lines)
@@ -100,6 +116,7 @@ class Diagnostic:
             "end_column": self.span.end_column,
             "hint": self.hint,
             "expected": list(self.expected),
+            "counterexample": list(self.counterexample) or None,
         }
 
 
@@ -123,7 +140,7 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return a hint that names the known name nearest to this one, or lists the few there are, or is empty."""
-    candidates = sorted(set(known))
+    candidates = sorted(set(known))[:_MANY]
     # Names are compared without case: AVAILABLE for available is the commonest slip.
     folded: dict[str, str] = {}
     for candidate in candidates:
@@ -142,6 +159,8 @@ def quoted(names: Sequence[str]) -> str:
 
 
 _FEW = 8
+_MANY = 500
+"""More names than this are not looked through for a hint: it has to come at once."""
 _WIDTH = 120
 
 

@@ -23,6 +23,7 @@ from skill_language.model import Skillset, Span
 _CONDITIONS: dict[str, type] = {
     "resource": model.ResourceIs,
     "data": model.DataIs,
+    "running": model.SkillRuns,
     "constant": model.Constant,
     "not": model.Not,
     "and": model.And,
@@ -106,6 +107,8 @@ def _decode_plain(value: object, wanted: type, where: str) -> object:
 def _decode_union(value: object, options: tuple[Any, ...], where: str, depth: int) -> object:
     if value is None and types.NoneType in options:
         return None
+    if set(typing.get_args(model.Expression)) <= set(options):
+        return _decode_condition(value, where, depth)
     for option in options:
         # A truth value is an int to Python, but not to the model: exact types decide.
         if option is type(value) or (option is float and type(value) is int):

@@ -1,4 +1,7 @@
-"""From text to tokens, for both notations: names, numbers, strings, punctuation; `//` comments stay with their token."""
+"""From text to tokens, for both notations: names, numbers, strings, punctuation; `//` comments stay with their token.
+
+`/* ... */` is a comment, too; it stays with no token.
+"""
 
 from __future__ import annotations
 
@@ -81,6 +84,8 @@ _TOKEN = re.compile(
     r"""(?P<space>[ \t\r\f\v]+)
       | (?P<newline>\n)
       | (?P<comment>//[^\n]*)
+      | (?P<block>/\*(?s:.*?)\*/)
+      | (?P<endless>/\*)
       | (?P<NAME>[A-Za-z_][A-Za-z0-9_]*)
       | (?P<NUMBER>-?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
       | (?P<STRING>"(?:[^"\\\n]|\\[^\n])*")
@@ -108,6 +113,13 @@ def tokenize(source: Source) -> list[Token]:
             line, line_start = line + 1, match.end()
             continue
         column = match.start() - line_start + 1
+        if group == "endless":
+            source.report("ALU108", "this comment has no `*/`", Span(source.file, line, column, column + 2))
+            break
+        if group == "block":
+            if ends := match.group().count("\n"):
+                line, line_start = line + ends, match.start() + match.group().rindex("\n") + 1
+            continue
         if group == "comment":
             if tokens and tokens[-1].line == line:
                 tokens[-1].comment = match.group()[2:].strip()

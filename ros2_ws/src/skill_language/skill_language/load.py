@@ -7,15 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from skill_language import side_files
-from skill_language.check import check
-from skill_language.errors import Diagnostic, LanguageError, has_errors, nearest
-from skill_language.lexer import MAX_CHARACTERS
+from skill_language.errors import Diagnostic, LanguageError, Severity, has_errors, nearest
 from skill_language.model import Skillset, Span
-from skill_language.paper import parse
+from skill_language.models import about, check_files
+from skill_language.notation import SUFFIXES
 from skill_language.robot import Bindings, Robot
 from skill_language.ros_types import PRIMITIVES, RosType
 
-SUFFIX = ".skill"
+FOR_GENERATOR = frozenset({"ALU215", "ALU216", "ALU217", "ALU218"})
+"""What a model may have by itself, but not when interfaces and managers are made of it: these warnings are errors then."""
 
 
 def load_skillset(path: str | Path) -> Skillset:
@@ -25,66 +25,48 @@ def load_skillset(path: str | Path) -> Skillset:
         LanguageError: the file can't be read, or has errors; all of them are in it, warnings too.
     """
     skillset, findings = check_file(path)
+    if skillset is None and not has_errors(findings):
+        findings = [*findings, about(Path(path), "ALU406", "one skillset is needed, and the file holds none or several")]
     if skillset is None or has_errors(findings):
         raise LanguageError(findings)
     return skillset
 
 
 def check_file(path: str | Path) -> tuple[Skillset | None, list[Diagnostic]]:
-    """Return the skillset of a file, None where it can't even be parsed, and all findings about it."""
-    try:
-        text = read_text(Path(path))
-        skillset = parse(text, str(path))
-    except LanguageError as error:
-        return None, list(error.diagnostics)
-    lines = text.split("\n")
-    return skillset, [_with_line(finding, lines) for finding in check(skillset)]
-
-
-def read_text(path: Path) -> str:
-    """Return a file's text with its line ends as newlines; raise LanguageError (ALU001 to ALU003) when it is no readable text."""
-    try:
-        if path.stat().st_size > 4 * MAX_CHARACTERS:
-            raise LanguageError([_about(path, "ALU003", f"{path.stat().st_size} bytes are too much for a model")])
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError as error:
-        message = f"not UTF-8 text: byte {error.start} is 0x{error.object[error.start]:02x}"
-        raise LanguageError([_about(path, "ALU002", message)]) from error
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else "") or str(error)
-        raise LanguageError([_about(path, "ALU001", f"can't be read: {reason}")]) from error
+    """Return the only skillset of a file, None where it has none, several or can't be read, and all findings about it."""
+    (file,) = check_files([path])
+    return (file.skillsets[0] if not file.damaged and len(file.skillsets) == 1 else None), file.findings
 
 
 def load_robot(folder: str | Path) -> Robot:
-    """Return a robot: every `*.skill` of a folder, with its `types.yaml` and `bindings.yaml` (both may be missing).
+    """Return a robot: every `*.skill` and `*.rl` of a folder, with its `types.yaml` and `bindings.yaml` (both may be missing).
 
     Raises:
         LanguageError: with everything that is wrong in all of the files.
     """
     place = Path(folder)
-    paths = sorted(place.glob(f"*{SUFFIX}"))
+    paths = sorted(path for path in place.glob("*") if path.suffix in SUFFIXES)
     if not paths:
-        reason = f"no *{SUFFIX} file in it" if place.is_dir() else "is no folder"
-        raise LanguageError([_about(place, "ALU006", reason)])
+        reason = f"no {' or '.join(f'*{suffix}' for suffix in SUFFIXES)} file in it" if place.is_dir() else "is no folder"
+        raise LanguageError([about(place, "ALU006", reason)])
     findings: list[Diagnostic] = []
     skillsets: list[Skillset] = []
     files: dict[str, str] = {}
-    for path in paths:
-        skillset, found = check_file(path)
-        findings += found
-        if skillset is None:
-            continue
-        if skillset.name in files:
-            message = f"skillset `{skillset.name}` is defined in {files[skillset.name]} already"
-            findings.append(Diagnostic("ALU404", message, skillset.span))
-        files.setdefault(skillset.name, f"{place.resolve().name}/{path.name}")
-        skillsets.append(skillset)
+    checked = check_files(paths)
+    for path, file in zip(paths, checked, strict=True):
+        findings += [_generated(finding) for finding in file.findings]
+        skillsets += file.skillsets
+        for skillset in file.skillsets:
+            if skillset.name in files:
+                message = f"skillset `{skillset.name}` is defined in {files[skillset.name]} already"
+                findings.append(Diagnostic("ALU404", message, skillset.span))
+            files.setdefault(skillset.name, f"{place.resolve().name}/{path.name}")
     types, more = side_files.load_types(place / "types.yaml")
     findings += more
     bindings, more = side_files.load_bindings(place / "bindings.yaml")
     findings += more
     robot = Robot(place.resolve().name, tuple(skillsets), types, bindings, files)
-    if len(skillsets) == len(paths):
+    if not any(file.damaged for file in checked):
         findings += _fit(robot, types, bindings, place)
     if has_errors(findings):
         raise LanguageError(findings)
@@ -117,10 +99,6 @@ def _fit(robot: Robot, types: Mapping[str, RosType], bindings: Bindings, place: 
     return findings
 
 
-def _with_line(finding: Diagnostic, lines: list[str]) -> Diagnostic:
-    line = finding.span.line
-    return replace(finding, source_line=lines[line - 1]) if 0 < line <= len(lines) else finding
-
-
-def _about(path: Path, code: str, message: str) -> Diagnostic:
-    return Diagnostic(code, message, Span(str(path), 0, 0, 0))
+def _generated(finding: Diagnostic) -> Diagnostic:
+    """Return a finding as it counts for generated code."""
+    return replace(finding, severity=Severity.ERROR) if finding.code in FOR_GENERATOR else finding

@@ -29,7 +29,8 @@ NOWHERE = Span(file="", line=0, column=0, end_column=0)
 
 
 # --- expressions -----------------------------------------------------------------------------------------------------
-# Conditions are over resource states (`axes == USED`) and, in preconditions, over data (`battery.level > 0.2`).
+# Conditions are over resource states (`axes == USED`), in preconditions and invariants over data (`battery.level > 0.2`),
+# and in properties over executions (`takeoff running`).
 
 
 class Comparison(Enum):
@@ -74,6 +75,14 @@ class Constant:
 
 
 @dataclass(frozen=True)
+class SkillRuns:
+    """``skill running``: an execution of the skill is running (Figure 5: RUNNING). Only properties ask it."""
+
+    skill: str
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
 class Not:
     """Negation."""
 
@@ -106,11 +115,12 @@ class Implies:
     span: Span = field(default=NOWHERE, compare=False)
 
 
-Expression = ResourceIs | DataIs | Constant | Not | And | Or | Implies
+Atom = ResourceIs | DataIs | SkillRuns | Constant
+Expression = Atom | Not | And | Or | Implies
 TRUE = Constant(value=True)
 
 
-def atoms(expression: Expression) -> Iterator[ResourceIs | DataIs | Constant]:
+def atoms(expression: Expression) -> Iterator[Atom]:
     """Yield the leaves of an expression from left to right."""
     match expression:
         case Not(operand=operand):
@@ -161,7 +171,10 @@ class Transition:
 
 @dataclass(frozen=True)
 class Resource:
-    """A state machine. ``states`` keeps the order of the source; ``all_transitions`` tells that they were written ``all``."""
+    """A state machine. ``states`` keeps the order of the source.
+
+    ``all_transitions`` tells that every arrow that is not extern was asked for by ``transition all``; they are in ``transitions``.
+    """
 
     name: str
     states: tuple[str, ...]
@@ -219,21 +232,46 @@ class Precondition:
 
 
 @dataclass(frozen=True)
+class Hold:
+    """How patient an invariant is (``fps >= 10 for 2 s recovers at 12``).
+
+    It is broken when its condition has been false for ``for_s`` seconds without a break. With ``hysteresis`` a value that fell
+    through the condition's threshold is good again only from that value on (in ``unit``, empty for the condition's own).
+    """
+
+    for_s: float = 0.0
+    hysteresis: float | None = None
+    unit: str = ""
+    span: Span = field(default=NOWHERE, compare=False)
+
+
+@dataclass(frozen=True)
 class Invariant:
-    """A named condition that must hold while the skill runs; ``effect`` is applied when it is broken."""
+    """A named condition that must hold while the skill runs; ``effect`` is applied when it is broken.
+
+    Without ``hold`` it is broken as soon as the condition is false.
+    """
 
     name: str
     condition: Expression
     effect: Effect = NO_EFFECT
+    hold: Hold | None = None
     span: Span = field(default=NOWHERE, compare=False)
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Every ``period_s`` seconds a running skill reports; ``message`` names the type of the report, or is empty."""
+    """Every ``period_s`` seconds a running skill reports.
+
+    ``message`` names the type of the report, or is empty; ``outputs`` are the values in it that have names of their own.
+
+    An execution that has not made progress for ``deadline_s`` seconds is stuck; None where no deadline is given.
+    """
 
     period_s: float
     message: str = ""
+    deadline_s: float | None = None
+    outputs: tuple[Parameter, ...] = ()
     span: Span = field(default=NOWHERE, compare=False)
 
 
@@ -292,9 +330,38 @@ class Skill:
         raise KeyError(f"skill {self.name} has no result {name}; it has {', '.join(r.name for r in self.results)}")
 
 
+class PropertyKind(Enum):
+    """What a property says about the states that can be reached."""
+
+    NEVER = "never"
+    ALWAYS = "always"
+    EVENTUALLY = "eventually"
+    LEADS_TO = "leads to"
+
+
+@dataclass(frozen=True)
+class Property:
+    """What the user wants proved. ``condition`` asks resource states and executions (``SkillRuns``), never data.
+
+    NEVER: no reachable state fulfils ``condition``; ALWAYS: every one does; EVENTUALLY: every run gets to one that does;
+    LEADS_TO: after each state that fulfils ``condition`` the run gets to one that fulfils ``consequence`` (None for the other
+    kinds). ``fair`` (written ``assuming termination``): only runs in which no execution stays RUNNING for ever are looked at.
+    """
+
+    name: str
+    kind: PropertyKind
+    condition: Expression
+    consequence: Expression | None = None
+    fair: bool = False
+    span: Span = field(default=NOWHERE, compare=False)
+
+
 @dataclass(frozen=True)
 class Skillset:
-    """Skills of one subsystem with the data and resources that they share (paper, section 4.1)."""
+    """Skills of one subsystem with the data and resources that they share (paper, section 4.1).
+
+    ``uses`` names other skillsets of the robot whose types are known here, too.
+    """
 
     name: str
     types: tuple[str, ...] = ()
@@ -303,6 +370,8 @@ class Skillset:
     resources: tuple[Resource, ...] = ()
     events: tuple[Event, ...] = ()
     skills: tuple[Skill, ...] = ()
+    properties: tuple[Property, ...] = ()
+    uses: tuple[str, ...] = ()
     span: Span = field(default=NOWHERE, compare=False)
 
     def resource(self, name: str) -> Resource:

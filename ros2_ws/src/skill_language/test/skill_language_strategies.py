@@ -1,4 +1,4 @@
-"""Random models that the paper's notation can say; they need not make sense."""
+"""Random models, with all that the notations can say; they need not make sense."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from skill_language.model import (
     Data,
     DataIs,
     Effect,
+    Event,
+    Hold,
     Implies,
     Interrupt,
     Invariant,
@@ -24,21 +26,29 @@ from skill_language.model import (
     Parameter,
     Precondition,
     Progress,
+    Property,
+    PropertyKind,
     Resource,
     ResourceIs,
     Result,
+    ResultKind,
     Skill,
+    SkillRuns,
     Skillset,
     Transition,
 )
-from skill_language.paper.cursor import OPERATOR_WORDS
-from skill_language.paper.skill import BLOCKS, MEMBERS
-from skill_language.paper.skillset import every_arrow, occurring
+from skill_language.paper import skill as paper
+from skill_language.rl import skill as rl
+from skill_language.syntax.cursor import OPERATOR_WORDS
+from skill_language.syntax.document import MEMBERS
+from skill_language.syntax.resources import every_arrow, occurring
 
-WORDS = OPERATOR_WORDS | set(BLOCKS) | set(MEMBERS) | {"skillset", "all", "period"}
+WORDS = OPERATOR_WORDS | set(paper.BLOCKS) | set(rl.BLOCKS) | set(MEMBERS) | {"skillset", "all", "period"}
+TRAPS = ["initial", "violation", "apply", "post", "extern", "state", "guard", "postcondition", "interrupting", "running", "never"]
+TRAPS += ["leads", "to", "assuming", "for", "recovers", "at", "deadline", "message", "m", "s", "transition", "always"]
 
 names = st.one_of(
-    st.sampled_from(["a", "b", "axes_authority", "OK", "initial", "violation", "success", "apply", "post", "extern", "state"]),
+    st.sampled_from(["a", "b", "axes_authority", "OK", *TRAPS]),
     st.text(string.ascii_letters + string.digits + "_", min_size=1, max_size=6).filter(lambda n: not n[0].isdigit()),
 ).filter(lambda name: name not in WORDS)
 floats = st.floats(allow_nan=False, allow_infinity=False)
@@ -66,8 +76,26 @@ def conditions(leaves):
 
 any_condition = st.one_of(conditions(resource_atoms), conditions(data_atoms), conditions(resource_atoms | data_atoms))
 postconditions = st.just(TRUE) | conditions(resource_atoms)
-parameters = st.lists(st.builds(lambda n, t, c: Parameter(n, t, comment=c), names, names, comments), max_size=3).map(tuple)
-effects = st.builds(lambda n, a: Effect(n, tuple(a)), names, st.lists(st.builds(Assignment, names, names), max_size=3))
+values_with_names = st.lists(st.builds(lambda n, t, c: Parameter(n, t, comment=c), names, names, comments), max_size=3).map(tuple)
+defaults = st.sampled_from(["", "0.5", "-1e3 m/s", "20 %", '"a b"', "true", "AUTO"])
+parameters = st.lists(st.builds(Parameter, names, names, defaults, comments), max_size=2).map(tuple)
+changes = st.lists(st.builds(Assignment, names, names), max_size=3).map(tuple)
+in_place = changes.map(lambda found: Effect("", found))
+holds = st.one_of(
+    st.builds(Hold, floats),
+    st.builds(Hold, floats, floats, st.sampled_from(["", "%", "m/s"]) | names),
+)
+effects = st.builds(Effect, names, changes)
+events = st.builds(Event, names, postconditions | any_condition, in_place)
+progresses = st.builds(Progress, floats, names | st.just(""), st.none() | floats, values_with_names)
+
+
+@st.composite
+def properties(draw):
+    condition = conditions(resource_atoms | st.builds(SkillRuns, names))
+    kind = draw(st.sampled_from(PropertyKind))
+    consequence = draw(condition) if kind is PropertyKind.LEADS_TO else None
+    return Property(draw(names), kind, draw(condition), consequence, draw(st.booleans()))
 
 
 @st.composite
@@ -83,32 +111,37 @@ def resources(draw):
 
 
 def results(used):
-    return st.builds(lambda n, e, p, c: Result(n, effect=e, postcondition=p, comment=c), names, used, postconditions, comments)
+    return st.builds(Result, names, st.sampled_from(ResultKind), used, postconditions, comments)
 
 
 @st.composite
 def skills(draw):
     defined = draw(st.lists(effects, max_size=3, unique_by=lambda effect: effect.name))
-    used = st.sampled_from([NO_EFFECT, *defined])
+    used = st.sampled_from([NO_EFFECT, *defined]) | in_place
     return Skill(
         name=draw(names),
-        inputs=draw(parameters),
-        outputs=draw(parameters),
+        parameters=draw(parameters),
+        inputs=draw(values_with_names),
+        outputs=draw(values_with_names),
         effects=tuple(defined),
         preconditions=tuple(draw(st.lists(st.builds(Precondition, names, any_condition), max_size=3))),
         start=draw(used),
-        invariants=tuple(draw(st.lists(st.builds(Invariant, names, any_condition, used), max_size=3))),
-        progress=draw(st.none() | st.builds(Progress, floats)),
-        interrupt=draw(st.builds(lambda e, p: Interrupt(effect=e, postcondition=p), used, postconditions)),
+        invariants=tuple(draw(st.lists(st.builds(Invariant, names, any_condition, used, st.none() | holds), max_size=3))),
+        progress=draw(st.none() | progresses),
+        interrupt=draw(st.builds(Interrupt, st.booleans(), used, postconditions)),
         results=tuple(draw(st.lists(results(used), max_size=3))),
     )
 
 
 skillsets = st.builds(
-    lambda name, types, data, states, able: Skillset(name, tuple(types), (), tuple(data), tuple(states), (), tuple(able)),
+    Skillset,
     names,
-    st.lists(names, max_size=2),
-    st.lists(st.builds(Data, names, names, st.none() | floats), max_size=2),
-    st.lists(resources(), max_size=3),
-    st.lists(skills(), max_size=3),
+    types=st.lists(names, max_size=2).map(tuple),
+    parameters=parameters,
+    data=st.lists(st.builds(Data, names, names, st.none() | floats), max_size=2).map(tuple),
+    resources=st.lists(resources(), max_size=3).map(tuple),
+    events=st.lists(events, max_size=2).map(tuple),
+    skills=st.lists(skills(), max_size=3).map(tuple),
+    properties=st.lists(properties(), max_size=2).map(tuple),
+    uses=st.lists(names, max_size=2).map(tuple),
 )

@@ -51,7 +51,7 @@ def test_text(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert [line.rsplit("/", 1)[-1] for line in lines if line.endswith(("ok", "errors", "error", "warning"))] == [
         "a.skill: ok",
-        "b.skill: 2 errors",
+        "b.skill: 1 error, 1 warning",
         "c.skill: 1 warning",
     ]
 
@@ -73,6 +73,7 @@ def test_json(tmp_path, capsys):
         "end_column": 36,
         "hint": "",
         "expected": [],
+        "counterexample": None,
     }
 
 

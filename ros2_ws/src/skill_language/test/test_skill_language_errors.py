@@ -6,8 +6,9 @@ import pytest
 
 from skill_language.check import check
 from skill_language.errors import CODES, Diagnostic, LanguageError, Severity, nearest
-from skill_language.load import check_file, load_robot, load_skillset, read_text
+from skill_language.load import FOR_GENERATOR, check_file, load_robot, load_skillset
 from skill_language.model import Span
+from skill_language.models import read_text
 from skill_language.paper import parse
 
 AXES = "resource axes { initial FREE FREE -> USED USED -> FREE }\n"
@@ -31,8 +32,8 @@ SYNTAX = [
     ("ALU100", "skillset s { ^\x00 }", "`U+0000`", ""),
     ("ALU101", 'skillset s { skill f { precondition { p: data = (m == ^"abc) } } }', "no closing", ""),
     ("ALU102", "skillset s { skill f { progress = ^1e999 } }", "too large", ""),
-    ("ALU103", "^skilset s {}", "expected `skillset`, found `skilset`", "a file holds one"),
-    ("ALU103", "^", "expected `skillset`, found the end of the file", "a file holds one"),
+    ("ALU103", "^skilset s {}", "expected `skillset` or `type`, found `skilset`", "a file holds"),
+    ("ALU103", "^", "expected `skillset` or `type`, found the end of the file", "a file holds"),
     ("ALU103", "skillset s { ^skil f {} }", "found `skil`", "did you mean `skill`?"),
     ("ALU103", "skillset s { skill f { ^inputs { } } }", "found `inputs`", "did you mean `input`?"),
     ("ALU103", "skillset s { skill f { input { height ^float64 } } }", "expected `:`, found `float64`", "`name: Type`"),
@@ -44,7 +45,9 @@ SYNTAX = [
     ("ALU103", "skillset s { skill f { progress = ^fast } }", "expected a number, found `fast`", ""),
     ("ALU103", "skillset s { skill ^and { } }", "found `and`", "a word of the language"),
     ("ALU103", "skillset s { resource r { A ^B } }", "expected `->`", "`A -> B` or `extern A -> B`"),
-    ("ALU103", "skillset s {} ^skillset t {}", "expected the end of the file", "its own file"),
+    ("ALU103", "skillset s {} ^data t {}", "expected `skillset` or `type`, found `data`", "one or several"),
+    ("ALU406", "skillset s {} skillset ^t {}", "expected one skillset, found 2", ""),
+    ("ALU108", "skillset s { ^/* }", "no `*/`", ""),
     ("ALU104", "skillset s { skill f ^{ progress = 1 ", "no `}` before the file ends", ""),
     ("ALU104", "skillset s { skill f { input { a: T ^effect { } } }", "opened in line 1 has no `}` before `effect`", "close the block"),
     ("ALU104", "skillset s { skill f { progress = 1 ^skill g { } }", "before `skill` begins", "close the block"),
@@ -120,13 +123,15 @@ SEMANTICS = [
         "sets `axes` twice",
         "",
     ),
-    (
-        "ALU213",
-        "data d: float64 " + asks("invariant { i: data = (^d > 1) }"),
-        "only preconditions may",
-        "state of a resource",
-    ),
-    ("ALU213", "data d: float64 skill f { result { R: post data = (^d > 1) } }", "only preconditions may", ""),
+    ("ALU213", "data d: float64 skill f { result { R: post data = (^d > 1) } }", "only preconditions and invariants may", "state of"),
+    ("ALU213", "data d: float64 property p: never ^d > 1", "only preconditions and invariants may", ""),
+    ("ALU220", "skill f { ^progress = 1 deadline = 1 result { R } }", "deadline of `f` is 1 s, its period 1 s", ""),
+    ("ALU221", "data d: float64 " + asks("invariant { i: data = (d > 1) ^for 0 s }"), "it must be positive", ""),
+    ("ALU221", AXES + asks("invariant { i: resource = (axes == USED) ^recovers at 3 }"), "no single comparison", "fps >= 10"),
+    ("ALU221", "data d: float64 " + asks("invariant { i: data = (d > 9) ^recovers at 8 }"), "not above its threshold", ""),
+    ("ALU221", "data d: float64 " + asks("invariant { i: data = (d < 9 m) ^recovers at 0.1 km }"), "not below its threshold", ""),
+    ("ALU219", "data d: float64 " + asks("invariant { i: data = (d < 9 m) ^recovers at (1 ft) }"), "unknown unit `ft`", ""),
+    ("ALU222", "property p: never ^takeof running " + asks("").replace("skill f", "skill takeoff"), "no skill `takeof`", "`takeoff`?"),
     ("ALU214", "data d: bool skill f { precondition { p: data = (^d > true) } result { R } }", "doesn't compare a truth value", ""),
     ("ALU214", 'data d: string skill f { precondition { p: data = (^d < "a") } result { R } }', "doesn't compare a text", ""),
     ("ALU214", "data d: float64 " + asks("precondition { p: data = (^d == true) }"), "can't be compared with True", ""),
@@ -182,7 +187,21 @@ def test_semantics(code, marked, message, hint):
         assert (finding.span.line, finding.span.column) == (place[0], column)
     assert message in finding.message
     assert hint in finding.hint
-    assert finding.severity is (Severity.WARNING if code.startswith("ALU3") else Severity.ERROR)
+    assert finding.severity is (Severity.WARNING if code.startswith("ALU3") or code in FOR_GENERATOR else Severity.ERROR)
+
+
+def test_an_execution_is_asked_by_properties_only(tmp_path):
+    path = tmp_path / "x.rl"
+    path.write_text("skillset s { skill f { precondition p: not f running success ok } }")
+    assert [(d.code, d.span.column) for d in check_file(path)[1]] == [("ALU223", 44)]
+
+
+def test_what_code_can_not_be_generated_of_is_told_as_an_error_when_it_shall_be(tmp_path):
+    (tmp_path / "x.rl").write_text("skillset Robot { skill f { } }")
+    assert {d.code: d.severity for d in check_file(tmp_path / "x.rl")[1]} == dict.fromkeys(("ALU216", "ALU218"), Severity.WARNING)
+    with pytest.raises(LanguageError) as caught:
+        load_robot(tmp_path)
+    assert {d.code: d.severity for d in caught.value.diagnostics} == dict.fromkeys(("ALU216", "ALU218"), Severity.ERROR)
 
 
 def test_a_sound_skillset_has_no_findings():
@@ -320,7 +339,7 @@ def robot(folder, skill="skillset s { }", types=None, bindings=None):
 
 
 def test_a_folder_without_skillsets(tmp_path):
-    with pytest.raises(LanguageError, match=r"ALU006: no \*\.skill file in it"):
+    with pytest.raises(LanguageError, match=r"ALU006: no \*\.skill or \*\.rl file in it"):
         load_robot(tmp_path)
     with pytest.raises(LanguageError, match="ALU006: is no folder"):
         load_robot(tmp_path / "none")
@@ -375,4 +394,5 @@ def test_side_files(tmp_path, types, bindings, message):
 def test_every_code_has_a_test():
     tested = {row[0] for row in SYNTAX + SEMANTICS}
     elsewhere = {"ALU001", "ALU002", "ALU003", "ALU004", "ALU005", "ALU006", "ALU107", "ALU401", "ALU402", "ALU403", "ALU404", "ALU405"}
+    elsewhere |= {"ALU109", "ALU223", "ALU224"}
     assert tested | elsewhere == set(CODES)

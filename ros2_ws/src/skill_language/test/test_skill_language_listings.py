@@ -141,13 +141,18 @@ def test_extern_arrows_and_states_in_order():
     assert resource.has_arrow("BROKEN", "OK", extern=False)
 
 
-def test_transition_all_is_for_everybody():
+def test_transition_all_is_for_skills_and_extern_all_for_the_functional_layer():
     resource = wrapped("resource r { state { A B C } initial B transition all }").resource("r")
     assert resource.states == ("A", "B", "C")
     assert resource.all_transitions
-    assert len(resource.transitions) == 12
-    assert resource.has_arrow("A", "C", extern=True)
+    assert len(resource.transitions) == 9
+    assert not any(arrow.extern for arrow in resource.transitions)
     assert resource.has_arrow("C", "A", extern=False)
+    assert resource.has_arrow("A", "A", extern=False)
+    both = wrapped("resource r { state { A B C } initial B transition { all  extern all } }").resource("r")
+    assert len(both.transitions) == 15
+    assert both.has_arrow("C", "A", extern=True)
+    assert not both.has_arrow("A", "A", extern=True)
 
 
 def test_data_with_and_without_period():

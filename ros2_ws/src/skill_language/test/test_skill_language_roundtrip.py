@@ -8,24 +8,32 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from skill_language_strategies import skillsets
 
+from skill_language import paper, rl
 from skill_language.errors import LanguageError
 from skill_language.json_form import from_json, to_json
-from skill_language.model import Comparison, DataIs, Event, Precondition, Result, ResultKind, Skill, Skillset
-from skill_language.paper import parse
+from skill_language.model import Assignment, Comparison, DataIs, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
+from skill_language.notation import Notation
 from skill_language.printer import NotInThisNotationError, print_skillset
 
 SLOW = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
+PARSE = {Notation.PAPER: paper.parse, Notation.ROBOT_LANGUAGE: rl.parse}
+BOTH = (Notation.PAPER, Notation.ROBOT_LANGUAGE)
+
+
 @SLOW
 @given(skillsets)
-def test_what_is_printed_reads_back(skillset):
-    text = print_skillset(skillset)
-    again = parse(text, "x.skill")
-    assert again == skillset
-    # `==` takes 1.0 for True; their texts differ.
-    assert repr_without_places(again) == repr_without_places(skillset)
-    assert print_skillset(again) == text
+def test_what_is_printed_reads_back_in_each_notation_and_through_both(skillset):
+    for first, second in ((a, b) for a in BOTH for b in BOTH):
+        text = print_skillset(skillset, first)
+        there = PARSE[first](text, "x")
+        assert there == skillset
+        # `==` takes 1.0 for True; their texts differ.
+        assert repr_without_places(there) == repr_without_places(skillset)
+        assert print_skillset(there, first) == text
+        back = PARSE[second](print_skillset(there, second), "x")
+        assert repr_without_places(back) == repr_without_places(skillset)
 
 
 @SLOW
@@ -50,10 +58,13 @@ def test_json_keeps_what_only_the_other_notation_says():
     assert again.skills[0].preconditions[0].condition.value is True
 
 
-def test_what_the_notation_has_no_words_for_is_refused():
-    skill = Skill("f", results=(Result("R", ResultKind.SUCCESS),))
-    with pytest.raises(NotInThisNotationError, match="event e, success R of f"):
-        print_skillset(Skillset("s", events=(Event("e"),), skills=(skill,)))
+@pytest.mark.parametrize("notation", BOTH)
+def test_what_no_text_says_is_refused(notation):
+    skill = Skill("f", start=Effect("take", (Assignment("r", "S"),)))
+    with pytest.raises(NotInThisNotationError, match="skill f has no effect take"):
+        print_skillset(Skillset("s", skills=(skill,)), notation)
+    with pytest.raises(NotInThisNotationError, match="effect of event e can't have a name"):
+        print_skillset(Skillset("s", events=(Event("e", effect=Effect("n")),)), notation)
 
 
 NOT = '{"is": "not", "operand": '

@@ -1,4 +1,4 @@
-"""The drone's models: the paper's listings in them, the resources of docs/architecture.md, and a language page that tells the truth."""
+"""The drone's models: the paper's listings in them, the resources of docs/architecture.md."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from pathlib import Path
 import pytest
 from test_skill_language_listings import LISTING_2, LISTING_3, TAKEOFF, wrapped
 
-from skill_language.check import check
-from skill_language.errors import CODES
 from skill_language.json_form import from_json, to_json
 from skill_language.load import check_file, load_robot
 from skill_language.model import Effect, Interrupt, ResourceIs, Skill
 from skill_language.paper import parse
 from skill_language.printer import print_skillset
-from skill_language.units import UNIT_IN_SI
 
 SKILLSETS = next(parent / "skillsets" for parent in Path(__file__).resolve().parents if (parent / "skillsets").is_dir())
 MODELS = sorted((SKILLSETS / "uav").glob("*.skill"))
@@ -148,25 +145,3 @@ def test_a_broken_camera_breaks_the_invariant_zed_ok(robot):
     (lidar,) = perception.skill("lidar_depthmap").invariants
     assert (zed.name, zed.condition) == ("zed_ok", ResourceIs("zed_status", "OK"))
     assert (lidar.name, lidar.condition) == ("lidar_ok", ResourceIs("lidar_status", "OK"))
-
-
-# --- the language page -----------------------------------------------------------------------------------------------
-
-PAGE = (SKILLSETS / "LANGUAGE.md").read_text()
-
-
-def test_every_example_of_the_page_is_sound():
-    examples = re.findall(r"```skill\n(.*?)```", PAGE, re.DOTALL)
-    assert len(examples) == 2
-    for example in examples:
-        assert check(parse(f"skillset page {{ {example} }}")) == []
-
-
-def test_the_page_tells_all_units():
-    (told,) = re.findall(r"A number may have a unit: `(.*?)`", PAGE)
-    assert set(told.split()) == set(UNIT_IN_SI) - {""}
-
-
-def test_the_page_tells_all_codes():
-    told = dict(re.findall(r"\| (ALU\d+) \| (.*?) \|", PAGE))
-    assert told == dict(CODES)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import chain, islice
+
 from skill_language.check.skill_rules import SKILL_RULES
 from skill_language.check.skillset_rules import RULES
 from skill_language.errors import Diagnostic
 from skill_language.model import Skillset
 
+MAX_FINDINGS = 200
+
 
 def check(skillset: Skillset) -> list[Diagnostic]:
-    """Return all findings about a skillset in the order of the source."""
-    findings = [finding for rule in RULES for finding in rule(skillset)]
-    for skill in skillset.skills:
-        findings += [finding for rule in SKILL_RULES for finding in rule(skillset, skill)]
+    """Return all findings about a skillset (at most ``MAX_FINDINGS``) in the order of the source."""
+    about_all = (finding for rule in RULES for finding in rule(skillset))
+    about_one = (finding for skill in skillset.skills for rule in SKILL_RULES for finding in rule(skillset, skill))
+    # Nobody reads more, and a file may be made to have a hundred thousand.
+    findings = islice(chain(about_all, about_one), MAX_FINDINGS)
     return sorted(dict.fromkeys(findings), key=lambda d: (d.span.line, d.span.column, d.code))

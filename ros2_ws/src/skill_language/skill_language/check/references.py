@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from skill_language import ros_types
 from skill_language.errors import Diagnostic, Severity, nearest, quoted
-from skill_language.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, Skillset, Span, atoms
+from skill_language.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, SkillRuns, Skillset, Span, atoms
 from skill_language.units import UNIT_IN_SI
 
 
@@ -25,20 +25,39 @@ class Named(Protocol):
         ...
 
 
-def condition_findings(skillset: Skillset, condition: Expression, where: str, *, data_allowed: bool) -> Iterator[Diagnostic]:
-    """Yield what is wrong with the resources, states and data that a condition asks; ``where`` names the condition."""
+def condition_findings(
+    skillset: Skillset, condition: Expression, where: str, *, data_allowed: bool, executions_allowed: bool = False
+) -> Iterator[Diagnostic]:
+    """Yield what is wrong with the resources, states, data and skills that a condition asks; ``where`` names the condition."""
     resources = {resource.name: resource for resource in skillset.resources}
     for atom in atoms(condition):
         if isinstance(atom, ResourceIs):
-            if atom.resource not in resources:
-                yield _unknown_resource(skillset, atom.resource, atom.span)
-            elif atom.state not in resources[atom.resource].states:
-                yield unknown_state(resources[atom.resource], atom.state, atom.span)
+            yield from _resource_atom(skillset, resources, atom)
         elif isinstance(atom, DataIs):
             if not data_allowed:
                 hint = "let the functional layer report it as a state of a resource"
-                yield error("ALU213", f"{where} asks data `{atom.data}`; only preconditions may", atom.span, hint=hint)
+                yield error("ALU213", f"{where} asks data `{atom.data}`; only preconditions and invariants may", atom.span, hint=hint)
             yield from _data(skillset, atom)
+        elif isinstance(atom, SkillRuns):
+            if not executions_allowed:
+                hint = "ask a resource that the skill takes at its start"
+                yield error("ALU223", f"{where} asks whether `{atom.skill}` runs; only properties may", atom.span, hint=hint)
+            known = [skill.name for skill in skillset.skills]
+            if atom.skill not in known:
+                message = f"skillset `{skillset.name}` has no skill `{atom.skill}`"
+                yield error("ALU222", message, atom.span, hint=nearest(atom.skill, known))
+
+
+def _resource_atom(skillset: Skillset, resources: Mapping[str, Resource], atom: ResourceIs) -> Iterator[Diagnostic]:
+    if atom.resource in resources:
+        if atom.state not in resources[atom.resource].states:
+            yield unknown_state(resources[atom.resource], atom.state, atom.span)
+    elif any(data.name == atom.resource for data in skillset.data):
+        message = f"skillset `{skillset.name}` has no resource `{atom.resource}`, it is data"
+        hint = f'data is compared with a number, true, false or a text: `{atom.resource} == "{atom.state}"`'
+        yield error("ALU202", message, atom.span, hint=hint)
+    else:
+        yield _unknown_resource(skillset, atom.resource, atom.span)
 
 
 def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
@@ -50,9 +69,7 @@ def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
     if isinstance(atom.value, bool | str) and atom.comparison not in {Comparison.EQ, Comparison.NE}:
         kind = "a truth value" if isinstance(atom.value, bool) else "a text"
         yield error("ALU214", f"`{atom.comparison.value}` doesn't compare {kind}; use == or !=", atom.span)
-    if atom.unit not in UNIT_IN_SI:
-        hint = nearest(atom.unit, UNIT_IN_SI) or f"there are {quoted([unit for unit in UNIT_IN_SI if unit])}"
-        yield error("ALU219", f"unknown unit `{atom.unit}`", atom.span, hint=hint)
+    yield from unit_findings(atom.unit, atom.span)
     python = ros_types.PRIMITIVES.get(types[atom.data])
     if python is None:
         return
@@ -61,6 +78,13 @@ def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
         yield error("ALU214", message, atom.span)
     elif (python in {"int", "float"}) != isinstance(atom.value, float) or (python == "str") != isinstance(atom.value, str):
         yield error("ALU214", f"data `{atom.data}` is a {types[atom.data]} and can't be compared with {atom.value!r}", atom.span)
+
+
+def unit_findings(unit: str, span: Span) -> Iterator[Diagnostic]:
+    """Yield a finding when a unit is not known."""
+    if unit not in UNIT_IN_SI:
+        hint = nearest(unit, UNIT_IN_SI) or f"there are {quoted([known for known in UNIT_IN_SI if known])}"
+        yield error("ALU219", f"unknown unit `{unit}`", span, hint=hint)
 
 
 def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> Iterator[Diagnostic]:
@@ -125,19 +149,24 @@ def one_in_code(what: str, elements: Sequence[Named], code_name: Callable[[str],
         other = first.setdefault(code_name(element.name), element.name)
         if other != element.name:
             message = f"{what}s `{other}` and `{element.name}` are both `{code_name(element.name)}` in generated code"
-            yield error("ALU217", message, element.span)
+            yield for_generator("ALU217", message, element.span)
 
 
 def ros_name(what: str, element: Named) -> Iterator[Diagnostic]:
     """Yield a finding when ROS does not allow an element's name for a field or topic."""
     if not ros_types.is_field_name(element.name):
         hint = "ROS wants a-z, 0-9 and single _, a letter first, no word of Python"
-        yield error("ALU216", f"`{element.name}` can't be the name of a ROS {what}", element.span, hint=hint)
+        yield for_generator("ALU216", f"`{element.name}` can't be the name of a ROS {what}", element.span, hint=hint)
 
 
 def error(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
     """Return an error."""
     return Diagnostic(code, message, span, hint=hint)
+
+
+def for_generator(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
+    """Return a warning that is an error to whoever generates code (``FOR_GENERATOR`` in ``load``): the model itself is sound."""
+    return Diagnostic(code, message, span, Severity.WARNING, hint)
 
 
 def warning(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:

@@ -6,9 +6,19 @@ import keyword
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from skill_language.check.references import condition_findings, duplicates, effect_findings, error, ros_name, warning
+from skill_language.check.references import (
+    condition_findings,
+    duplicates,
+    effect_findings,
+    error,
+    for_generator,
+    ros_name,
+    unit_findings,
+    warning,
+)
 from skill_language.errors import Diagnostic
-from skill_language.model import NO_EFFECT, Effect, Skill, Skillset
+from skill_language.model import NO_EFFECT, Comparison, DataIs, Effect, Hold, Invariant, Skill, Skillset
+from skill_language.units import UNIT_IN_SI
 
 
 def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
@@ -16,6 +26,7 @@ def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     yield from duplicates("precondition", skill.preconditions)
     yield from duplicates("invariant", skill.invariants)
     yield from duplicates("result", skill.results)
+    yield from duplicates("parameter", skill.parameters)
     yield from duplicates("input", skill.inputs)
     yield from duplicates("output", skill.outputs)
     shared = {resource.name: "resource" for resource in skillset.resources} | {data.name: "data" for data in skillset.data}
@@ -23,36 +34,65 @@ def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
         if parameter.name in shared:
             message = f"`{parameter.name}` of `{skill.name}` has the name of a {shared[parameter.name]}, and hides it from no condition"
             yield warning("ALU304", message, parameter.span, hint="conditions speak of resources and data, never of inputs")
+    inputs = {given.name for given in skill.inputs}
     for output in skill.outputs:
-        if any(output.name == given.name for given in skill.inputs):
+        if output.name in inputs:
             yield error("ALU201", f"`{output.name}` is an input and an output of `{skill.name}`", output.span)
 
 
 def _interface_names(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     if skill.name in CLIENT_NAMES or keyword.iskeyword(skill.name):
-        yield error("ALU215", f"the generated client needs the name `{skill.name}` for itself; name the skill otherwise", skill.span)
+        yield for_generator(
+            "ALU215", f"the generated client needs the name `{skill.name}` for itself; name the skill otherwise", skill.span
+        )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", skill.name):
         hint = "a skill's name begins with a letter, and has single _ between letters and digits"
-        yield error("ALU216", f"skill `{skill.name}` can't be the name of a ROS action", skill.span, hint=hint)
+        yield for_generator("ALU216", f"skill `{skill.name}` can't be the name of a ROS action", skill.span, hint=hint)
     for parameter in (*skill.inputs, *skill.outputs):
         yield from ros_name("field", parameter)
     for output in skill.outputs:
         if output.name in RESULT_FIELDS:
             message = f"the generated action needs the field `{output.name}` for itself; name the output otherwise"
-            yield error("ALU215", message, output.span)
+            yield for_generator("ALU215", message, output.span)
     for given in skill.inputs:
         if given.name in INPUT_NAMES:
-            yield error("ALU215", f"generated code needs the name `{given.name}` for itself; name the input otherwise", given.span)
+            yield for_generator("ALU215", f"generated code needs the name `{given.name}` for itself; name the input otherwise", given.span)
 
 
 def _conditions(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     for precondition in skill.preconditions:
         yield from condition_findings(skillset, precondition.condition, f"precondition `{precondition.name}`", data_allowed=True)
     for invariant in skill.invariants:
-        yield from condition_findings(skillset, invariant.condition, f"invariant `{invariant.name}`", data_allowed=False)
+        yield from condition_findings(skillset, invariant.condition, f"invariant `{invariant.name}`", data_allowed=True)
     yield from condition_findings(skillset, skill.interrupt.postcondition, "the interruption's postcondition", data_allowed=False)
     for result in skill.results:
         yield from condition_findings(skillset, result.postcondition, f"the postcondition of `{result.name}`", data_allowed=False)
+
+
+def _patience(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    for invariant in skill.invariants:
+        if invariant.hold is not None:
+            yield from _hold(invariant, invariant.hold)
+
+
+def _hold(invariant: Invariant, hold: Hold) -> Iterator[Diagnostic]:
+    if hold.for_s < 0 or (hold.for_s == 0 and hold.hysteresis is None):
+        yield error("ALU221", f"invariant `{invariant.name}` holds for {hold.for_s:g} s; it must be positive", hold.span)
+    if hold.hysteresis is None:
+        return
+    yield from unit_findings(hold.unit, hold.span)
+    condition = invariant.condition
+    below = {Comparison.LT: True, Comparison.LE: True, Comparison.GT: False, Comparison.GE: False}
+    if not isinstance(condition, DataIs) or condition.comparison not in below or not isinstance(condition.value, float):
+        message = f"invariant `{invariant.name}` can't recover at a value: its condition is no single comparison with a number"
+        yield error("ALU221", message, hold.span, hint="`recovers at` goes with a condition such as `fps >= 10`")
+        return
+    scale, own_scale = UNIT_IN_SI.get(hold.unit or condition.unit, 1.0), UNIT_IN_SI.get(condition.unit, 1.0)
+    recovers, broken = hold.hysteresis * scale, condition.value * own_scale
+    if recovers >= broken if below[condition.comparison] else recovers <= broken:
+        side = "below" if below[condition.comparison] else "above"
+        message = f"invariant `{invariant.name}` recovers at a value that is not {side} its threshold"
+        yield error("ALU221", message, hold.span, hint="it recovers where the condition holds with something to spare")
 
 
 def _effects(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
@@ -68,14 +108,15 @@ def _effects(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
 
 def _ends(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     if not skill.results:
-        hint = "add a `result { ... }` block with at least one result"
-        yield error("ALU218", f"skill `{skill.name}` has no result", skill.span, hint=hint)
+        hint = "add a result: `result { NAME }` in the paper's notation, `success NAME` in the Robot Language"
+        yield for_generator("ALU218", f"skill `{skill.name}` has no result", skill.span, hint=hint)
 
 
 SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _skill_names,
     _interface_names,
     _conditions,
+    _patience,
     _effects,
     _ends,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from skill_language import ros_types
@@ -10,13 +11,16 @@ from skill_language.check.references import (
     duplicates,
     effect_findings,
     error,
+    for_generator,
     one_in_code,
     ros_name,
     unknown_state,
     warning,
 )
 from skill_language.errors import Diagnostic, nearest
-from skill_language.model import Data, Parameter, Resource, Skillset
+from skill_language.model import Resource, Skillset, Span
+from skill_language.syntax.document import typed_elements
+from skill_language.syntax.resources import occurring
 
 
 def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:
@@ -25,13 +29,14 @@ def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:
     yield from duplicates("skill", skillset.skills)
     yield from duplicates("event", skillset.events)
     yield from duplicates("parameter", skillset.parameters)
-    for index, name in enumerate(skillset.types):
-        if name in skillset.types[:index]:
+    yield from duplicates("property", skillset.properties)
+    for name, times in Counter(skillset.types).items():
+        if times > 1:
             yield error("ALU201", f"type `{name}` is declared twice", skillset.span)
     yield from one_in_code("skill", skillset.skills, ros_types.camel)
     if not ros_types.is_package_name(skillset.name):
         hint = "a ROS name has a-z, 0-9 and single _, and begins with a letter"
-        yield error("ALU216", f"`{skillset.name}` can't be the name of a ROS package", skillset.span, hint=hint)
+        yield for_generator("ALU216", f"`{skillset.name}` can't be the name of a ROS package", skillset.span, hint=hint)
     for data in skillset.data:
         yield from ros_name("data", data)
 
@@ -44,8 +49,8 @@ def _resources(skillset: Skillset) -> Iterator[Diagnostic]:
 
 
 def _states(resource: Resource) -> Iterator[Diagnostic]:
-    for index, state in enumerate(resource.states):
-        if state in resource.states[:index]:
+    for state, times in Counter(resource.states).items():
+        if times > 1:
             yield error("ALU201", f"state `{state}` of `{resource.name}` is listed twice", resource.span)
     seen: set[tuple[str, str, bool]] = set()
     for arrow in resource.transitions:
@@ -63,9 +68,15 @@ def _initial(resource: Resource) -> Iterator[Diagnostic]:
     if not resource.initial:
         hint = f"add `initial {resource.states[0]}`" if resource.states else "add `initial STATE`"
         yield error("ALU207", f"resource `{resource.name}` has no initial state", resource.span, hint=hint)
-    elif resource.initial not in resource.states or (ends and resource.initial not in ends):
-        message = f"the initial state `{resource.initial}` of `{resource.name}` has no arrow"
-        yield error("ALU208", message, resource.span, hint=nearest(resource.initial, ends))
+        return
+    message = f"the initial state `{resource.initial}` of `{resource.name}` has no arrow"
+    hint = nearest(resource.initial, ends)
+    if resource.initial not in resource.states:
+        yield error("ALU208", message, resource.span, hint=hint)
+    elif ends and resource.initial not in ends:
+        # A state that is not listed may well be a slip of the pen; one that is listed is meant.
+        listed = resource.states != occurring(resource.initial, resource.transitions)
+        yield (warning if listed else error)("ALU208", message, resource.span, hint="" if listed else hint)
 
 
 def _reach(resource: Resource) -> Iterator[Diagnostic]:
@@ -85,15 +96,16 @@ def _reach(resource: Resource) -> Iterator[Diagnostic]:
 
 def _types(skillset: Skillset) -> Iterator[Diagnostic]:
     used: set[str] = set()
-    typed: list[Data | Parameter] = [*skillset.data, *skillset.parameters]
-    for skill in skillset.skills:
-        typed += [*skill.inputs, *skill.outputs, *skill.parameters]
-    for element in typed:
-        used.add(element.type)
-        if element.type not in skillset.types and element.type not in ros_types.PRIMITIVES:
-            hint = nearest(element.type, [*skillset.types, *ros_types.PRIMITIVES])
-            hint = hint if hint.startswith("did") else f"declare it with `type {element.type}`"
-            yield error("ALU205", f"unknown type `{element.type}`", element.span, hint=hint)
+    known = {*skillset.types, *ros_types.PRIMITIVES}
+    messages = [s.progress for s in skillset.skills if s.progress and s.progress.message]
+    typed: list[tuple[str, Span]] = [(element.type, element.span) for element in typed_elements(skillset)]
+    typed += [(progress.message, progress.span) for progress in messages]
+    for name, span in typed:
+        used.add(name)
+        if name not in known:
+            hint = nearest(name, known)
+            hint = hint if hint.startswith("did") else f"declare it with `type {name}`"
+            yield error("ALU205", f"unknown type `{name}`", span, hint=hint)
     for name in skillset.types:
         if name not in used:
             yield warning("ALU303", f"type `{name}` is never used", skillset.span)
@@ -108,6 +120,9 @@ def _periods(skillset: Skillset) -> Iterator[Diagnostic]:
         if progress and progress.period_s <= 0:
             message = f"the progress period of `{skill.name}` is {progress.period_s:g} s; it must be positive"
             yield error("ALU211", message, progress.span)
+        elif progress and progress.deadline_s is not None and progress.deadline_s <= progress.period_s:
+            message = f"the progress deadline of `{skill.name}` is {progress.deadline_s:g} s, its period {progress.period_s:g} s"
+            yield error("ALU220", message, progress.span, hint="the deadline should leave time for several reports")
 
 
 def _events(skillset: Skillset) -> Iterator[Diagnostic]:
@@ -117,4 +132,12 @@ def _events(skillset: Skillset) -> Iterator[Diagnostic]:
         yield from effect_findings(skillset, event.effect, any_arrow=True)
 
 
-RULES: Sequence[Callable[[Skillset], Iterable[Diagnostic]]] = (_skillset_names, _resources, _types, _periods, _events)
+def _properties(skillset: Skillset) -> Iterator[Diagnostic]:
+    for prop in skillset.properties:
+        for condition in (prop.condition, prop.consequence):
+            if condition is not None:
+                where = f"property `{prop.name}`"
+                yield from condition_findings(skillset, condition, where, data_allowed=False, executions_allowed=True)
+
+
+RULES: Sequence[Callable[[Skillset], Iterable[Diagnostic]]] = (_skillset_names, _resources, _types, _periods, _events, _properties)

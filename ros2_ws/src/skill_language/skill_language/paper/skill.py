@@ -1,16 +1,20 @@
 """A skill of the paper's notation (Listing 3).
 
-Beyond the listing: an effect of several changes is written `name { r1 -> S1  r2 -> S2 }`; `output { ... }` is an `input`
-the other way; `interrupt { apply = effect }` says what an interruption changes; `violation` and `apply` may be left out;
-`post resource = (...)` after a result says what must hold once its effect was applied (section 4.1.2).
+Beyond the listing: an effect of several changes is written `name { r1 -> S1  r2 -> S2 }`, and in place of an effect's name its
+changes may stand in braces; `output { ... }` is an `input` the other way, `parameter { ... }` has what is set once for all;
+`interrupt { interrupting apply = effect }` says what an interruption does; `violation` and `apply` may be left out;
+`post resource = (...)` after a result says what must hold once its effect was applied (section 4.1.2); `success` or `failure`
+before a result says what it means for the mission; an invariant may be patient (`for 2 s recovers at 12`); `progress = 0.5
+deadline = 5 message T` has a deadline and a report.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from skill_language.errors import nearest
-from skill_language.lexer import Kind, Token, number
+from skill_language.lexer import Kind, Token
 from skill_language.model import (
     NO_EFFECT,
     TRUE,
@@ -23,30 +27,31 @@ from skill_language.model import (
     Precondition,
     Progress,
     Result,
+    ResultKind,
     Skill,
-    Span,
 )
-from skill_language.paper.conditions import condition
-from skill_language.paper.cursor import Cursor, starts_block, starts_member
-from skill_language.paper.skill_parts import SkillParts
+from skill_language.syntax.conditions import paper_condition
+from skill_language.syntax.cursor import Cursor, starts_block, starts_member
+from skill_language.syntax.elements import read_change, read_parameter
+from skill_language.syntax.quantities import duration, hold, setting
+from skill_language.syntax.skill_parts import SkillParts
 
-BLOCKS = ("progress", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
-MEMBERS = ("type", "data", "resource", "skill")
+BLOCKS = ("progress", "parameter", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
+_OUTSIDE = ("resource", "event", "skill", "property")
 
 
 def read_skill(cursor: Cursor) -> Skill:
-    """Read `skill name { ... }`."""
-    cursor.expect("skill")
+    """Read `name { ... }`."""
     name = cursor.name("the name of the skill")
     reader = _SkillReader(cursor)
-    cursor.block(reader.member, lambda: starts_member(cursor, MEMBERS))
+    cursor.block(reader.member, lambda: starts_member(cursor, _OUTSIDE), lambda: ends_block(cursor))
     return reader.parts.build(name, cursor.source)
 
 
 def ends_block(cursor: Cursor) -> bool:
     """Tell whether something begins that can't stand inside a block of a skill: the block's `}` is missing."""
     progress = cursor.at("progress") and cursor.ahead().text == "=" and cursor.ahead(2).kind is Kind.NUMBER
-    return progress or starts_block(cursor, BLOCKS) or starts_member(cursor, ("skill",))
+    return progress or starts_block(cursor, BLOCKS) or starts_member(cursor, _OUTSIDE)
 
 
 class _SkillReader:
@@ -66,6 +71,8 @@ class _SkillReader:
         match word.text:
             case "progress":
                 self._progress()
+            case "parameter":
+                self._block(lambda: parts.parameters.append(read_parameter(self.cursor, "a parameter")))
             case "input":
                 self._block(lambda: parts.inputs.append(read_parameter(self.cursor, "an input")))
             case "output":
@@ -99,27 +106,32 @@ class _SkillReader:
         self.cursor.block(entry, lambda: ends_block(self.cursor))
 
     def _progress(self) -> None:
-        first = self.cursor.advance()
-        self.cursor.expect("=", hint="write `progress = 0.5`, the period in seconds")
-        value = self.cursor.kind(Kind.NUMBER)
-        self.parts.progress = Progress(number(self.cursor.source, value), span=self.cursor.span(first, value))
+        """Read `progress = 0.5`, and what may follow it: `deadline = 5`, `message T` or `message { x: T }`."""
+        cursor = self.cursor
+        first = cursor.advance()
+        cursor.expect("=", hint="write `progress = 0.5`, the period in seconds")
+        period, deadline, message, outputs = duration(cursor), None, "", list[Parameter]()
+        span = cursor.span(first, cursor.previous)
+        if cursor.at("deadline"):
+            deadline = setting(cursor, "deadline")
+        while cursor.at("message"):
+            cursor.advance()
+            if cursor.at("{"):
+                cursor.block(lambda: outputs.append(read_parameter(cursor, "a value")), lambda: ends_block(cursor))
+            else:
+                message = cursor.name("a type").text
+        self.parts.progress = Progress(period, message, deadline, tuple(outputs), span=span)
 
     def _effect(self) -> None:
         name = self.cursor.name("the name of an effect")
         changes: list[Assignment] = []
         if self.cursor.accept(":"):
-            changes.append(self._assignment())
+            changes.append(read_change(self.cursor))
         elif self.cursor.at("{"):
-            self.cursor.block(lambda: changes.append(self._assignment()), lambda: ends_block(self.cursor))
+            self.cursor.block(lambda: changes.append(read_change(self.cursor)), lambda: ends_block(self.cursor))
         else:
             raise self.cursor.fail("`:`", "`{`", hint=f"write `{name.text}: resource -> STATE` or `{name.text} {{}}`")
         self.parts.effects.append(Effect(name.text, tuple(changes), span=self.cursor.span(name)))
-
-    def _assignment(self) -> Assignment:
-        resource = self.cursor.name("a resource")
-        self.cursor.expect("->")
-        state = self.cursor.name("a state")
-        return Assignment(resource.text, state.text, span=self.cursor.span(resource, state))
 
     def _precondition(self) -> None:
         if self.cursor.at_word("success"):
@@ -133,30 +145,44 @@ class _SkillReader:
 
     def _invariant(self) -> None:
         name, holds = self._named_condition("an invariant")
+        patience = hold(self.cursor)
         effect = self._setting("violation") if self.cursor.at_word("violation") else NO_EFFECT
-        self.parts.invariants.append(Invariant(name.text, holds, effect, span=self.cursor.span(name)))
+        self.parts.invariants.append(Invariant(name.text, holds, effect, patience, span=self.cursor.span(name)))
 
     def _interrupt(self) -> None:
-        if not self.cursor.at("apply", "post"):
-            raise self.cursor.fail("`apply`", "`post`", "`}`")
+        if not self.cursor.at("apply", "post", "interrupting"):
+            raise self.cursor.fail("`interrupting`", "`apply`", "`post`", "`}`")
         word = self.cursor.here
         interrupt = self.parts.interrupt
-        given = interrupt.effect is not NO_EFFECT if word.text == "apply" else interrupt.postcondition is not TRUE
-        if given:
+        if self.cursor.accept("interrupting"):
+            given = self.cursor.accept("true", "false")
+            interrupting = given is None or given.text == "true"
+            self.parts.interrupt = replace(interrupt, interrupting=interrupting, span=self.cursor.span(word))
+            return
+        twice = interrupt.effect is not NO_EFFECT if word.text == "apply" else interrupt.postcondition is not TRUE
+        if twice:
             self.cursor.source.report("ALU106", f"`{word.text}` is given twice in this block", self.cursor.span(word))
         effect, postcondition = self._outcome()
         self.parts.interrupt = Interrupt(
+            interrupting=interrupt.interrupting,
             effect=effect if effect is not NO_EFFECT else interrupt.effect,
             postcondition=postcondition if postcondition is not TRUE else interrupt.postcondition,
             span=self.cursor.span(word),
         )
 
     def _result(self) -> None:
+        kind = self._result_kind()
         name = self.cursor.name("a result")
         effect, postcondition = self._outcome() if self.cursor.accept(":") else (NO_EFFECT, TRUE)
         comment = self.cursor.previous.comment
-        span: Span = self.cursor.span(name)
-        self.parts.results.append(Result(name.text, effect=effect, postcondition=postcondition, comment=comment, span=span))
+        self.parts.results.append(Result(name.text, kind, effect, postcondition, comment, span=self.cursor.span(name)))
+
+    def _result_kind(self) -> ResultKind:
+        """Read `success` or `failure` where a result's name follows on its line (they may be names of results themselves)."""
+        following = self.cursor.ahead()
+        if self.cursor.at("success", "failure") and following.kind is Kind.NAME and following.line == self.cursor.here.line:
+            return ResultKind(self.cursor.advance().text)
+        return ResultKind.PLAIN
 
     def _outcome(self) -> tuple[Effect, Expression]:
         """Read `apply = effect`, `post condition`, both or none."""
@@ -164,12 +190,12 @@ class _SkillReader:
         if not self.cursor.at_word("post"):
             return effect, TRUE
         self.cursor.advance()
-        return effect, condition(self.cursor)
+        return effect, paper_condition(self.cursor)
 
     def _named_condition(self, what: str) -> tuple[Token, Expression]:
         name = self.cursor.name(what)
         self.cursor.expect(":", hint=f"{what} is written `name: resource = (...)`")
-        return name, condition(self.cursor)
+        return name, paper_condition(self.cursor)
 
     def _setting(self, word: str) -> Effect:
         self.cursor.expect(word)
@@ -177,13 +203,11 @@ class _SkillReader:
         return self._reference()
 
     def _reference(self) -> Effect:
+        """Read the name of an effect, or the changes themselves in braces."""
+        if self.cursor.at("{"):
+            changes: list[Assignment] = []
+            first = self.cursor.here
+            self.cursor.block(lambda: changes.append(read_change(self.cursor)), lambda: ends_block(self.cursor))
+            return Effect("", tuple(changes), span=self.cursor.span(first))
         name = self.cursor.name("the name of an effect")
         return Effect(name.text, span=self.cursor.span(name))
-
-
-def read_parameter(cursor: Cursor, what: str) -> Parameter:
-    """Read `name: Type // comment`."""
-    name = cursor.name(what)
-    cursor.expect(":", hint=f"{what} is written `name: Type`")
-    kind = cursor.name("a type")
-    return Parameter(name.text, kind.text, comment=kind.comment, span=cursor.span(name, kind))

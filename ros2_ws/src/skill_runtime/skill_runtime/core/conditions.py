@@ -6,7 +6,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
+from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
 from skill_language.units import UNIT_IN_SI
 from skill_runtime.core.errors import DataMissingError, UnsupportedModelError
 
@@ -42,6 +42,8 @@ def holds(condition: Expression, states: States, data: Data) -> bool:
             return all(holds(operand, states, data) for operand in operands)
         case Or(operands=operands):
             return any(holds(operand, states, data) for operand in operands)
+        case SkillRuns(skill=skill):
+            raise UnsupportedModelError(f"{skill} running: that can be asked in properties only")
         case Implies(premise=premise, conclusion=conclusion):
             return not holds(premise, states, data) or holds(conclusion, states, data)
 

@@ -73,7 +73,7 @@ class Step:
 
 
 def check_supported(skillset: Skillset) -> None:
-    """Refuse what can't be executed: invariants and postconditions over data (resources alone change in steps), unknown units.
+    """Refuse what can't be executed: invariants and postconditions over data, durations, deadlines, unknown units.
 
     Raises:
         UnsupportedModelError: names the place.
@@ -82,6 +82,13 @@ def check_supported(skillset: Skillset) -> None:
         for precondition in skill.preconditions:
             for atom in data_of(precondition.condition):
                 in_si(atom)
+        for invariant in skill.invariants:
+            if invariant.hold is not None:
+                raise UnsupportedModelError(
+                    f"{invariant.span}: {skill.name}, invariant {invariant.name}: durations are proved, not yet executed"
+                )
+        if skill.progress is not None and skill.progress.deadline_s is not None:
+            raise UnsupportedModelError(f"{skill.progress.span}: {skill.name}: a progress deadline is proved, not yet executed")
         pure = [(f"invariant {i.name}", i.condition) for i in skill.invariants]
         pure += [(f"postcondition of {r.name}", r.postcondition) for r in skill.results]
         pure += [("postcondition of the interruption", skill.interrupt.postcondition)]

@@ -81,6 +81,10 @@ class Cursor:
             return self.advance()
         raise self.fail(kind.value)
 
+    def same_line(self, offset: int = 0) -> bool:
+        """Tell whether the token that many places ahead stands on the line of the token read last."""
+        return self.ahead(offset).line == self.previous.line
+
     def span(self, first: Token, last: Token | None = None) -> Span:
         """Return the place from one token to another of the same line (to the first one's end when it isn't)."""
         span = self.source.span(first)
@@ -95,10 +99,14 @@ class Cursor:
         self.source.report("ALU103", message, self.source.span(self.here), hint=hint, expected=listed)
         return SyntaxFault()
 
-    def block(self, entry: Callable[[], None], outer: Callable[[], bool]) -> None:
-        """Read `{ entry* }`. ``outer`` tells that what comes next can only stand outside, so that the `}` is missing."""
+    def block(self, entry: Callable[[], None], outer: Callable[[], bool], begins: Callable[[], bool] | None = None) -> None:
+        """Read `{ entry* }`, commas or semicolons allowed between entries.
+
+        ``outer`` tells that what comes next can only stand outside, so that the `}` is missing. After an entry that can't be
+        read it goes on where ``begins`` tells that another one begins, by default with `name:` or `name {` first in a line.
+        """
         opening = self.expect("{")
-        while not self.accept("}"):
+        while not self._closed():
             if self.at_end or outer():
                 self._missing_end(opening)
                 return
@@ -106,11 +114,21 @@ class Cursor:
             try:
                 entry()
             except SyntaxFault:
-                self._skip_to_end(outer, minimum=before)
-                return
+                if not self._skip_entry(outer, begins or self._begins_entry, minimum=before):
+                    return
             if self.source.full:
                 self._index = len(self._tokens) - 1
                 return
+
+    def _begins_entry(self) -> bool:
+        first = self.here.line > self.previous.line
+        return first and self.here.kind is Kind.NAME and self.ahead().text in {":", "{"}
+
+    def _closed(self) -> bool:
+        """Skip commas and semicolons between entries, and the `}` if it is there."""
+        while self.accept(",", ";"):
+            pass
+        return self.accept("}") is not None
 
     def _missing_end(self, opening: Token) -> None:
         if self.at_end:
@@ -123,18 +141,25 @@ class Cursor:
         message = f"the block opened in line {opening.line} has no `}}` before {self.here.shown} begins"
         self.source.report("ALU104", message, self.source.span(self.here), hint="close the block with `}`")
 
-    def _skip_to_end(self, outer: Callable[[], bool], *, minimum: int) -> None:
-        """Go on behind the `}` of the present block, or where something begins that can only stand outside."""
+    def _skip_entry(self, outer: Callable[[], bool], begins: Callable[[], bool], *, minimum: int) -> bool:
+        """Skip the rest of an entry; False where the block ends behind it, or something begins that can only stand outside."""
         depth = sum({"{": 1, "}": -1}.get(token.text, 0) for token in self._tokens[minimum : self._index])
-        while not self.at_end and not (depth <= 0 and outer()):
+        if self._index == minimum and self.here.text not in {"{", "}"} and not outer():
+            self.advance()
+        while not self.at_end:
+            if depth <= 0 and outer():
+                return False
+            if depth <= 0 and self._index > minimum and begins():
+                return True
             if self.here.text == "{":
                 depth += 1
             elif self.here.text == "}":
                 depth -= 1
                 if depth < 0:
                     self.advance()
-                    return
+                    return False
             self.advance()
+        return False
 
 
 def starts_block(cursor: Cursor, words: Collection[str]) -> bool:
@@ -143,9 +168,10 @@ def starts_block(cursor: Cursor, words: Collection[str]) -> bool:
 
 
 def starts_member(cursor: Cursor, words: Collection[str]) -> bool:
-    """Tell whether `word name` comes next, with one of these words, as in `skill takeoff`."""
-    following = cursor.ahead()
-    return cursor.here.text in words and cursor.here.kind is Kind.NAME and following.kind is Kind.NAME and cursor.ahead(2).text != "->"
+    """Tell whether `word name {` or `word name:` comes next, with one of these words, as in `skill takeoff {`."""
+    if cursor.here.text not in words or cursor.here.kind is not Kind.NAME:
+        return False
+    return cursor.ahead().kind is Kind.NAME and cursor.ahead(2).text in {"{", ":"}
 
 
 _FEW = 3

@@ -13,6 +13,7 @@ from skill_language.model import NO_EFFECT, Effect, Interrupt, Invariant, Parame
 class SkillParts:
     """What was read of a skill so far; an effect that is referred to has only its name until ``build``."""
 
+    parameters: list[Parameter] = field(default_factory=list)
     inputs: list[Parameter] = field(default_factory=list)
     outputs: list[Parameter] = field(default_factory=list)
     effects: list[Effect] = field(default_factory=list)
@@ -37,12 +38,13 @@ class SkillParts:
                 return replace(named[reference.name], span=reference.span)
             if not self.effects_complete:
                 return reference
-            hint = nearest(reference.name, named) or "define it in the skill's `effect` block"
+            hint = nearest(reference.name, named) or "define it in an `effect` block of the skill"
             source.report("ALU204", f"skill `{name.text}` has no effect `{reference.name}`", reference.span, hint=hint)
             return reference
 
         return Skill(
             name=name.text,
+            parameters=tuple(self.parameters),
             inputs=tuple(self.inputs),
             outputs=tuple(self.outputs),
             effects=tuple(self.effects),

@@ -1,4 +1,7 @@
-"""Conditions: `resource = (a == S and not b != T)`, `data = (battery.level > 0.2)`, and both joined by and, or, not, =>.
+"""Conditions of both notations.
+
+The paper's: `resource = (a == S and not b != T)`, `data = (battery.level > 0.2)`, and both joined by and, or, not, =>.
+The Robot Language's and every property: the same without the words `resource = (...)` and `data = (...)` around it.
 
 From loose to tight: `=>` (to the right), `or`, `and`, `not`, then comparisons and parentheses.
 """
@@ -8,27 +11,38 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NoReturn
 
-from skill_language.lexer import Kind, number, string_value
-from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, Span
-from skill_language.paper.cursor import OPERATOR_WORDS, Cursor, SyntaxFault
+from skill_language.lexer import Kind, Token, string_value
+from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, Span
+from skill_language.syntax.cursor import OPERATOR_WORDS, Cursor, SyntaxFault
+from skill_language.syntax.quantities import quantity
 
 MAX_DEPTH = 40
 """Nesting beyond this is a mistake or an attack; it also keeps the recursion within Python's limit."""
 
 Atom = Callable[[int], Expression]
+_COMPARISONS = tuple(comparison.value for comparison in Comparison)
+_EQUALITIES = ("==", "!=")
+_NO_EXECUTION = frozenset({*_COMPARISONS, ".", ":", "{", "->"})
+"""What tells that `running` is a name of its own and does not belong to the name before it."""
 
 
-def condition(cursor: Cursor) -> Expression:
-    """Read a condition as it stands behind `name:` in a precondition or invariant."""
-    return _Reader(cursor).implication(0)
+def paper_condition(cursor: Cursor) -> Expression:
+    """Read a condition of the paper's notation, as it stands behind `name:` in a precondition or invariant."""
+    return _Reader(cursor, bare=False).implication(0)
+
+
+def bare_condition(cursor: Cursor) -> Expression:
+    """Read a condition of the Robot Language, or of a property in either notation."""
+    return _Reader(cursor, bare=True).implication(0)
 
 
 class _Reader:
     """Reads one condition; ``atom`` changes with where we are: outside, in `resource = (...)` or in `data = (...)`."""
 
-    def __init__(self, cursor: Cursor) -> None:
+    def __init__(self, cursor: Cursor, *, bare: bool) -> None:
         self.cursor = cursor
-        self.atom: Atom = self._predicate
+        self.atom: Atom = self._bare_atom if bare else self._predicate
+        self._enclosed = 0
 
     def implication(self, depth: int) -> Expression:
         """Read `premise => conclusion`, which groups to the right."""
@@ -64,13 +78,14 @@ class _Reader:
 
     def _parenthesised(self, depth: int) -> Expression:
         self.cursor.expect("(")
+        self._enclosed += 1
         inner = self.implication(depth)
-        self._close()
-        return inner
-
-    def _close(self) -> None:
+        self._enclosed -= 1
         if not self.cursor.accept(")"):
             raise self.cursor.fail("`)`", "`and`", "`or`", "`=>`")
+        return inner
+
+    # --- the paper's predicates -----------------------------------------------------------------------------------
 
     def _predicate(self, depth: int) -> Expression:
         """Read `resource = (...)` or `data = (...)`."""
@@ -85,49 +100,68 @@ class _Reader:
             self.atom = outside
 
     def _predicate_hint(self) -> str:
-        if self.cursor.ahead().text in {"==", "!="}:
+        if self.cursor.ahead().text in _EQUALITIES:
             return "put it into `resource = (...)`, or `data = (...)` if it is about data"
         return ""
 
     def _resource_atom(self, _depth: int) -> Expression:
         first = self.cursor.name("a resource")
-        if self.cursor.at("=") and self.cursor.ahead().kind is Kind.NAME:
-            raise self.cursor.fail("`==`", "`!=`", hint="states are compared with `==`")
-        operator = self.cursor.expect("==", "!=")
-        state = self.cursor.name("a state")
-        return ResourceIs(first.text, state.text, operator.text == "!=", span=self.cursor.span(first, state))
+        self._refuse_assignment()
+        operator = self.cursor.expect(*_EQUALITIES)
+        return self._is_state(first, operator)
 
     def _data_atom(self, _depth: int) -> Expression:
         first = self.cursor.name("data")
+        return self._is_value(first, self._path())
+
+    # --- atoms without the words ----------------------------------------------------------------------------------
+
+    def _bare_atom(self, depth: int) -> Expression:
+        cursor = self.cursor
+        if cursor.at("resource", "data") and cursor.ahead().text == "=" and cursor.ahead(2).text == "(":
+            return self._predicate(depth)
+        first = cursor.name("a condition")
+        if cursor.at("running") and cursor.ahead().text not in _NO_EXECUTION:
+            return SkillRuns(first.text, span=cursor.span(first, cursor.advance()))
+        path = self._path()
+        if not path and cursor.at(*_EQUALITIES) and cursor.ahead().kind is Kind.NAME and cursor.ahead().text not in OPERATOR_WORDS:
+            return self._is_state(first, cursor.advance())
+        if not path:
+            self._refuse_assignment()
+        return self._is_value(first, path)
+
+    def _refuse_assignment(self) -> None:
+        if self.cursor.at("=") and self.cursor.ahead().kind is Kind.NAME:
+            raise self.cursor.fail("`==`", "`!=`", hint="states are compared with `==`")
+
+    def _is_state(self, first: Token, operator: Token) -> Expression:
+        state = self.cursor.name("a state")
+        return ResourceIs(first.text, state.text, operator.text == "!=", span=self.cursor.span(first, state))
+
+    def _path(self) -> tuple[str, ...]:
         path: list[str] = []
         while self.cursor.accept("."):
             path.append(self.cursor.name("a field").text)
+        return tuple(path)
+
+    def _is_value(self, first: Token, path: tuple[str, ...]) -> Expression:
         last = self.cursor.previous
-        if not self.cursor.at(*(c.value for c in Comparison)):
+        if not self.cursor.at(*_COMPARISONS):
             # A truth value may stand alone.
-            return DataIs(first.text, tuple(path), Comparison.EQ, value=True, span=self.cursor.span(first, last))
+            return DataIs(first.text, path, Comparison.EQ, value=True, span=self.cursor.span(first, last))
         comparison = Comparison(self.cursor.advance().text)
         value, unit = self._value()
-        span = self.cursor.span(first, self.cursor.previous)
-        return DataIs(first.text, tuple(path), comparison, value, unit, span=span)
+        return DataIs(first.text, path, comparison, value, unit, span=self.cursor.span(first, self.cursor.previous))
 
     def _value(self) -> tuple[float | str | bool, str]:
         cursor = self.cursor
         if token := cursor.accept("true", "false"):
             return token.text == "true", ""
-        token = cursor.here
-        if token.kind is Kind.STRING:
+        if cursor.here.kind is Kind.STRING:
             return string_value(cursor.advance()), ""
-        if token.kind is not Kind.NUMBER:
+        if cursor.here.kind is not Kind.NUMBER:
             raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`")
-        value, unit = number(cursor.source, cursor.advance()), cursor.here
-        if cursor.at("%") or (unit.kind is Kind.NAME and unit.text not in OPERATOR_WORDS):
-            return value, cursor.advance().text + self._per()
-        return value, ""
-
-    def _per(self) -> str:
-        """Read the second half of a unit such as `m/s`, if it has one."""
-        return f"/{self.cursor.name('a unit').text}" if self.cursor.accept("/") else ""
+        return quantity(cursor, enclosed=self._enclosed > 0)
 
     def _too_deep(self) -> NoReturn:
         message = f"the condition is nested more than {MAX_DEPTH} deep"

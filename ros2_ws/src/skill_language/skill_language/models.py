@@ -1,0 +1,151 @@
+"""Files that are read together, the names that they use of each other, and every finding about each of them.
+
+A skillset that says `use other` knows the types of skillset `other`, which is in one of the files, and those that are in
+`other.skill` or `other.rl` beside its own file, within a skillset or outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from skill_language.check import check
+from skill_language.errors import Diagnostic, LanguageError, Severity, nearest
+from skill_language.lexer import MAX_CHARACTERS
+from skill_language.model import Skillset, Span
+from skill_language.notation import SUFFIXES, Notation, read
+from skill_language.syntax.document import Document, typed_elements, with_known_types
+
+
+@dataclass
+class ModelFile:
+    """A file and what was found in it; ``document`` is None where there is no text to read."""
+
+    path: str
+    text: str = ""
+    document: Document | None = None
+    findings: list[Diagnostic] = field(default_factory=list)
+    declared: tuple[Skillset, ...] = ()
+    """The skillsets as they stand in the file: without the types that they know by `use`."""
+
+    @property
+    def skillsets(self) -> tuple[Skillset, ...]:
+        """What could be read of the skillsets of the file."""
+        return self.document.skillsets if self.document else ()
+
+    @property
+    def damaged(self) -> bool:
+        """Something could not be read."""
+        return self.document is None or self.document.damaged
+
+    def add(self, findings: Iterable[Diagnostic]) -> None:
+        """Add findings, in the order of the source, each with the line that it is about."""
+        lines = self.text.split("\n")
+        found = [_with_line(finding, lines) for finding in findings]
+        self.findings = sorted((*self.findings, *found), key=lambda d: (d.span.line, d.span.column, d.code))
+
+
+def check_files(paths: Sequence[str | Path]) -> list[ModelFile]:
+    """Read and check files together; all trouble is in their findings, in the order of the source."""
+    return check_texts([_read_file(Path(path), str(path)) for path in paths])
+
+
+def check_texts(files: Sequence[ModelFile], notation: Notation | None = None) -> list[ModelFile]:
+    """Read and check files whose text is known already (those with findings are left as they are)."""
+    for file in files:
+        if not file.findings:
+            file.document, source = read(file.text, file.path, notation)
+            file.declared = file.document.skillsets
+            file.findings += source.diagnostics
+    _resolve(files)
+    for file in files:
+        file.add(_meaning(file))
+    return list(files)
+
+
+def read_text(path: Path) -> str:
+    """Return a file's text with its line ends as newlines; raise LanguageError (ALU001 to ALU003) when it is no readable text."""
+    try:
+        if path.stat().st_size > 4 * MAX_CHARACTERS:
+            raise LanguageError([about(path, "ALU003", f"{path.stat().st_size} bytes are too much for a model")])
+        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        message = f"not UTF-8 text: byte {error.start} is 0x{error.object[error.start]:02x}"
+        raise LanguageError([about(path, "ALU002", message)]) from error
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else "") or str(error)
+        raise LanguageError([about(path, "ALU001", f"can't be read: {reason}")]) from error
+
+
+def about(path: Path, code: str, message: str) -> Diagnostic:
+    """Return an error about a file as a whole."""
+    return Diagnostic(code, message, Span(str(path), 0, 0, 0))
+
+
+def _read_file(path: Path, name: str) -> ModelFile:
+    try:
+        return ModelFile(name, read_text(path))
+    except LanguageError as error:
+        return ModelFile(name, findings=list(error.diagnostics))
+
+
+def _meaning(file: ModelFile) -> Iterator[Diagnostic]:
+    """Yield findings about what could be read, as far as they can't come from what could not."""
+    document = file.document
+    if document is None or not document.whole:
+        return
+    for skillset in document.skillsets:
+        for finding in check(skillset):
+            # What seems unused or unknown may be in the part that is missing.
+            if not document.damaged or (finding.severity is Severity.ERROR and finding.code != "ALU222"):
+                yield finding
+    if not document.damaged and len(document.skillsets) > 1:
+        used = {element.type for skillset in document.skillsets for element in typed_elements(skillset)}
+        for shared in document.types:
+            if shared.name not in used:
+                yield Diagnostic("ALU303", f"type `{shared.name}` is never used", shared.span, Severity.WARNING)
+
+
+# --- names across files ----------------------------------------------------------------------------------------------
+
+
+def _resolve(files: Sequence[ModelFile]) -> None:
+    """Give skillsets the types of those that they use; report what they use and isn't there."""
+    known: dict[str, Skillset] = {}
+    for file in files:
+        for skillset in file.skillsets:
+            known.setdefault(skillset.name, skillset)
+    for file in files:
+        if file.document is not None and any(skillset.uses for skillset in file.skillsets):
+            resolved = tuple(_resolved(file, skillset, known) for skillset in file.skillsets)
+            file.document = replace(file.document, skillsets=resolved)
+
+
+def _resolved(file: ModelFile, skillset: Skillset, known: Mapping[str, Skillset]) -> Skillset:
+    names: list[str] = []
+    for use in skillset.uses:
+        types = known[use].types if use in known else _beside(file, use)
+        if types is None:
+            message = f"`{skillset.name}` uses `{use}`, which is no skillset of these files, nor a file beside this one"
+            hint = nearest(use, set(known) - {skillset.name})
+            file.add([Diagnostic("ALU224", message, skillset.span, hint=hint)])
+        names += types or ()
+    return with_known_types(skillset, names)
+
+
+def _beside(file: ModelFile, name: str) -> tuple[str, ...] | None:
+    for suffix in SUFFIXES:
+        path = Path(file.path).parent / f"{name}{suffix}"
+        try:
+            document, _ = read(read_text(path), str(path))
+        except LanguageError:
+            continue
+        outside = tuple(kind.name for kind in document.types)
+        return outside + tuple(kind for skillset in document.skillsets for kind in skillset.types)
+    return None
+
+
+def _with_line(finding: Diagnostic, lines: Sequence[str]) -> Diagnostic:
+    line = finding.span.line
+    return replace(finding, source_line=lines[line - 1]) if 0 < line <= len(lines) else finding

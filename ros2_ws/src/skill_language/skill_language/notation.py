@@ -1,0 +1,53 @@
+"""Which notation a text is in, and reading it in that one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from itertools import pairwise
+from pathlib import PurePath
+
+from skill_language.lexer import Kind, Source, Token, tokenize
+from skill_language.paper import PAPER
+from skill_language.rl import ROBOT_LANGUAGE
+from skill_language.syntax.document import Dialect, Document, read_document
+
+
+class Notation(Enum):
+    """The two ways to write a model; the value is what `--to` calls it."""
+
+    PAPER = "paper"
+    ROBOT_LANGUAGE = "rl"
+
+
+SUFFIXES: Mapping[str, Notation] = {".skill": Notation.PAPER, ".rl": Notation.ROBOT_LANGUAGE}
+_DIALECTS: Mapping[Notation, Dialect] = {Notation.PAPER: PAPER, Notation.ROBOT_LANGUAGE: ROBOT_LANGUAGE}
+
+_PAPER_ROWS = frozenset(
+    {("progress", "="), ("resource", "="), ("data", "="), ("violation", "="), ("apply", "="), ("period", "="), ("result", "{")}
+)
+_RL_WORDS = frozenset({"guard", "start", "postcondition", "failure"})
+
+
+def notation_of(file: str, text: str) -> Notation:
+    """Return the notation of a file by its suffix, or by its words where the suffix tells nothing."""
+    suffix = PurePath(file).suffix.lower()
+    return SUFFIXES[suffix] if suffix in SUFFIXES else sniff(tokenize(Source("", text)))
+
+
+def sniff(tokens: list[Token]) -> Notation:
+    """Return the notation that more of the words speak for; the paper's when none does."""
+    paper = rl = 0
+    for token, following in pairwise(tokens):
+        if token.kind is not Kind.NAME:
+            continue
+        paper += (token.text, following.text) in _PAPER_ROWS
+        rl += token.text in _RL_WORDS or (token.text == "transition" and following.text == "{")
+    return Notation.ROBOT_LANGUAGE if rl > paper else Notation.PAPER
+
+
+def read(text: str, file: str = "", notation: Notation | None = None) -> tuple[Document, Source]:
+    """Return what could be read of a text, and the source with what is wrong with it (the notation only, not the meaning)."""
+    source = Source(file, text)
+    dialect = _DIALECTS[notation or notation_of(file, text)]
+    return read_document(source, dialect), source

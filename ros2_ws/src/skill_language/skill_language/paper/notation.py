@@ -1,0 +1,22 @@
+"""The paper's notation as a whole: its skills, and conditions that say what they ask (`resource = (...)`)."""
+
+from __future__ import annotations
+
+from skill_language.lexer import Source
+from skill_language.model import Skillset
+from skill_language.paper.skill import read_skill
+from skill_language.syntax.conditions import paper_condition
+from skill_language.syntax.document import Dialect, one_skillset, read_document
+
+PAPER = Dialect(read_skill, paper_condition)
+
+
+def parse(text: str, file: str = "") -> Skillset:
+    """Return the only skillset written in ``text``.
+
+    Raises:
+        LanguageError: with everything that is wrong with the notation. Meaning is judged by ``check``, except that an
+            effect that is referred to must exist, for else there is nothing to put into the model.
+    """
+    source = Source(file, text)
+    return one_skillset(source, read_document(source, PAPER))

@@ -1,0 +1,149 @@
+"""`python -m skill_language.prove.bench [--json] [--sizes 10,20,50,100,200] [--timeout 60]`: how far the proofs scale.
+
+Grows two kinds of skillsets by skills and resources alike, and proves them one situation at a time and as sets, each
+in a process of its own: seconds of the clock, peak memory, how many situations, and where it stops.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+
+from skill_language.model import (
+    And,
+    Assignment,
+    Effect,
+    Interrupt,
+    Invariant,
+    Precondition,
+    Property,
+    PropertyKind,
+    Resource,
+    ResourceIs,
+    Result,
+    Skill,
+    SkillRuns,
+    Skillset,
+    Transition,
+)
+from skill_language.prove.prover import prove
+
+ALL_ONE_BY_ONE = 10**9
+
+
+def tools(count: int) -> Skillset:
+    """Return a robot with ``count`` tools: each a resource of its own and a skill that uses it, all under one authority."""
+    authority = Resource(
+        "authority", ("Pilot", "Drone"), "Pilot", (Transition("Pilot", "Drone", extern=True), Transition("Drone", "Pilot", extern=True))
+    )
+    skills = tuple(_using(f"use{i}", [f"tool{i}"], ResourceIs("authority", "Drone")) for i in range(count))
+    never = Property("obeys", PropertyKind.NEVER, And((SkillRuns("use0"), ResourceIs("authority", "Pilot"))))
+    ends = Property("ends", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs("tool0", "Free"), fair=True)
+    return Skillset(
+        "tools", resources=(authority, *(_free_or_used(f"tool{i}") for i in range(count))), skills=skills, properties=(never, ends)
+    )
+
+
+def neighbours(count: int) -> Skillset:
+    """Return a ring of ``count`` resources and as many skills that each need two neighbours of it."""
+    skills = tuple(_using(f"join{i}", [f"part{i}", f"part{(i + 1) % count}"]) for i in range(count))
+    both = Property("apart", PropertyKind.NEVER, And((SkillRuns("join0"), SkillRuns("join1"))))
+    return Skillset("neighbours", resources=tuple(_free_or_used(f"part{i}") for i in range(count)), skills=skills, properties=(both,))
+
+
+FAMILIES = {"tools": tools, "neighbours": neighbours}
+METHODS = {"one by one": ALL_ONE_BY_ONE, "sets": 0}
+
+
+def _free_or_used(name: str) -> Resource:
+    return Resource(name, ("Free", "Used"), "Free", (Transition("Free", "Used"), Transition("Used", "Free")))
+
+
+def _using(name: str, resources: Sequence[str], needs: ResourceIs | None = None) -> Skill:
+    take = Effect("take", tuple(Assignment(one, "Used") for one in resources))
+    give = Effect("give", tuple(Assignment(one, "Free") for one in resources))
+    needed = () if needs is None else (Precondition("needs", needs),)
+    kept = () if needs is None else (Invariant("keeps", needs, give),)
+    free = tuple(Precondition(f"free_{one}", ResourceIs(one, "Free")) for one in resources)
+    held = tuple(Invariant(f"holds_{one}", ResourceIs(one, "Used")) for one in resources)
+    return Skill(
+        name,
+        preconditions=(*needed, *free),
+        start=take,
+        invariants=(*kept, *held),
+        interrupt=Interrupt(effect=give),
+        results=(Result("OK", effect=give),),
+    )
+
+
+def measure(family: str, count: int, method: str, timeout_s: float) -> dict[str, object]:
+    """Prove one skillset in this process."""
+    begin = time.monotonic()
+    findings = prove(FAMILIES[family](count), timeout_s=timeout_s, most=METHODS[method])
+    seconds = time.monotonic() - begin
+    return {
+        "family": family,
+        "size": count,
+        "method": method,
+        "seconds": round(seconds, 3),
+        "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "proved": not any(finding.code == "ALU540" for finding in findings),
+        "findings": sorted({finding.code for finding in findings}),
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure all sizes until a method stops; print a table or JSON."""
+    parser = argparse.ArgumentParser(prog="bench", description="Measure how far the proofs of skillsets scale.")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--sizes", default="10,20,50,100,200", help="numbers of skills, and as many resources")
+    parser.add_argument("--timeout", type=float, default=60.0, metavar="SECONDS", help="for each proof")
+    parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure this one only, in this process")
+    options = parser.parse_args(arguments)
+    if options.one:
+        family, size, method = options.one
+        sys.stdout.write(json.dumps(measure(family, int(size), method, options.timeout)) + "\n")
+        return 0
+    rows = _all([int(size) for size in options.sizes.split(",")], options.timeout)
+    sys.stdout.write((json.dumps({"timeout_s": options.timeout, "proofs": rows}, indent=2) if options.json else _table(rows)) + "\n")
+    return 0
+
+
+def _all(sizes: Sequence[int], timeout_s: float) -> list[dict[str, object]]:
+    rows: list[dict[str, object]] = []
+    for family in FAMILIES:
+        for method in METHODS:
+            for size in sizes:
+                command = [
+                    sys.executable,
+                    "-m",
+                    "skill_language.prove.bench",
+                    "--timeout",
+                    str(timeout_s),
+                    "--one",
+                    family,
+                    str(size),
+                    method,
+                ]
+                rows.append(json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout))
+                if not rows[-1]["proved"]:
+                    break
+    return rows
+
+
+def _table(rows: Sequence[dict[str, object]]) -> str:
+    lines = [f"{'family':<12}{'method':<12}{'size':>6}{'seconds':>10}{'peak MB':>10}  proved"]
+    lines += [
+        f"{r['family']:<12}{r['method']:<12}{r['size']:>6}{r['seconds']:>10}{r['peak_mb']:>10}  {'yes' if r['proved'] else 'no'}"
+        for r in rows
+    ]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,179 @@
+"""The model's conditions in z3: resources are enumerations, numbers of data are reals that may have any value."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import z3
+
+from skill_language.model import (
+    And,
+    Comparison,
+    Constant,
+    DataIs,
+    Effect,
+    Expression,
+    Implies,
+    Not,
+    Or,
+    Resource,
+    ResourceIs,
+    SkillRuns,
+    Skillset,
+)
+from skill_language.prove.limits import Deadline, OutOfTimeError
+from skill_language.units import UNIT_IN_SI
+
+Assignment = Mapping[str, str]
+
+
+class Solver:
+    """Asks z3 about one skillset. States after an effect are constants put into the condition, so no second set of variables is needed."""
+
+    def __init__(self, skillset: Skillset, deadline: Deadline) -> None:
+        self.skillset = skillset
+        self._deadline = deadline
+        self._context = z3.Context()
+        self._solver = z3.Solver(ctx=self._context)
+        self._resources = {resource.name: resource for resource in skillset.resources}
+        self._variables: dict[str, Any] = {}
+        self._values: dict[str, dict[str, Any]] = {}
+        self._texts: dict[str, int] = {}
+        for resource in skillset.resources:
+            # An enumeration needs no bounds, so that a question costs what it asks and not what the skillset has.
+            sort, values = z3.EnumSort(f"resource {resource.name}", [f"{resource.name} {s}" for s in resource.states], ctx=self._context)
+            self._variables[resource.name] = z3.Const(f"state {resource.name}", sort)
+            self._values[resource.name] = dict(zip(resource.states, values, strict=True))
+
+    # --- questions ------------------------------------------------------------------------------------------------
+
+    def example(self, *terms: Any) -> Any | None:
+        """Return a model in which all terms are true, or None when there is none; raise OutOfTimeError."""
+        self._deadline.check()
+        self._solver.set("timeout", max(1, int(self._deadline.left_s() * 1000)))
+        self._solver.push()
+        try:
+            self._solver.add(*terms)
+            answer = self._solver.check()
+            if answer == z3.unknown:
+                raise OutOfTimeError
+            return self._solver.model() if answer == z3.sat else None
+        finally:
+            self._solver.pop()
+
+    def possible(self, *terms: Any) -> bool:
+        """Tell whether all terms can be true at once."""
+        return self.example(*terms) is not None
+
+    # --- terms ----------------------------------------------------------------------------------------------------
+
+    def term(self, condition: Expression, after: Assignment | None = None) -> Any:
+        """Return a condition as z3's; ``after`` gives resources the state that an effect has put them in."""
+        match condition:
+            case ResourceIs(resource=name, state=state, negated=negated):
+                if after and name in after:
+                    return self.constant(value=(after[name] == state) != negated)
+                same = self.state_is(name, state)
+                return z3.Not(same, ctx=self._context) if negated else same
+            case DataIs():
+                return self._data(condition)
+            case SkillRuns(skill=skill):
+                return z3.Bool(f"running {skill}", self._context)
+            case Constant(value=value):
+                return self.constant(value=value)
+            case Not(operand=operand):
+                return z3.Not(self.term(operand, after), ctx=self._context)
+            case And(operands=operands):
+                return z3.And(*(self.term(operand, after) for operand in operands))
+            case Or(operands=operands):
+                return z3.Or(*(self.term(operand, after) for operand in operands))
+            case Implies(premise=premise, conclusion=conclusion):
+                return z3.Implies(self.term(premise, after), self.term(conclusion, after))
+
+    def constant(self, *, value: bool) -> Any:
+        """Return true or false."""
+        return z3.BoolVal(value, ctx=self._context)
+
+    def state_is(self, resource: str, state: str) -> Any:
+        """Return that a resource is in a state."""
+        value = self._values[resource].get(state)
+        return self.constant(value=False) if value is None else self._variables[resource] == value
+
+    def negation(self, term: Any) -> Any:
+        """Return the opposite of a term."""
+        return z3.Not(term, ctx=self._context)
+
+    def applies(self, effect: Effect, *, by_event: bool = False) -> Any:
+        """Return that every change of an effect is an arrow now."""
+        changes = [
+            z3.Or(
+                self.constant(value=False),
+                *(self.state_is(change.resource, source) for source in sources(resource, change.target, by_event)),
+            )
+            for change in effect.assignments
+            for resource in [self._resources[change.resource]]
+        ]
+        names = [change.resource for change in effect.assignments]
+        return z3.And(self.constant(value=len(set(names)) == len(names)), *changes)
+
+    def _data(self, atom: DataIs) -> Any:
+        name = ".".join(("data", atom.data, *atom.path))
+        compare = _COMPARE[atom.comparison]
+        if isinstance(atom.value, bool):
+            return compare(z3.Bool(name, self._context), z3.BoolVal(atom.value, self._context))
+        if isinstance(atom.value, str):
+            # Texts are only compared for being the same: numbers in place of them will do.
+            number = self._texts.setdefault(atom.value, len(self._texts))
+            return compare(z3.Int(f"{name} text", self._context), z3.IntVal(number, self._context))
+        # By its decimals: 20 % is to be shown as 0.2 and not as the float next to it.
+        value = Fraction(repr(float(atom.value))) * Fraction(repr(UNIT_IN_SI.get(atom.unit, 1.0)))
+        return compare(z3.Real(f"{name} number", self._context), z3.RealVal(str(value), self._context))
+
+    # --- answers --------------------------------------------------------------------------------------------------
+
+    def told(self, model: Any, resources: Sequence[str]) -> tuple[str, ...]:
+        """Return which state each of these resources is in, and what value each data has, in a model; a line each."""
+        lines = [f"{name} == {self._state(model, name)}" for name in resources]
+        return (*lines, *self._told_data(model))
+
+    def states(self, model: Any) -> dict[str, str]:
+        """Return the state of every resource in a model."""
+        return {name: self._state(model, name) for name in self._resources}
+
+    def _state(self, model: Any, name: str) -> str:
+        value: str = model.eval(self._variables[name], model_completion=True).decl().name()
+        return value.removeprefix(f"{name} ")
+
+    def _told_data(self, model: Any) -> Iterator[str]:
+        texts = {number: text for text, number in self._texts.items()}
+        for declared in sorted(model.decls(), key=str):
+            words = declared.name().split(" ")
+            if not words[0].startswith("data."):
+                continue
+            value = model[declared]
+            name = words[0].removeprefix("data.")
+            if words[-1] == "text":
+                text = texts.get(value.as_long())
+                yield f'{name} == "{text}"' if text is not None else f"{name} is another text"
+            elif words[-1] == "number":
+                yield f"{name} == {value.as_decimal(6).rstrip('?')}"
+            else:
+                yield f"{name} == {str(value).lower()}"
+
+
+def sources(resource: Resource, target: str, any_arrow: bool) -> list[str]:  # noqa: FBT001 - the two callers name it by their own
+    """Return the states from which a skill (or with ``any_arrow`` an event) may take a resource to ``target``."""
+    return [arrow.source for arrow in resource.transitions if arrow.target == target and (any_arrow or not arrow.extern)]
+
+
+_COMPARE: Mapping[Comparison, Callable[[Any, Any], Any]] = {
+    Comparison.EQ: operator.eq,
+    Comparison.NE: operator.ne,
+    Comparison.LT: operator.lt,
+    Comparison.LE: operator.le,
+    Comparison.GT: operator.gt,
+    Comparison.GE: operator.ge,
+}

@@ -1,0 +1,209 @@
+"""All steps out of a situation, each taken by the runtime's own ``skill_runtime.core.semantics``.
+
+This is the one place of the language that imports the runtime, and of the runtime its pure core alone. The direction
+elsewhere is the other (``skill_runtime`` imports ``skill_language.model``), so it is imported when a search begins, not
+when the language is.
+
+A situation is kept as small as its future needs: the states of the resources and the names of the running skills.
+Executions of one skill differ in nothing but their age. The order of the start decides in which order violations take
+effect; skills whose violations change nothing are therefore kept sorted by name, before the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from skill_language.model import Effect, Event, Skill, Skillset
+from skill_language.prove.abstract import Abstraction, Breaker
+from skill_runtime.core import semantics
+from skill_runtime.core.conditions import holds
+from skill_runtime.core.errors import EffectError
+from skill_runtime.core.execution import ExecutionState
+from skill_runtime.core.semantics import Change, Entered, Running, Situation, Step
+
+Key = tuple[str, ...]
+"""What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A situation: the state of each resource, and the running skills in the order that matters."""
+
+    resources: tuple[str, ...]
+    running: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Move:
+    """A step to ``target``. ``kind`` and ``subject`` say what asked for it; ``ended`` names the skills that it ended."""
+
+    kind: str
+    subject: tuple[str, ...]
+    target: State
+    ended: tuple[str, ...] = ()
+    faults: tuple[Key, ...] = ()
+    step: Step | None = None
+
+
+class World:
+    """The steps of one skillset. ``copies`` is how many executions of one skill are looked at, at most."""
+
+    def __init__(self, abstraction: Abstraction, *, copies: int = 2) -> None:
+        self.skillset: Skillset = abstraction.skillset
+        self.copies = copies
+        self.crowded: set[str] = set()
+        """Skills of which more executions could have started than are looked at, and would have mattered."""
+        self._breakers = abstraction.breakers
+        self._names = tuple(resource.name for resource in self.skillset.resources)
+        self._ordered = {s.name for s in self.skillset.skills if any(i.effect.assignments for i in s.invariants)}
+        self.idle = {s.name for s in self.skillset.skills if not any(effect.assignments for effect in _effects(s))}
+
+    # --- situations -----------------------------------------------------------------------------------------------
+
+    def initial(self) -> State:
+        """Return the state at the start."""
+        return self.state(semantics.initial(self.skillset))
+
+    def state(self, situation: Situation) -> State:
+        """Return the state of a situation."""
+        running = [execution.skill for execution in situation.running]
+        sortable = sorted(name for name in running if name not in self._ordered)
+        return State(tuple(situation.states[name] for name in self._names), (*sortable, *(n for n in running if n in self._ordered)))
+
+    def situation(self, state: State) -> Situation:
+        """Return a situation of this state; executions are numbered by their age."""
+        running = tuple(Running(str(number), skill) for number, skill in enumerate(state.running, 1))
+        return Situation(dict(zip(self._names, state.resources, strict=True)), running)
+
+    # --- steps ----------------------------------------------------------------------------------------------------
+
+    def moves(self, state: State) -> Iterator[Move]:
+        """Yield every step out of a state, also those that change nothing but show a fault."""
+        situation = self.situation(state)
+        yield from self._extern(situation)
+        yield from self._events(situation)
+        yield from self._starts(situation)
+        yield from self._ends(situation)
+        yield from self._breaks(situation)
+
+    def _extern(self, situation: Situation) -> Iterator[Move]:
+        for resource in self.skillset.resources:
+            for target in dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern):
+                if not semantics.extern_refusal(self.skillset, situation, resource.name, target):
+                    step = semantics.transition(self.skillset, situation, resource.name, target)
+                    yield self._move("extern", (resource.name, target), step)
+
+    def _events(self, situation: Situation) -> Iterator[Move]:
+        for event in self.skillset.events:
+            if holds(event.guard, situation.states, {}):
+                changes = _event_changes(self.skillset, event, situation)
+                if changes is None:
+                    yield Move("event", (event.name,), self.state(situation), faults=(("effect", "event", event.name),))
+                elif changes:
+                    states = {**situation.states, **{change.resource: change.target for change in changes}}
+                    step = semantics.settle(self.skillset, Step(Situation(states, situation.running), changes))
+                    yield self._move("event", (event.name,), step)
+
+    def _starts(self, situation: Situation) -> Iterator[Move]:
+        counts = [execution.skill for execution in situation.running]
+        for skill in self.skillset.skills:
+            if semantics.unmet_precondition(skill, situation.states, {}) is not None:
+                continue
+            if self._fails(skill, skill.start, situation):
+                yield Move("start", (skill.name,), self.state(situation), faults=(("effect", "start", skill.name),))
+                continue
+            if counts.count(skill.name) >= self.copies:
+                # One more that changes nothing adds nothing that the others do not show.
+                self.crowded |= {skill.name} - self.idle
+                continue
+            step = semantics.start(self.skillset, situation, Running("new", skill.name))
+            yield self._move("start", (skill.name,), step, self._broken_at_birth(skill, step))
+
+    def _ends(self, situation: Situation) -> Iterator[Move]:
+        seen: set[tuple[State, tuple[str, ...]]] = set()
+        for execution in situation.running:
+            for move in self._ends_of(situation, execution):
+                if (move.target, move.subject) not in seen:
+                    seen.add((move.target, move.subject))
+                    yield move
+
+    def _ends_of(self, situation: Situation, execution: Running) -> Iterator[Move]:
+        skill = self.skillset.skill(execution.skill)
+        for result in skill.results:
+            key: Key = ("result", skill.name, result.name)
+            step = semantics.terminate(self.skillset, situation, execution, result.name)
+            faults = self._end_faults(skill, result.effect, key, situation, step, execution)
+            yield self._move("terminate", (skill.name, result.name), step, faults)
+        key = ("interrupt", skill.name)
+        step = semantics.interrupt(self.skillset, situation, execution)
+        yield self._move("interrupt", (skill.name,), step, self._end_faults(skill, skill.interrupt.effect, key, situation, step, execution))
+
+    def _breaks(self, situation: Situation) -> Iterator[Move]:
+        running = {execution.skill for execution in situation.running}
+        for breaker in self._breakers:
+            if breaker.skill in running and holds(breaker.when, situation.states, {}):
+                yield self._move("data", (breaker.skill, breaker.invariant), _broken(breaker, situation))
+
+    # --- faults ---------------------------------------------------------------------------------------------------
+
+    def _move(self, kind: str, subject: tuple[str, ...], step: Step, faults: tuple[Key, ...] = ()) -> Move:
+        ended = tuple(h.execution.skill for h in step.happenings if isinstance(h, Entered) and h.state is not ExecutionState.RUNNING)
+        return Move(kind, subject, self.state(step.situation), ended, (*faults, *self._violation_faults(step)), step)
+
+    def _fails(self, skill: Skill, effect: Effect, situation: Situation) -> bool:
+        try:
+            semantics.effect_changes(self.skillset, Running("", skill.name), effect, "", situation.states)
+        except EffectError:
+            return True
+        return False
+
+    def _end_faults(self, skill: Skill, effect: Effect, key: Key, situation: Situation, step: Step, execution: Running) -> tuple[Key, ...]:
+        if self._fails(skill, effect, situation):
+            return (("effect", *key),)
+        entered = next(h for h in step.happenings if isinstance(h, Entered) and h.execution == execution)
+        return (("post", *key),) if entered.state is ExecutionState.FAILED else ()
+
+    def _violation_faults(self, step: Step) -> tuple[Key, ...]:
+        """Find violations whose effect was no transition: it is not among what happened just before."""
+        faults: list[Key] = []
+        for index, entered in enumerate(step.happenings):
+            if isinstance(entered, Entered) and entered.state is ExecutionState.RESOURCE_INVARIANT_VIOLATED:
+                skill = self.skillset.skill(entered.execution.skill)
+                effect = next(one.effect for one in skill.invariants if one.name == entered.result)
+                wanted, by = len(effect.assignments), f"{skill.name} {entered.execution.id} "
+                before = step.happenings[index - wanted : index] if index >= wanted else ()
+                if wanted and not (before and all(isinstance(h, Change) and h.cause.startswith(by) for h in before)):
+                    faults.append(("effect", "invariant", skill.name, entered.result))
+        return tuple(faults)
+
+    @staticmethod
+    def _broken_at_birth(skill: Skill, step: Step) -> tuple[Key, ...]:
+        for entered in step.happenings:
+            if isinstance(entered, Entered) and entered.execution.id == "new" and entered.state is not ExecutionState.RUNNING:
+                return (("after start", skill.name, entered.result),)
+        return ()
+
+
+def _broken(breaker: Breaker, situation: Situation) -> Step:
+    return semantics.settle(breaker.broken, Step(situation))
+
+
+def _effects(skill: Skill) -> Iterator[Effect]:
+    yield skill.start
+    yield skill.interrupt.effect
+    for invariant in skill.invariants:
+        yield invariant.effect
+    for result in skill.results:
+        yield result.effect
+
+
+def _event_changes(skillset: Skillset, event: Event, situation: Situation) -> tuple[Change, ...] | None:
+    """Return what an event changes, or None when a change is no arrow; an event may take any arrow, also an extern one."""
+    changes: list[Change] = []
+    for assignment in event.effect.assignments:
+        resource, source = skillset.resource(assignment.resource), situation.states[assignment.resource]
+        if not any(resource.has_arrow(source, assignment.target, extern=extern) for extern in (True, False)):
+            return None
+        changes.append(Change(resource.name, source, assignment.target, f"event {event.name}"))
+    return tuple(changes)

@@ -1,0 +1,1 @@
+"""What both notations share: a cursor over tokens with recovery, conditions, durations, changes, resources, properties."""

@@ -1,0 +1,161 @@
+"""The language server, driven as an editor drives it: JSON-RPC over the standard streams of a process."""
+
+from __future__ import annotations
+
+import json
+import queue
+import subprocess
+import sys
+import threading
+
+import pytest
+
+TIMEOUT_S = 30
+URI = "file:///tmp/does_not_exist/robot.rl"
+TEXT = """type Point
+
+skillset robot {
+  data battery: Point period 1 sec
+  resource axes {
+    state { FREE USED }
+    initial FREE
+    transition { FREE -> USED  USED -> FREE }
+  }
+  skill goto {
+    input target: Point
+    effect take: axes -> USED
+    precondition free: axes == FREE
+    start take
+    success ok { effect axes -> FREE }
+    failure ko
+  }
+}
+"""
+
+
+class Editor:
+    """The other end of the protocol."""
+
+    def __init__(self):
+        command = [sys.executable, "-m", "skill_language.server"]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.received = queue.Queue()
+        self.number = 0
+        threading.Thread(target=self._receive, daemon=True).start()
+
+    def _receive(self):
+        out = self.process.stdout
+        while header := out.readline():
+            length = int(header.split(b":")[1]) if header.lower().startswith(b"content-length") else 0
+            while out.readline().strip():
+                pass
+            self.received.put(json.loads(out.read(length)))
+
+    def send(self, method, params, **more):
+        body = json.dumps({"jsonrpc": "2.0", "method": method, "params": params, **more}).encode()
+        self.process.stdin.write(b"Content-Length: %d\r\n\r\n%s" % (len(body), body))
+        self.process.stdin.flush()
+
+    def ask(self, method, params):
+        self.number += 1
+        self.send(method, params, id=self.number)
+        return self.wait(lambda m: m.get("id") == self.number and "method" not in m)["result"]
+
+    def told(self):
+        return self.wait(lambda m: m.get("method") == "textDocument/publishDiagnostics")["params"]
+
+    def wait(self, wanted):
+        while True:
+            message = self.received.get(timeout=TIMEOUT_S)
+            if wanted(message):
+                return message
+
+    def at(self, method, line, text, offset=0):
+        """Ask about the place of a text in a line of TEXT, counted as editors do."""
+        column = TEXT.split("\n")[line].index(text) + offset
+        return self.ask(method, {"textDocument": {"uri": URI}, "position": {"line": line, "character": column}})
+
+    def change(self, text, version):
+        document = {"uri": URI, "version": version}
+        self.send("textDocument/didChange", {"textDocument": document, "contentChanges": [{"text": text}]})
+        return self.told()["diagnostics"]
+
+
+@pytest.fixture
+def editor():
+    editor = Editor()
+    try:
+        capabilities = editor.ask("initialize", {"processId": None, "rootUri": None, "capabilities": {}})["capabilities"]
+        assert capabilities["hoverProvider"]
+        assert capabilities["definitionProvider"]
+        assert "completionProvider" in capabilities
+        editor.send("initialized", {})
+        yield editor
+        editor.ask("shutdown", None)
+        editor.send("exit", None)
+        assert editor.process.wait(TIMEOUT_S) == 0
+    finally:
+        editor.process.kill()
+        editor.process.wait(TIMEOUT_S)
+
+
+def place(line, start, end):
+    return {"start": {"line": line, "character": start}, "end": {"line": line, "character": end}}
+
+
+def test_an_editing_session(editor):
+    document = {"uri": URI, "languageId": "alula", "version": 1, "text": TEXT}
+    editor.send("textDocument/didOpen", {"textDocument": document})
+    assert editor.told() == {"uri": URI, "diagnostics": []}
+
+    # Completion: states behind a resource, names and words elsewhere, types behind a colon.
+    labels = {c["label"] for c in editor.at("textDocument/completion", 12, "FREE", 2)["items"]}
+    assert labels == {"FREE", "USED"}
+    labels = {c["label"]: c.get("detail") for c in editor.at("textDocument/completion", 13, "take")["items"]}
+    assert {"axes", "battery", "goto", "take", "precondition", "guard"} <= set(labels)
+    assert labels["axes"] == "FREE USED"
+    assert labels["take"] == "effect of goto"
+    assert "Point" in {c["label"] for c in editor.at("textDocument/completion", 10, "Point")["items"]}
+
+    # Hover: the resource with its arrows, the skill's signature, an effect.
+    told = editor.at("textDocument/hover", 12, "axes", 1)
+    assert "state { FREE USED }" in told["contents"]["value"]
+    assert "FREE -> USED" in told["contents"]["value"]
+    assert told["range"] == place(12, 23, 27)
+    assert "skill goto(target: Point)" in editor.at("textDocument/hover", 9, "goto")["contents"]["value"]
+    assert "axes -> USED" in editor.at("textDocument/hover", 13, "take")["contents"]["value"]
+    assert editor.at("textDocument/hover", 13, "start") is None
+
+    # Definition: a resource, a state, an effect, a type.
+    definition = "textDocument/definition"
+    assert editor.at(definition, 12, "axes")["range"] == place(4, 11, 15)
+    assert editor.at(definition, 12, "FREE")["range"] == place(5, 12, 16)
+    assert editor.at(definition, 13, "take")["range"] == place(11, 11, 15)
+    assert editor.at(definition, 10, "Point")["range"] == place(0, 5, 10)
+    assert editor.at(definition, 13, "start") is None
+
+    # Changes: every error with its place in UTF-16 units, also behind a character that has two of them.
+    wrong = TEXT.replace("axes == FREE", "/* \U0001f681 */ axes == FRE").replace("target: Point", "target Point")
+    first, *_ = editor.change(wrong, 2)
+    assert (first["code"], first["severity"], first["range"]) == ("ALU103", 1, place(10, 17, 22))
+    (finding,) = editor.change(wrong.replace("target Point", "target: Point"), 3)
+    assert finding["code"] == "ALU203"
+    assert finding["range"] == place(12, 32, 43)
+    assert "did you mean `FREE`?" in finding["message"]
+    assert editor.change(TEXT, 4) == []
+
+    # A file that goes away leaves nothing behind; any junk is answered.
+    assert editor.change("\x00" * 1000, 5)[0]["code"] == "ALU100"
+    assert editor.change("a" * 400_000, 6)[0]["code"] == "ALU003"
+    editor.send("textDocument/didClose", {"textDocument": {"uri": URI}})
+    assert editor.told() == {"uri": URI, "diagnostics": []}
+
+
+def test_completion_in_a_file_that_is_broken_at_the_cursor(editor):
+    text = TEXT.replace("axes == FREE", "axes == ")
+    document = {"uri": URI, "languageId": "alula", "version": 1, "text": text}
+    editor.send("textDocument/didOpen", {"textDocument": document})
+    assert editor.told()["diagnostics"] != []
+    where = {"line": 12, "character": text.split("\n")[12].index("axes == ") + 8}
+    items = editor.ask("textDocument/completion", {"textDocument": {"uri": URI}, "position": where})["items"]
+    assert [c["label"] for c in items] == ["FREE", "USED"]
