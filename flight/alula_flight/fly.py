@@ -30,6 +30,8 @@ CANNOT_START = 2
 GIVEN_UP = 1
 PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
+PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
+KILL_AT = 2  # interrupts: the first lands the vehicle, the second ends everything
 MISSION_MODULE = b"uav_missions"
 
 
@@ -135,7 +137,7 @@ class Front:
         supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
         live = LiveEvents(Path(self._spec.out_dir), self._say)
         try:
-            while supervisor.poll() is None and self._interrupts < 2:
+            while supervisor.poll() is None and self._interrupts < KILL_AT:
                 live.show_new()
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     supervisor.wait(0.2)
@@ -143,7 +145,8 @@ class Front:
                 self._supervisor_died(supervisor.returncode, live)
             live.show_new()
         finally:
-            end_run(self._spec.run_id)
+            # At the second Ctrl-C nobody is asked: a supervisor that is told politely would still try to land.
+            end_run(self._spec.run_id, patience_s=0.0 if self._interrupts >= KILL_AT else PATIENCE_S)
             supervisor.wait()
             sweep_shared_memory()
         return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
@@ -167,7 +170,7 @@ class Front:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGINT)
         end = time.monotonic() + MISSION_PATIENCE_S
-        while any(map(_is_mission, missions)) and time.monotonic() < end and self._interrupts < 2:
+        while any(map(_is_mission, missions)) and time.monotonic() < end and self._interrupts < KILL_AT:
             live.show_new()
             time.sleep(0.2)
 

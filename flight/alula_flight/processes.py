@@ -30,9 +30,10 @@ def processes_of_run(run_id: str) -> list[int]:
 
 
 def end_run(run_id: str, *, patience_s: float = 3.0) -> list[int]:
-    """End all processes of the run, first politely, then for good; return those that had to be told."""
+    """End all processes of the run, first politely unless ``patience_s`` is 0, then for good; return those that had to be told."""
     told = processes_of_run(run_id)
-    for send, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, 5.0)):
+    polite = [(signal.SIGTERM, patience_s)] if patience_s > 0.0 else []
+    for send, wait_s in (*polite, (signal.SIGKILL, 5.0)):
         for process in processes_of_run(run_id):
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process, send)
