@@ -198,11 +198,11 @@ class Supervisor:
         from uav_msgs.srv import Command
 
         heard, down = threading.Event(), threading.Event()
-        commanded = False
+        commanded, reference = False, ""
 
         def look(state: Any) -> None:
-            nonlocal commanded
-            commanded = state.authority
+            nonlocal commanded, reference
+            commanded, reference = state.authority, state.reference
             if not state.armed:
                 down.set()
             heard.set()
@@ -211,14 +211,16 @@ class Supervisor:
         end = time.monotonic() + LANDING_PATIENCE_S
         if not heard.wait(STATE_PATIENCE_S) or down.is_set() or not commanded:
             return
-        try:
-            rospy.wait_for_service("/uav_guidance/land", timeout=10.0)
-            answer = rospy.ServiceProxy("/uav_guidance/land", Command)()
-            log.info("landing: %s %s", answer.accepted, answer.reason)
-        except (rospy.ROSException, rospy.ServiceException) as error:
-            log.error("the guidance could not be told to land: %s", error)
-        while not down.wait(0.2) and time.monotonic() < end and not self._clock.stands_still:
-            pass
+        # Again where something else is followed instead: a skill that was running may have answered the first with a hover.
+        while not down.is_set() and time.monotonic() < end and not self._clock.stands_still:
+            if reference != "land" and commanded:
+                try:
+                    rospy.wait_for_service("/uav_guidance/land", timeout=10.0)
+                    answer = rospy.ServiceProxy("/uav_guidance/land", Command)()
+                    log.info("landing: %s %s", answer.accepted, answer.reason)
+                except (rospy.ROSException, rospy.ServiceException) as error:
+                    log.error("the guidance could not be told to land: %s", error)
+            down.wait(1.0)
 
 
 def main(arguments: list[str]) -> int:

@@ -42,6 +42,10 @@ LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability
 ALL_EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+LAST_EVENTS_S = 2.0  # wall clock to wait for the events of what has ended
+UNENDED_STATES = ("REQUESTED", "RUNNING")
+
+
 class WakingClient:
     """A skillset's client that has the tree ticked at once when an execution ends or a resource changes."""
 
@@ -79,6 +83,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._route = route
         self._lift_off_s: float | None = None
         self._view_json = ""
+        self._unended: set[str] = set()
         self._events = EventLog(out / "events.jsonl")
         self._skillsets = {name: WakingClient(self, name, self.wake) for name in SKILLSETS}
         self.director = self._make_director()
@@ -118,6 +123,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.get_logger().warning(f"{reason}: {answer}")
         self.wake()
         return answer
+
+    @property
+    def unended(self) -> bool:
+        """Tell whether executions are open as far as the events have told: a result may be here before its event."""
+        return bool(self._unended)
 
     def finish(self, end: End) -> None:
         """Write what is left to write."""
@@ -164,6 +174,9 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _on_event(self, event: Event) -> None:
         record = event_record(event)
         self._events.add(record)
+        if record.get("skill"):
+            change = self._unended.add if record["state"] in UNENDED_STATES else self._unended.discard
+            change(str(record["id"]))
         if record.get("resource") == "flight_status" and record["from_state"] == "ON_GROUND" and self._lift_off_s is None:
             self._lift_off_s = float(str(record["stamp_s"]))
         self.wake()
@@ -204,6 +217,9 @@ def fly(node: MissionNode, signals: Sequence[int]) -> End:
             node.tick()
         if standstill.lasts(node.now_s):
             return End(Outcome.NOT_STARTED if node.director.start_s is None else Outcome.GIVEN_UP, "the mission clock stands still")
+    patience = time.monotonic() + LAST_EVENTS_S
+    while node.unended and time.monotonic() < patience:
+        executor.spin_once(timeout_sec=TURN_S)
     return node.director.end
 
 

@@ -114,6 +114,16 @@ def test_a_flight_whose_reference_is_lost_aborts(rig, how):
     rig.wait(lambda: rig.functional.names()[-1:] == ["hover"])
 
 
+def test_a_flight_that_somebody_else_lands_is_not_held_up_by_a_hover(rig):
+    rig.in_air()
+    handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
+    rig.wait(lambda: handle.progress > 0.0)
+    rig.functional.vehicle.reference, rig.functional.vehicle.reference_id = "land", rig.functional.vehicle.reference_id + 5
+    assert rig.ended(handle) == ("TERMINATED", "ABORTED")
+    rig.wait(rig._calls_are_answered)
+    assert "hover" not in rig.functional.names()
+
+
 def test_losing_the_authority_ends_the_flight_without_another_command(rig):
     rig.in_air()
     handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)

@@ -149,7 +149,9 @@ class GuidedSkill(SkillHooks):
             return
         silent_s = self.guidance.now_s - motion.heard_s
         if silent_s > self.thresholds.reference_lost_s:
-            self._end(motion, self.lost(silent_s), stop=True)
+            # Somebody lands the vehicle, perhaps because nobody else decides any more: a hover would keep it in the air.
+            state = self.guidance.state
+            self._end(motion, self.lost(silent_s), stop=state is None or state.reference != "land")
 
     def _end(self, motion: Motion, verdict: Verdict, *, stop: bool) -> None:
         with self._lock:
