@@ -40,6 +40,7 @@ echo "ROS 2 world"
 look 2 "rclpy (Jazzy)" "import rclpy, importlib.metadata as m; print(m.version('ros-jazzy-rclpy'))"
 look 2 "message packages (colcon)" "import uav_msgs.msg, skillset_interfaces.srv; print('uav_msgs, skillset_interfaces')"
 look 2 "generated skillsets" "import navigation_managers, perception_managers, mapping_managers; print('navigation, perception, mapping')"
+look 2 "proofs and language server" "import z3, dd.cudd, pygls; print('z3', z3.get_version_string())"
 look 2 "bridge" "import ros_bridge, rosbags; print('ros_bridge')"
 
 [ $missing = 0 ] && echo "all is well" || echo "something is missing, see above"
