@@ -122,7 +122,7 @@ def tokenize(source: Source) -> list[Token]:
             continue
         if group == "comment":
             if tokens and tokens[-1].line == line:
-                tokens[-1].comment = match.group()[2:].strip()
+                tokens[-1].comment = " ".join(match.group()[2:].split())
         elif group in {"bad", "open"}:
             _report_bad(source, match.group(), Span(source.file, line, column, column + len(match.group())), unclosed=group == "open")
             if source.full:

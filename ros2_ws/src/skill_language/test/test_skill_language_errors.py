@@ -48,6 +48,8 @@ SYNTAX = [
     ("ALU103", "skillset s {} ^data t {}", "expected `skillset` or `type`, found `data`", "one or several"),
     ("ALU406", "skillset s {} skillset ^t {}", "expected one skillset, found 2", ""),
     ("ALU108", "skillset s { ^/* }", "no `*/`", ""),
+    ("ALU103", "skillset s { skill f { interrupt { ^apply: give } } }", "found `apply`", ""),
+    ("ALU103", "skillset s { skill f { interrupt { ^post -> give } } }", "found `post`", ""),
     ("ALU104", "skillset s { skill f ^{ progress = 1 ", "no `}` before the file ends", ""),
     ("ALU104", "skillset s { skill f { input { a: T ^effect { } } }", "opened in line 1 has no `}` before `effect`", "close the block"),
     ("ALU104", "skillset s { skill f { progress = 1 ^skill g { } }", "before `skill` begins", "close the block"),

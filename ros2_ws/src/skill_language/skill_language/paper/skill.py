@@ -150,7 +150,7 @@ class _SkillReader:
         self.parts.invariants.append(Invariant(name.text, holds, effect, patience, span=self.cursor.span(name)))
 
     def _interrupt(self) -> None:
-        if not self.cursor.at("apply", "post", "interrupting"):
+        if not any(self.cursor.at_word(word) for word in ("apply", "post", "interrupting")):
             raise self.cursor.fail("`interrupting`", "`apply`", "`post`", "`}`")
         word = self.cursor.here
         interrupt = self.parts.interrupt

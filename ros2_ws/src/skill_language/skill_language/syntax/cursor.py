@@ -113,6 +113,8 @@ class Cursor:
             before = self._index
             try:
                 entry()
+                if self._index == before:
+                    raise self.fail("another entry", "`}`")
             except SyntaxFault:
                 if not self._skip_entry(outer, begins or self._begins_entry, minimum=before):
                     return
