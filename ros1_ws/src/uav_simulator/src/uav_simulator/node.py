@@ -48,7 +48,8 @@ class SimulatorNode:
         self._link = TcpLink(self._simulation.endpoint, settings.mavlink_port)
         self._pacer = Pacer(settings.pace_topics, limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
         self._pilot_words: queue.SimpleQueue[str] = queue.SimpleQueue()
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
+        # Holds more ticks than a pace limit lets through at once, so a paced run loses none; flat out, the oldest may be dropped.
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
         self._pose = rospy.Publisher("/sim/true_pose", PoseStamped, queue_size=5)
         self._state = rospy.Publisher("/sim/state", String, queue_size=5, latch=True)
         self._tf_static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
