@@ -105,7 +105,10 @@ build_ros1() {
 
 prepare_ros1_sources() { # $ALULA_STATE/ros1/src holds links to the packages: catkin_make writes its toplevel file beside them
   rm -rf "$ALULA_STATE/ros1/src"; mkdir -p "$ALULA_STATE/ros1/src"
-  for package in "$ALULA_ROOT"/ros1_ws/src/*/; do ln -sfn "$(readlink -f "$package")" "$ALULA_STATE/ros1/src/$(basename "$package")"; done
+  for package in "$ALULA_ROOT"/ros1_ws/src/*/ "$ALULA_STATE"/generated/*_interfaces/; do
+    [ -d "$package" ] || continue
+    ln -sfn "$(readlink -f "$package")" "$ALULA_STATE/ros1/src/$(basename "$package")"
+  done
 }
 make_ros1() { prepare_ros1_sources && build_ros1; }
 
@@ -134,8 +137,8 @@ fi
 step apt "$(digest "$ALULA_ROOT/setup/apt.txt")" install_packages "Debian packages (ROS 1, build tools)"
 step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt")-$ALULA_STATE" make_venv1 "Python packages of the ROS 1 world"
 step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
-step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src")-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
 step generated "$(model_digest)" \
   generate "skillsets: interfaces, managers, bridge configuration"
+step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
 step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(cat "$ALULA_STATE/stamps/venv2")" make_ros2 "ROS 2 workspace (colcon build)"
 [ $quiet = 1 ] || echo "Alula is ready ($((SECONDS - started)) s)"

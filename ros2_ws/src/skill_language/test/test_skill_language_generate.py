@@ -118,8 +118,8 @@ def test_an_action_without_inputs(files):
 
 
 def test_what_packages_depend_on(files):
-    assert "  DEPENDENCIES geometry_msgs\n" in files["rover_interfaces/CMakeLists.txt"]
-    assert '  "action/GoTo.action"\n  "action/Wait.action"\n' in files["rover_interfaces/CMakeLists.txt"]
+    assert "    DEPENDENCIES geometry_msgs\n" in files["rover_interfaces/CMakeLists.txt"]
+    assert '    "action/GoTo.action"\n    "action/Wait.action"\n' in files["rover_interfaces/CMakeLists.txt"]
     assert "<depend>geometry_msgs</depend>" in files["rover_interfaces/package.xml"]
     managers = files["rover_managers/package.xml"]
     for name in ("rover_interfaces", "skill_runtime", "skill_language", "geometry_msgs", "sensor_msgs"):

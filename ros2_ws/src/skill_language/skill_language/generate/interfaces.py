@@ -1,4 +1,4 @@
-"""The package `<skillset>_interfaces`: one action a skill (paper, section 4.2)."""
+"""The package `<skillset>_interfaces`: one action a skill (paper, section 4.2), built in both ROS worlds from the same files."""
 
 from __future__ import annotations
 
@@ -19,34 +19,63 @@ PACKAGE_XML = """\
   $maintainer
   <license>Apache-2.0</license>
 
-  <buildtool_depend>ament_cmake</buildtool_depend>
-  <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <depend>action_msgs</depend>
+  <buildtool_depend condition="$$ROS_VERSION == 1">catkin</buildtool_depend>
+  <build_depend condition="$$ROS_VERSION == 1">message_generation</build_depend>
+  <exec_depend condition="$$ROS_VERSION == 1">message_runtime</exec_depend>
+  <depend condition="$$ROS_VERSION == 1">actionlib_msgs</depend>
+
+  <buildtool_depend condition="$$ROS_VERSION == 2">ament_cmake</buildtool_depend>
+  <buildtool_depend condition="$$ROS_VERSION == 2">rosidl_default_generators</buildtool_depend>
+  <depend condition="$$ROS_VERSION == 2">action_msgs</depend>
+  <exec_depend condition="$$ROS_VERSION == 2">rosidl_default_runtime</exec_depend>
+  <member_of_group condition="$$ROS_VERSION == 2">rosidl_interface_packages</member_of_group>
+
 $depends
-  <exec_depend>rosidl_default_runtime</exec_depend>
-  <member_of_group>rosidl_interface_packages</member_of_group>
 
   <export>
-    <build_type>ament_cmake</build_type>
+    <build_type condition="$$ROS_VERSION == 2">ament_cmake</build_type>
   </export>
 </package>
 """
 
 CMAKE = """\
 # $header.
+# One package, two worlds: actionlib's actions and ROS 2's from the same files.
 cmake_minimum_required(VERSION 3.16)
 project($package)
 
-find_package(ament_cmake REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
+if("$$ENV{ROS_VERSION}" STREQUAL "1")
+  find_package(catkin REQUIRED COMPONENTS message_generation actionlib_msgs)
+  # A type that has no ROS 1 form costs this skillset its managers there, and nobody else anything.
+  set(missing)
+  foreach(dependency$ros1_names)
+    find_package($${dependency} QUIET)
+    if(NOT $${dependency}_FOUND)
+      list(APPEND missing $${dependency})
+    endif()
+  endforeach()
+  if(missing)
+    message(WARNING "$${PROJECT_NAME} is not built for ROS 1: there is no ROS 1 package $${missing}")
+    catkin_package()
+    return()
+  endif()
+  add_action_files(DIRECTORY action FILES
+$ros1_actions
+  )
+  # Managers and clients are Python; the headers of other languages would take most of the time.
+  generate_messages(LANGS genpy DEPENDENCIES actionlib_msgs$ros1_names)
+  catkin_package(CATKIN_DEPENDS message_runtime actionlib_msgs$ros1_names)
+else()
+  find_package(ament_cmake REQUIRED)
+  find_package(rosidl_default_generators REQUIRED)
 $find_packages
-rosidl_generate_interfaces($${PROJECT_NAME}
+  rosidl_generate_interfaces($${PROJECT_NAME}
 $actions
 $dependencies
-)
-
-ament_export_dependencies(rosidl_default_runtime)
-ament_package()
+  )
+  ament_export_dependencies(rosidl_default_runtime)
+  ament_package()
+endif()
 """
 
 ACTION = """\
@@ -87,9 +116,11 @@ def interface_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
         f"{package}/CMakeLists.txt": fill(
             CMAKE,
             **common,
-            find_packages=lines(f"find_package({name} REQUIRED)" for name in needed),
-            actions=lines((f'"action/{camel(name)}.action"' for name in skills), 2),
-            dependencies=f"  DEPENDENCIES {' '.join(needed)}" if needed else "",
+            ros1_names="".join(f" {name}" for name in needed),
+            ros1_actions=lines((f"{camel(name)}.action" for name in skills), 4),
+            find_packages=lines((f"find_package({name} REQUIRED)" for name in needed), 2),
+            actions=lines((f'"action/{camel(name)}.action"' for name in skills), 4),
+            dependencies=f"    DEPENDENCIES {' '.join(needed)}" if needed else "",
         ),
     }
     files = {path: _without_empty_lines_in_a_row(text) for path, text in files.items()}
