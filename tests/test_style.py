@@ -9,7 +9,16 @@ import pytest
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 # Each room's Python packages, type-checked together; generated packages and the tests are left to ruff.
-ROS1_PACKAGES = ("uav_guidance", "resource_reporter", "perception_core", "zed_depth", "lidar_obstacles", "lidar_mapping", "uav_simulator")
+ROS1_PACKAGES = (
+    "uav_guidance",
+    "resource_reporter",
+    "skillset_ros1",
+    "perception_core",
+    "zed_depth",
+    "lidar_obstacles",
+    "lidar_mapping",
+    "uav_simulator",
+)
 TYPED = [
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",

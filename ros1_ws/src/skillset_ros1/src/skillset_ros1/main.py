@@ -1,0 +1,38 @@
+"""The main function of a skillset's process in the ROS 1 world."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, ModuleType
+
+import rospy
+
+from skill_language.model import Skillset
+from skillset_ros1.data_manager import DataBindings
+from skillset_ros1.managers import HooksFactory, SkillsetManagers
+
+CHECK_S = 0.5
+
+
+def run_skillset(
+    skillset: Skillset, interfaces: ModuleType, hooks_factory: HooksFactory, *, data_bindings: DataBindings | None = None
+) -> None:
+    """Serve a skillset until SIGINT, SIGTERM or the node's end; then stop what runs, tell its callers, and return.
+
+    The command line is rospy's: ``__ns:=/robot1 __name:=...`` and remappings.
+    """
+    stop = threading.Event()
+
+    def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        stop.set()
+
+    # Our own handlers: rospy's would close the connections before the callers were told.
+    rospy.init_node(skillset.name, disable_signals=True)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    managers = SkillsetManagers(skillset, interfaces, hooks_factory, data_bindings=data_bindings)
+    while not stop.wait(CHECK_S) and not rospy.is_shutdown():
+        pass
+    managers.close("the managers were shut down")
+    rospy.signal_shutdown("the managers were shut down")

@@ -1,0 +1,171 @@
+"""A skill manager (paper, section 4.2): one skill as an actionlib action that takes any number of goals at a time.
+
+A goal's id is the execution's. It is PENDING until the skill runs, so a refusal is a REJECTED goal and an interruption before
+the start a RECALLED one; every end carries a result that says why. No thread waits while a skill runs.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from actionlib import ActionServer, ServerGoalHandle
+from actionlib_msgs.msg import GoalStatus
+
+from skill_language.model import Skill
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.events import ExecutionEvent
+from skill_runtime.core.execution import ExecutionState
+from skill_runtime.hooks import SkillHooks
+from skillset_ros1.alarms import Alarms
+from skillset_ros1.convert import fill, values_of
+from skillset_ros1.names import ActionTypes
+
+Job = Callable[[], object]
+RECALLED_EARLY = "interrupted before it arrived"
+_WAITING = {GoalStatus.PENDING, GoalStatus.RECALLING}
+
+
+class _Server(ActionServer):  # type: ignore[misc]  # actionlib has no types
+    """An action server that never sends an empty result: actionlib itself recalls a goal whose cancellation came first."""
+
+    def publish_result(self, status: Any, result: Any) -> None:
+        """Publish a result."""
+        if not result.outcome:
+            result.outcome, result.message = ExecutionState.INTERRUPTED.value, RECALLED_EARLY
+        super().publish_result(status, result)
+
+
+class _Goal:
+    """A goal that has not ended. Its interruption may be asked for before the engine knows it."""
+
+    def __init__(self, handle: ServerGoalHandle) -> None:
+        self.handle = handle
+        self._lock = threading.Lock()
+        self._known = False
+        self._interrupt = False
+
+    def known(self) -> bool:
+        """Note that the engine knows it; tell whether it is to be interrupted now."""
+        with self._lock:
+            self._known = True
+            return self._interrupt
+
+    def interrupt(self) -> bool:
+        """Note that it is to be interrupted; tell whether that can be done now."""
+        with self._lock:
+            self._interrupt = True
+            return self._known
+
+
+class SkillManager:
+    """Serves one skill; ``submit`` runs a job on a worker thread, because hooks may wait."""
+
+    def __init__(
+        self,
+        place: str,
+        engine: SkillsetEngine,
+        skill: Skill,
+        types: ActionTypes,
+        hooks: SkillHooks,
+        submit: Callable[[Job], None],
+        alarms: Alarms,
+    ) -> None:
+        self._engine = engine
+        self._skill = skill
+        self._types = types
+        self._hooks = hooks
+        self._submit = submit
+        self._alarms = alarms
+        self._goals: dict[str, _Goal] = {}
+        self._server = _Server(f"{place}/skill/{skill.name}", types.spec, self._accepted, self._cancel, auto_start=False)
+
+    def start(self) -> None:
+        """Take goals."""
+        self._server.start()
+
+    def close(self) -> None:
+        """Take no more goals, and take the topics away."""
+        self._server.stop()
+
+    def on_event(self, event: ExecutionEvent) -> None:
+        """Follow an execution of this skill."""
+        goal = self._goals.get(event.id)
+        if goal is None:
+            return
+        if event.state is ExecutionState.REQUESTED:
+            if goal.known():
+                self._submit_interrupt(event.id)
+        elif event.state is ExecutionState.RUNNING:
+            goal.handle.set_accepted()
+            self._feed_back(goal, 0.0, event.outputs)
+            self._report_later(event.id)
+        elif event.state.terminal:
+            del self._goals[event.id]
+            self._finish(goal.handle, event)
+
+    def _accepted(self, handle: ServerGoalHandle) -> None:
+        identifier = handle.get_goal_id().id
+        self._goals[identifier] = _Goal(handle)
+        self._submit(lambda: self._request(identifier, handle))
+
+    def _request(self, identifier: str, handle: ServerGoalHandle) -> None:
+        try:
+            inputs = self._hooks.make_inputs(values_of(handle.get_goal()))
+            self._engine.request(self._skill.name, inputs, execution_id=identifier)
+        except Exception as error:
+            # The engine knows nothing of this goal; whoever asked must hear of it all the same.
+            if self._goals.pop(identifier, None) is not None:
+                reason = f"{type(error).__name__}: {error}"
+                handle.set_rejected(self._types.result(outcome=ExecutionState.FAILED.value, message=reason), reason)
+            raise
+
+    def _cancel(self, handle: ServerGoalHandle) -> None:
+        identifier = handle.get_goal_id().id
+        goal = self._goals.get(identifier)
+        if goal is not None and goal.interrupt():
+            self._submit_interrupt(identifier)
+
+    def _submit_interrupt(self, identifier: str) -> None:
+        self._submit(lambda: self._engine.interrupt(identifier))
+
+    def _finish(self, handle: ServerGoalHandle, event: ExecutionEvent) -> None:
+        """Set the goal's terminal state and send its result."""
+        result = self._types.result(outcome=event.state.value, result=event.result, message=event.message)
+        try:
+            fill(result, event.outputs, f"outputs of {self._skill.name}")
+        except ValueError as error:
+            result.message = f"{result.message} ({error})".strip()
+        waiting = handle.get_goal_status().status in _WAITING
+        if event.state is ExecutionState.TERMINATED:
+            handle.set_succeeded(result, event.message)
+        elif event.state is ExecutionState.INTERRUPTED:
+            handle.set_canceled(result, event.message)
+        elif waiting:
+            handle.set_rejected(result, event.message)
+        else:
+            handle.set_aborted(result, event.message)
+
+    def _report_later(self, identifier: str) -> None:
+        if self._skill.progress is not None:
+            self._alarms.after(self._skill.progress.period_s, lambda: self._submit(lambda: self._report(identifier)))
+
+    def _report(self, identifier: str) -> None:
+        """Send the progress of a goal, and again after a period; not before the hook has answered."""
+        progress = self._engine.progress(identifier)
+        goal, execution = self._goals.get(identifier), self._engine.execution(identifier)
+        if goal is None or execution is None:
+            return
+        if progress is not None:
+            self._feed_back(goal, progress, dict(execution.outputs))
+        self._report_later(identifier)
+
+    def _feed_back(self, goal: _Goal, progress: float, outputs: Any) -> None:
+        feedback = self._types.feedback(progress=progress)
+        try:
+            fill(feedback, outputs, f"outputs of {self._skill.name}")
+        except ValueError as error:
+            rospy.logerr("%s", error)
+        goal.handle.publish_feedback(feedback)

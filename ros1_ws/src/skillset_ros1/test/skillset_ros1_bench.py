@@ -1,0 +1,107 @@
+"""The drone's navigation served by this process's rospy node with recording hooks, and a client of it."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+
+import navigation_interfaces.msg
+from navigation_managers.hooks import ABSTRACT_HOOKS
+from navigation_managers.model import SKILLSET
+
+from skill_runtime.hooks import SkillHooks
+from skillset_ros1 import SkillsetClient, SkillsetManagers
+
+SOON_S = 15.0
+FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
+NUMBERS = itertools.count()
+
+
+def until(condition, what: str, timeout_s: float = SOON_S) -> None:
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, f"not within {timeout_s} s: {what}"
+        time.sleep(0.005)
+
+
+class Recorder(SkillHooks):
+    """Writes down the calls; ``acts`` maps a hook's name to what it does with the execution."""
+
+    def __init__(self, skill: str) -> None:
+        self.inputs_type = ABSTRACT_HOOKS[skill].inputs_type
+        self.calls: list[str] = []
+        self.acts: dict = {}
+
+    def _note(self, name: str, value: object) -> object:
+        self.calls.append(name)
+        return self.acts[name](value) if name in self.acts else None
+
+    def validate(self, inputs: object) -> str:
+        return self._note("validate", inputs) or ""
+
+    def on_dispatch(self, execution) -> None:
+        self._note("on_dispatch", execution)
+
+    def progress(self, execution) -> float:
+        value = self._note("progress", execution)
+        return 0.5 if value is None else value
+
+    def on_interrupt(self, execution) -> None:
+        self._note("on_interrupt", execution)
+
+    def on_violation(self, execution) -> None:
+        self._note("on_violation", execution)
+
+    def on_failure(self, execution) -> None:
+        self._note("on_failure", execution)
+
+
+class Navigation:
+    """Managers, hooks and client in a namespace of their own."""
+
+    def __init__(self) -> None:
+        self.namespace = f"/n{next(NUMBERS)}"
+        self.hooks = {skill.name: Recorder(skill.name) for skill in SKILLSET.skills}
+        self.clients: list[SkillsetClient] = []
+        self.managers = SkillsetManagers(SKILLSET, navigation_interfaces.msg, lambda _: self.hooks, namespace=self.namespace)
+        self.client = self.another_client()
+
+    def another_client(self) -> SkillsetClient:
+        client = SkillsetClient("navigation", namespace=self.namespace)
+        self.clients.append(client)
+        assert client.wait_ready(SOON_S)
+        return client
+
+    def name(self, topic: str) -> str:
+        return f"{self.namespace}/navigation/{topic}"
+
+    def bring(self, states: dict[str, str]) -> None:
+        """Take extern transitions, as the functional layer does."""
+        for resource, state in states.items():
+            reply = self.managers.engine.transition(resource, state)
+            assert reply.accepted or reply.state == state, reply.reason
+
+    def running(self, skill: str, **inputs: object):
+        handle = self.client.start(skill, **inputs)
+        until(lambda: handle.state.value == "RUNNING", f"{skill} runs, it is {handle}: {handle.message}")
+        until(lambda: "on_dispatch" in self.hooks[skill].calls, "it was dispatched")
+        return handle
+
+    def fly(self):
+        return self.running("goto_straight", target=(1, 2.5, 3), speed=1)
+
+    def execution(self, handle):
+        return self.managers.engine.execution(handle.id)
+
+    def close(self) -> None:
+        self.managers.close("the test is over")
+        for client in self.clients:
+            client.close()
+        self.managers.destroy()
+
+
+def on_thread(job) -> threading.Thread:
+    thread = threading.Thread(target=job, daemon=True)
+    thread.start()
+    return thread

@@ -1,0 +1,213 @@
+"""Managers and client on a live ROS 1 graph, with the drone's generated navigation."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalID, GoalStatus
+from geometry_msgs.msg import Point
+from navigation_interfaces.msg import TakeoffAction, TakeoffActionGoal, TakeoffActionResult, TakeoffGoal
+from navigation_managers.inputs import GotoStraightInputs
+from skillset_interfaces.msg import Event
+from skillset_interfaces.srv import Describe, GetData, Transition
+from skillset_ros1_bench import FLYING, SOON_S, Navigation, on_thread, until
+from uav_msgs.msg import GuidanceState
+
+from skill_language.json_form import from_json
+from skill_runtime.core import ExecutionState
+
+S = ExecutionState
+
+
+@pytest.fixture
+def navigation(ros_master):
+    bench = Navigation()
+    yield bench
+    bench.close()
+
+
+def service(navigation, kind, name: str, /, **request: object):
+    proxy = rospy.ServiceProxy(navigation.name(name), kind)
+    return proxy(**request)
+
+
+def test_an_execution_from_request_to_result(navigation):
+    navigation.bring(FLYING)
+    seen = []
+    until(lambda: navigation.client.resources.get("flight_status") == "IN_AIR", "the client follows")
+    navigation.client.on_change(seen.append)
+    handle = navigation.fly()
+    execution = navigation.execution(handle)
+    assert execution.inputs == GotoStraightInputs(target=Point(x=1.0, y=2.5, z=3.0), speed=1.0)
+    until(lambda: handle.progress == 0.5, "progress is reported every period")
+    states_at_end = []
+    handle.add_done_callback(lambda _: states_at_end.append(navigation.client.resources["axes_authority"]))
+    execution.terminate("ARRIVED", "there")
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.outcome, handle.result, handle.message) == (S.TERMINATED, "TERMINATED", "ARRIVED", "there")
+    until(lambda: states_at_end == ["AVAILABLE"], "who is told of the end sees the resources after it")
+    assert [states["axes_authority"] for states in seen] == ["USED", "AVAILABLE"]
+
+
+def test_refusals_reach_the_one_who_asked(navigation):
+    handle = navigation.client.start("goto_straight", target=Point(), speed=1.0)
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.result) == (S.NOT_READY, "sdk_authority")
+    assert "SDK_authority is UNAVAILABLE" in handle.message
+    navigation.hooks["takeoff"].acts["validate"] = lambda inputs: f"{inputs.height} m is too high"
+    handle = navigation.client.start("takeoff", height=300, speed=1)
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.message) == (S.NOT_VALIDATED, "300.0 m is too high")
+    answer = service(navigation, Transition, "transition", resource="axes_authority", to="USED")
+    assert (answer.accepted, answer.state) == (False, "AVAILABLE")
+    assert "for skills only" in answer.reason
+
+
+def test_a_second_caller_is_refused_while_the_first_goes_on(navigation):
+    navigation.bring(FLYING)
+    first = navigation.fly()
+    second = navigation.another_client().start("goto_straight", target=(0, 0, 0), speed=1)
+    assert second.wait(SOON_S)
+    assert (second.state, second.result) == (S.NOT_READY, "not_moving")
+    assert first.state is S.RUNNING
+    navigation.execution(first).terminate("ARRIVED")
+    assert first.wait(SOON_S)
+    assert first.result == "ARRIVED"
+
+
+def test_interrupt_and_violation_reach_client_and_function(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly()
+    handle.interrupt()
+    assert handle.wait(SOON_S)
+    assert handle.state is S.INTERRUPTED
+    assert navigation.hooks["goto_straight"].calls.count("on_interrupt") == 1
+    early = navigation.client.start("goto_straight", target=(0, 0, 0), speed=1)
+    early.interrupt()
+    assert early.wait(SOON_S)
+    assert early.state is S.INTERRUPTED
+    handle = navigation.fly()
+    navigation.bring({"SDK_authority": "UNAVAILABLE"})
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.result) == (S.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")
+    until(lambda: "on_violation" in navigation.hooks["goto_straight"].calls, "the function is stopped")
+
+
+def test_a_hook_that_waits_holds_up_nobody(navigation):
+    navigation.bring(FLYING)
+    go_on = threading.Event()
+    navigation.hooks["hover"].acts["validate"] = lambda _: "" if go_on.wait(SOON_S) else "nobody let me go on"
+    slow = navigation.client.start("hover", duration=1)
+    handle = navigation.fly()
+    navigation.execution(handle).terminate("ARRIVED")
+    assert handle.wait(SOON_S)
+    assert not slow.done
+    go_on.set()
+    until(lambda: slow.state is S.RUNNING, "the slow one is validated")
+
+
+def test_a_hook_that_raises_fails_its_execution_only(navigation):
+    navigation.bring(FLYING)
+
+    def break_down(_):
+        raise OSError("no link")
+
+    navigation.hooks["hover"].acts["on_dispatch"] = break_down
+    handle = navigation.client.start("hover", duration=1)
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.message) == (S.FAILED, "on_dispatch raised OSError: no link")
+    until(lambda: navigation.client.resources["axes_authority"] == "AVAILABLE", "its effect is undone")
+    assert navigation.fly().state is S.RUNNING
+
+
+def test_wrong_inputs_are_the_callers_error(navigation):
+    with pytest.raises(ValueError, match="inputs of navigation.takeoff: speed missing"):
+        navigation.client.start("takeoff", height=3)
+    with pytest.raises(ValueError, match=r"inputs of navigation.takeoff, height takes a number \(float64\), not 'high'"):
+        navigation.client.start("takeoff", height="high", speed=1)
+    with pytest.raises(ValueError, match="has no skill 'fly'; it has takeoff, goto"):
+        navigation.client.start("fly")
+
+
+def test_any_actionlib_client_gets_its_answers(navigation):
+    navigation.bring({"SDK_authority": "AVAILABLE", "homepoint_status": "VALID"})
+    client = actionlib.SimpleActionClient(navigation.name("skill/takeoff"), TakeoffAction)
+    assert client.wait_for_server(rospy.Duration(SOON_S))
+    navigation.hooks["takeoff"].acts["validate"] = lambda inputs: "" if inputs.height < 10 else "too high"
+    assert client.send_goal_and_wait(TakeoffGoal(height=30, speed=1), rospy.Duration(SOON_S)) == GoalStatus.REJECTED
+    assert (client.get_result().outcome, client.get_result().message) == ("NOT_VALIDATED", "too high")
+    navigation.hooks["takeoff"].acts["on_dispatch"] = lambda execution: on_thread(lambda: execution.terminate("AT_ALTITUDE"))
+    assert client.send_goal_and_wait(TakeoffGoal(height=3, speed=1), rospy.Duration(SOON_S)) == GoalStatus.SUCCEEDED
+    assert (client.get_result().outcome, client.get_result().result) == ("TERMINATED", "AT_ALTITUDE")
+    navigation.hooks["takeoff"].acts.pop("on_dispatch")
+    client.send_goal(TakeoffGoal(height=3, speed=1))
+    until(lambda: client.get_state() == GoalStatus.ACTIVE, "it runs")
+    client.cancel_goal()
+    assert client.wait_for_result(rospy.Duration(SOON_S))
+    assert (client.get_state(), client.get_result().outcome) == (GoalStatus.PREEMPTED, "INTERRUPTED")
+
+
+def test_a_cancellation_that_overtakes_its_goal(navigation):
+    results = []
+    place = navigation.name("skill/takeoff")
+    goals = rospy.Publisher(f"{place}/goal", TakeoffActionGoal, queue_size=1)
+    cancels = rospy.Publisher(f"{place}/cancel", GoalID, queue_size=1)
+    listening = rospy.Subscriber(f"{place}/result", TakeoffActionResult, results.append)
+    until(lambda: goals.get_num_connections() and cancels.get_num_connections() and listening.get_num_connections(), "connected")
+    server = navigation.managers._skills["takeoff"]._server
+    cancels.publish(GoalID(id="early"))
+    until(lambda: any(status.status.goal_id.id == "early" for status in server.status_list), "the cancellation is there")
+    goals.publish(TakeoffActionGoal(goal_id=GoalID(id="early"), goal=TakeoffGoal(height=3, speed=1)))
+    until(lambda: results, "the goal is answered")
+    assert (results[0].status.status, results[0].result.outcome) == (GoalStatus.RECALLED, "INTERRUPTED")
+    assert "validate" not in navigation.hooks["takeoff"].calls
+
+
+def test_who_subscribes_late_hears_all_events(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly()
+    navigation.execution(handle).terminate("ARRIVED", "there")
+    assert handle.wait(SOON_S)
+    # Subscribers of one process share a connection: the first one's must go, or nobody would be late.
+    navigation.client.close()
+    heard = {}
+    late = rospy.Subscriber(navigation.name("events"), Event, lambda event: heard.setdefault(event.sequence, event))
+    until(lambda: any(event.state == "TERMINATED" for event in heard.values()), "the history comes")
+    late.unregister()
+    events = [heard[number] for number in sorted(heard)]
+    assert [event.sequence for event in events] == list(range(1, len(events) + 1))
+    held = ["axes_authority", "heading_authority"]
+    told = [event.resource or event.state for event in events[len(FLYING) :]]
+    assert told == ["REQUESTED", *held, "RUNNING", *held, "TERMINATED"]
+    first = next(event for event in events if event.state == "REQUESTED")
+    assert json.loads(first.inputs_json) == {"target": {"x": 1.0, "y": 2.5, "z": 3.0}, "speed": 1.0}
+
+
+def test_description_and_data(navigation):
+    assert from_json(service(navigation, Describe, "describe").model_json) == navigation.managers.engine.skillset
+    assert navigation.client.model == navigation.managers.engine.skillset
+    assert not service(navigation, GetData, "get_data", name="nonsense").known
+    answer = service(navigation, GetData, "get_data", name="guidance_state")
+    assert (answer.known, answer.received) == (True, False)
+    source = rospy.Publisher("/uav_guidance/state", GuidanceState, queue_size=1, latch=True)
+    source.publish(GuidanceState())
+    until(lambda: service(navigation, GetData, "get_data", name="guidance_state").received, "the data manager hears it")
+    answer = service(navigation, GetData, "get_data", name="guidance_state")
+    assert json.loads(answer.value_json)["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    passed_on = rospy.wait_for_message(navigation.name("data/guidance_state"), GuidanceState, timeout=SOON_S)
+    assert isinstance(passed_on, GuidanceState)
+    source.unregister()
+
+
+def test_a_closed_client_leaves_no_handle_open(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly()
+    navigation.client.close()
+    assert handle.wait(SOON_S)
+    assert (handle.state, handle.message) == (S.FAILED, "the client of navigation was closed")
+    late = navigation.client.start("land")
+    assert (late.state, late.message) == (S.FAILED, "the managers of navigation are not there")
