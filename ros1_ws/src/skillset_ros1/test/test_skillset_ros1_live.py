@@ -125,7 +125,7 @@ def test_a_hook_that_raises_fails_its_execution_only(navigation):
 
 
 def test_wrong_inputs_are_the_callers_error(navigation):
-    with pytest.raises(ValueError, match="inputs of navigation.takeoff: speed missing"):
+    with pytest.raises(ValueError, match=r"inputs of navigation\.takeoff: speed missing"):
         navigation.client.start("takeoff", height=3)
     with pytest.raises(ValueError, match=r"inputs of navigation.takeoff, height takes a number \(float64\), not 'high'"):
         navigation.client.start("takeoff", height="high", speed=1)

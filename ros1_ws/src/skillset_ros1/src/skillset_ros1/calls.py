@@ -50,16 +50,24 @@ class _Call:
         while not self._over.is_set():
             self._proxy = rospy.ServiceProxy(self._name, self._kind, persistent=True)
             try:
-                self._answer.put((self._proxy(self._request), ""))
-                return
+                reply = self._proxy(self._request)
             except Exception as error:  # noqa: BLE001 - rospy lets through whatever the sockets below it raise
-                sent = self._proxy.transport is not None
-                late = time.monotonic() + AGAIN_S > self._deadline_s
-                if sent or late or rospy.is_shutdown():
-                    what = f"broke off: {error}" if sent else f"is not there within {self._timeout_s:g} s"
-                    self._answer.put((None, f"service {self._name} {what}"))
+                if self._is_last(error):
                     return
+            else:
+                self._answer.put((reply, ""))
+                return
             self._over.wait(AGAIN_S)
+
+    def _is_last(self, error: Exception) -> bool:
+        """Tell whether a failed attempt was the last one, and then the caller why it failed."""
+        sent = self._proxy.transport is not None
+        late = time.monotonic() + AGAIN_S > self._deadline_s
+        if not (sent or late or rospy.is_shutdown()):
+            return False
+        what = f"broke off: {error}" if sent else f"is not there within {self._timeout_s:g} s"
+        self._answer.put((None, f"service {self._name} {what}"))
+        return True
 
     def _break_off(self) -> None:
         """Free a thread that still waits for an answer."""

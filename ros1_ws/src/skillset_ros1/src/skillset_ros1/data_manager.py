@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,12 +14,11 @@ from skillset_interfaces.srv import GetData, GetDataResponse
 from skill_language.model import Data, Skillset
 from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.staleness import STALE_PERIODS, is_stale
+from skillset_ros1.alarms import Alarms
 from skillset_ros1.convert import message_class
 from skillset_ros1.names import now_ns
 from skillset_ros1.plain import to_plain
-
-STALE_PERIODS = 3.0
-"""A value is stale when it is older than so many of the periods that the model promises."""
 
 QUEUE = 10
 DataBindings = Mapping[str, tuple[str, str]]
@@ -32,22 +31,27 @@ class _Received:
     stamp_ns: int
 
 
-class DataManager(Mapping[str, object]):
-    """The fresh values by name (a mapping, for preconditions), their topics and the service ``get_data``."""
+class DataManager:
+    """Tells ``update`` of each fresh value, and with None that it has become stale; the data's topics and service ``get_data``."""
 
-    def __init__(self, place: str, skillset: Skillset, bindings: DataBindings) -> None:
+    def __init__(
+        self, place: str, skillset: Skillset, bindings: DataBindings, update: Callable[[str, object | None], None], alarms: Alarms
+    ) -> None:
         missing = [data.name for data in skillset.data if data.name not in bindings]
         if missing:
             raise SkillRuntimeError(f"skillset {skillset.name}: no binding to a topic for data {', '.join(missing)}")
+        self._update = update
+        self._alarms = alarms
         self._data = {data.name: data for data in skillset.data}
         self._received: dict[str, _Received] = {}
+        self._watched: set[str] = set()
         self._lock = threading.Lock()
         self._topics: list[Any] = []
-        for name in self._data:
-            topic, type_name = bindings[name]
+        for data in skillset.data:
+            topic, type_name = bindings[data.name]
             kind = message_class(type_name)
-            publisher = rospy.Publisher(f"{place}/data/{name}", kind, latch=True, queue_size=QUEUE)
-            subscriber = rospy.Subscriber(topic, kind, self._receiver(name, publisher.publish), queue_size=QUEUE)
+            publisher = rospy.Publisher(f"{place}/data/{data.name}", kind, latch=True, queue_size=QUEUE)
+            subscriber = rospy.Subscriber(topic, kind, self._receiver(data, publisher.publish), queue_size=QUEUE)
             self._topics += [subscriber, publisher]
         self._service = rospy.Service(f"{place}/get_data", GetData, self._answer)
 
@@ -57,40 +61,42 @@ class DataManager(Mapping[str, object]):
         for topic in self._topics:
             topic.unregister()
 
-    def _receiver(self, name: str, publish: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _receiver(self, data: Data, publish: Callable[[Any], None]) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
+            received = _Received(message, now_ns())
             with self._lock:
-                self._received[name] = _Received(message, now_ns())
+                self._received[data.name] = received
+                watch = data.period_s is not None and data.name not in self._watched
+                self._watched.add(data.name)
+            if watch:
+                self._look_at(data, received.stamp_ns)
             publish(message)
+            # A primitive comes as std_msgs/Float64 and the like.
+            self._update(data.name, message.data if data.type in PRIMITIVES else message)
 
         return receive
 
-    @staticmethod
-    def _stale(data: Data, received: _Received) -> bool:
-        return data.period_s is not None and now_ns() - received.stamp_ns > STALE_PERIODS * data.period_s * 1e9
+    def _look_at(self, data: Data, stamp_ns: int) -> None:
+        """Look, when a value of this age will be stale, whether a fresher one has come; there is one alarm a data at a time."""
+
+        def ring() -> None:
+            with self._lock:
+                latest = self._received[data.name]
+                if stale := latest.stamp_ns <= stamp_ns:
+                    self._watched.discard(data.name)
+            if not stale:
+                self._look_at(data, latest.stamp_ns)
+            else:
+                self._update(data.name, None)
+
+        self._alarms.at(stamp_ns + round(STALE_PERIODS * (data.period_s or 0.0) * 1e9) + 1, ring)
 
     def _answer(self, request: Any) -> Any:
         data, received = self._data.get(request.name), self._received.get(request.name)
         response = GetDataResponse(known=data is not None)
         if data is not None and received is not None:
             response.received = True
-            response.stale = self._stale(data, received)
+            response.stale = is_stale(now_ns() - received.stamp_ns, data.period_s)
             response.stamp_ns = received.stamp_ns
             response.value_json = json.dumps(to_plain(received.value))
         return response
-
-    def _fresh(self) -> dict[str, object]:
-        with self._lock:
-            received = dict(self._received)
-        fresh = {name: value for name, value in received.items() if not self._stale(self._data[name], value)}
-        # A primitive comes as std_msgs/Float64 and the like.
-        return {name: got.value.data if self._data[name].type in PRIMITIVES else got.value for name, got in fresh.items()}
-
-    def __getitem__(self, name: str) -> object:
-        return self._fresh()[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._fresh())
-
-    def __len__(self) -> int:
-        return len(self._fresh())

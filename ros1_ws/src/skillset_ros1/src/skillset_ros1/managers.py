@@ -19,6 +19,7 @@ from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.hooks import SkillHooks
 from skillset_ros1.alarms import Alarms
 from skillset_ros1.data_manager import DataBindings, DataManager
+from skillset_ros1.due import DueAlarm
 from skillset_ros1.events import EventPublisher
 from skillset_ros1.heartbeat import Heartbeat
 from skillset_ros1.names import action_types, now_ns, place
@@ -61,10 +62,12 @@ class SkillsetManagers:
         self._workers = ThreadPoolExecutor(WORKERS, thread_name_prefix=f"{skillset.name}_hooks")
         hooks = hooks_factory(self)
         self._alarms = Alarms(skillset.name, _log)
-        self._data = DataManager(self.place, skillset, _generated_bindings(skillset) if data_bindings is None else data_bindings)
         self.engine = SkillsetEngine(
-            skillset, now_ns, hooks, self._on_events, data=self._data, defer=self._submit, on_error=lambda text: rospy.logerr("%s", text)
+            skillset, now_ns, hooks, self._on_events, defer=self._submit, on_error=lambda text: rospy.logerr("%s", text)
         )
+        self._due = DueAlarm(self.engine, self._alarms)
+        bindings = _generated_bindings(skillset) if data_bindings is None else data_bindings
+        self._data = DataManager(self.place, skillset, bindings, self._update_data, self._alarms)
         self._events = EventPublisher(self.place, skillset.name, life)
         self._resources = ResourceManager(self.place, self.engine, life)
         self._skills = {
@@ -103,6 +106,11 @@ class SkillsetManagers:
         for event in events:
             if isinstance(event, ExecutionEvent):
                 self._skills[event.skill].on_event(event)
+        self._due.look()
+
+    def _update_data(self, name: str, value: object | None) -> None:
+        self.engine.update_data(name, value)
+        self._due.look()
 
     def _submit(self, job: Callable[[], object]) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The resource manager's interface (paper, section 4.2) in ROS 1: states latched, extern transitions as a service."""
+"""The resource manager's interface (paper, section 4.2) in ROS 1: states latched, services for extern transitions and events."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import rospy
 from skillset_interfaces.msg import ResourceState, ResourceStates
-from skillset_interfaces.srv import Transition, TransitionResponse
+from skillset_interfaces.srv import Transition, TransitionResponse, TriggerEvent, TriggerEventResponse
 
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import EngineEvent, TransitionEvent
@@ -15,7 +15,7 @@ from skillset_ros1.names import QUEUE, now_ns, stamp_of
 
 
 class ResourceManager:
-    """Publishes ``resource_states`` once a step, and serves ``transition``.
+    """Publishes ``resource_states`` once a step, and serves ``transition`` and ``trigger``.
 
     ``header.frame_id`` says which managers' states these are, and after which of their events: topics of ROS 1 come in no order.
     """
@@ -30,7 +30,10 @@ class ResourceManager:
             for name, status in engine.resources.items()
         }
         self._publish(now_ns(), 0)
-        self._service = rospy.Service(f"{place}/transition", Transition, self._answer)
+        self._services = [
+            rospy.Service(f"{place}/transition", Transition, self._answer),
+            rospy.Service(f"{place}/trigger", TriggerEvent, self._answer_trigger),
+        ]
 
     def on_events(self, events: Sequence[EngineEvent]) -> None:
         """Follow the transitions of one step."""
@@ -44,7 +47,8 @@ class ResourceManager:
 
     def close(self) -> None:
         """Take topic and service away."""
-        self._service.shutdown()
+        for service in self._services:
+            service.shutdown()
         self._publisher.unregister()
 
     def _publish(self, stamp_ns: int, sequence: int) -> None:
@@ -56,3 +60,7 @@ class ResourceManager:
     def _answer(self, request: Any) -> Any:
         reply = self._engine.transition(request.resource, request.to)
         return TransitionResponse(accepted=reply.accepted, reason=reply.reason, state=reply.state)
+
+    def _answer_trigger(self, request: Any) -> Any:
+        reply = self._engine.trigger(request.event)
+        return TriggerEventResponse(accepted=reply.accepted, reason=reply.reason)

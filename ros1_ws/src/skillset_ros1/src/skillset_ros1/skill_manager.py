@@ -7,12 +7,14 @@ the start a RECALLED one; every end carries a result that says why. No thread wa
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import rospy
 from actionlib import ActionServer, ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
+from std_msgs.msg import Header
 
 from skill_language.model import Skill
 from skill_runtime.core.engine import SkillsetEngine
@@ -24,18 +26,43 @@ from skillset_ros1.convert import fill, values_of
 from skillset_ros1.names import ActionTypes
 
 Job = Callable[[], object]
+OnGoal = Callable[[ServerGoalHandle], None]
+OnResult = Callable[[Any], None]
 RECALLED_EARLY = "interrupted before it arrived"
+RESULTS_KEPT = 10
 _WAITING = {GoalStatus.PENDING, GoalStatus.RECALLING}
 
 
-class _Server(ActionServer):  # type: ignore[misc]  # actionlib has no types
-    """An action server that never sends an empty result: actionlib itself recalls a goal whose cancellation came first."""
+class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # neither actionlib nor rospy has types
+    """An action server whose results reach everybody and are never empty.
+
+    A subscriber of ROS 1 takes itself for connected a moment before the publisher knows of it, so an action client can lose the
+    result of its first goal: who subscribes is sent the last results. And actionlib itself recalls a goal whose cancellation came
+    first, without a word.
+    """
+
+    def __init__(self, name: str, spec: Any, on_goal: OnGoal, on_cancel: OnGoal) -> None:
+        self._results: deque[Any] = deque(maxlen=RESULTS_KEPT)
+        super().__init__(name, spec, on_goal, on_cancel, auto_start=False)
+
+    def initialize(self) -> None:
+        """Make the topics."""
+        super().initialize()
+        self.result_pub.impl.add_subscriber_listener(self)
 
     def publish_result(self, status: Any, result: Any) -> None:
         """Publish a result."""
         if not result.outcome:
             result.outcome, result.message = ExecutionState.INTERRUPTED.value, RECALLED_EARLY
-        super().publish_result(status, result)
+        with self.lock:
+            self._results.append(self.ActionResult(Header(stamp=rospy.get_rostime()), status, result))
+            super().publish_result(status, result)
+
+    def peer_subscribe(self, topic_name: str, topic_publish: OnResult, peer_publish: OnResult) -> None:  # noqa: ARG002
+        """Send the last results to somebody who has just subscribed."""
+        with self.lock:
+            for result in self._results:
+                peer_publish(result)
 
 
 class _Goal:
@@ -80,7 +107,7 @@ class SkillManager:
         self._submit = submit
         self._alarms = alarms
         self._goals: dict[str, _Goal] = {}
-        self._server = _Server(f"{place}/skill/{skill.name}", types.spec, self._accepted, self._cancel, auto_start=False)
+        self._server = _Server(f"{place}/skill/{skill.name}", types.spec, self._accepted, self._cancel)
 
     def start(self) -> None:
         """Take goals."""
