@@ -7,6 +7,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from xmlrpc.client import ServerProxy
 
 import pytest
@@ -37,9 +38,9 @@ def end_process(process: subprocess.Popen[bytes], *, patience_s: float = 5.0) ->
             process.wait()
 
 
-@pytest.fixture(scope="session")
-def ros_master() -> Iterator[str]:
-    """Start a ROS master on a port of its own; this process becomes node /tester, on wall time unless a test sets /use_sim_time before."""
+@contextmanager
+def running_master(node: str) -> Iterator[str]:
+    """Run a ROS master on a port of its own, with this process as a node of it, and return its URI."""
     import rospy
 
     port = free_port()
@@ -50,16 +51,25 @@ def ros_master() -> Iterator[str]:
 
     def answers() -> bool:
         try:
-            ServerProxy(uri).getPid("/tester")
+            ServerProxy(uri).getPid(f"/{node}")
         except OSError:
             return False
         return True
 
-    wait_until(answers, timeout_s=MASTER_START_S, what="the ROS master answers")
-    rospy.init_node("tester", disable_signals=True)
-    yield uri
-    rospy.signal_shutdown("tests are over")
-    end_process(master)
+    try:
+        wait_until(answers, timeout_s=MASTER_START_S, what="the ROS master answers")
+        rospy.init_node(node, disable_signals=True)
+        yield uri
+    finally:
+        rospy.signal_shutdown("that was all")
+        end_process(master)
+
+
+@pytest.fixture(scope="session")
+def ros_master() -> Iterator[str]:
+    """Start a ROS master on a port of its own; this process becomes node /tester, on wall time unless a test sets /use_sim_time before."""
+    with running_master("tester") as uri:
+        yield uri
 
 
 @pytest.fixture

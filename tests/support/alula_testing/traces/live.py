@@ -1,0 +1,59 @@
+"""What both stages on real graphs share: threads, wall clock, and events that come as messages."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+PATIENCE_S = 30.0
+_STEP_S = 0.002
+
+
+def after(delay_s: float, job: Callable[[], object]) -> threading.Timer:
+    """Run a job on a thread after a delay."""
+    timer = threading.Timer(delay_s, job)
+    timer.daemon = True
+    timer.start()
+    return timer
+
+
+def until(condition: Callable[[], bool], what: str) -> None:
+    """Wait until the condition holds."""
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, f"not within {PATIENCE_S} s: {what}"
+        time.sleep(_STEP_S)
+
+
+class Listener:
+    """Hears events; those that come twice, once."""
+
+    def __init__(self) -> None:
+        self._heard: dict[int, dict[str, Any]] = {}
+        self._lock = threading.Lock()
+
+    def hear(self, event: Any) -> None:
+        """Take an ``Event`` of either world."""
+        with self._lock:
+            self._heard[event.sequence] = event_record(event)
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return all, in order; none while one is missing in between."""
+        with self._lock:
+            numbers = sorted(self._heard)
+            return [self._heard[number] for number in numbers] if numbers == list(range(1, len(numbers) + 1)) else []
+
+
+def event_record(event: Any) -> dict[str, Any]:
+    """Return a message as a record like that of ``skill_runtime.local``."""
+    record = {"sequence": event.sequence}
+    if event.kind == event.EXECUTION:
+        names = ("skill", "id", "state", "result", "message")
+        record |= {"kind": "EXECUTION", "inputs": json.loads(event.inputs_json), "outputs": json.loads(event.outputs_json or "{}")}
+    else:
+        names = ("resource", "from_state", "to_state", "cause")
+        record |= {"kind": "TRANSITION"}
+    return record | {name: getattr(event, name) for name in names}

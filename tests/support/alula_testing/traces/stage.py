@@ -1,0 +1,56 @@
+"""What a script needs of a middleware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.handle import SkillHandle
+from skill_runtime.hooks import SkillHooks
+
+Hooks = Mapping[str, SkillHooks]
+
+
+class Client(Protocol):
+    """The part of the clients' API that scripts use."""
+
+    @property
+    def resources(self) -> dict[str, str]:
+        """The state of every resource."""
+        ...
+
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        """Ask for an execution."""
+        ...
+
+
+class Stage(Protocol):
+    """Managers of the drone's navigation over one middleware, up before the first step; each stage serves one script."""
+
+    engine: SkillsetEngine
+
+    def client(self) -> Client:
+        """Return a new client that is ready."""
+        ...
+
+    def transition(self, resource: str, state: str) -> tuple[bool, str, str]:
+        """Take an extern transition as the functional layer does; return accepted, reason, state."""
+        ...
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Let time pass until the condition holds; raise when it does not within a generous time."""
+        ...
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return all events heard so far by a listener of its own, in order, as records."""
+        ...
+
+    def close(self) -> None:
+        """End the managers; after that no hook is called any more."""
+        ...
+
+
+HooksFactory = Callable[[Callable[[float, Callable[[], object]], object]], Hooks]
+"""Makes the hooks, given a function that runs a job after so many seconds of mission clock."""
+MakeStage = Callable[[HooksFactory], Stage]

@@ -1,0 +1,52 @@
+"""Managers and clients without middleware, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from navigation_managers.model import SKILLSET
+
+from alula_testing.traces.stage import Client, HooksFactory
+from skill_runtime.core.events import EngineEvent
+from skill_runtime.local import LocalWorld, event_record
+
+PATIENCE_S = 10.0
+
+
+class NoneStage:
+    """One world."""
+
+    def __init__(self, make_hooks: HooksFactory) -> None:
+        self._world = LocalWorld()
+        self._managers = self._world.serve(SKILLSET, lambda managers: make_hooks(managers.after))
+        self.engine = self._managers.engine
+        self._heard: list[dict[str, Any]] = []
+        self._world.client(SKILLSET.name).on_event(self._hear)
+
+    def _hear(self, skillset: str, event: EngineEvent) -> None:
+        self._heard.append(event_record(skillset, event))
+
+    def client(self) -> Client:
+        """Return a new client that is ready."""
+        client = self._world.client(SKILLSET.name)
+        assert client.wait_ready(PATIENCE_S)
+        return client
+
+    def transition(self, resource: str, state: str) -> tuple[bool, str, str]:
+        """Take an extern transition."""
+        reply = self._managers.transition(resource, state)
+        return reply.accepted, reply.reason, reply.state
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Let virtual time pass."""
+        assert self._world.run_until(condition, timeout_s=PATIENCE_S), what
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return what was heard."""
+        return list(self._heard)
+
+    def close(self) -> None:
+        """End the managers."""
+        self._managers.close("the play is over")
+        self._world.run_for(1.0)

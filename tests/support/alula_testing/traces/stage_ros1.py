@@ -1,0 +1,60 @@
+"""Managers and clients over rospy, on a master of this process's own."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import navigation_interfaces.msg
+import rospy
+from navigation_managers.model import SKILLSET
+from skillset_interfaces.msg import Event
+from skillset_interfaces.srv import Transition, TransitionRequest
+
+from alula_testing.traces import live
+from alula_testing.traces.stage import Client, HooksFactory
+from skillset_ros1 import SkillsetClient, SkillsetManagers, call_and_wait
+
+NUMBERS = itertools.count()
+
+
+class Ros1Stage:
+    """One namespace."""
+
+    def __init__(self, make_hooks: HooksFactory) -> None:
+        self._namespace = f"/play{next(NUMBERS)}"
+        self._listener = live.Listener()
+        self._managers = SkillsetManagers(SKILLSET, navigation_interfaces.msg, lambda _: make_hooks(live.after), namespace=self._namespace)
+        self.engine = self._managers.engine
+        self._subscriber = rospy.Subscriber(f"{self._managers.place}/events", Event, self._listener.hear)
+        self._clients: list[SkillsetClient] = []
+
+    def client(self) -> Client:
+        """Return a new client that is ready."""
+        client = SkillsetClient(SKILLSET.name, namespace=self._namespace)
+        self._clients.append(client)
+        assert client.wait_ready(live.PATIENCE_S)
+        return client
+
+    def transition(self, resource: str, state: str) -> tuple[bool, str, str]:
+        """Call the service."""
+        request = TransitionRequest(resource=resource, to=state)
+        reply = call_and_wait(f"{self._managers.place}/transition", Transition, request, timeout_s=live.PATIENCE_S)
+        return reply.accepted, reply.reason, reply.state
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait."""
+        live.until(condition, what)
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return what was heard."""
+        return self._listener.events()
+
+    def close(self) -> None:
+        """End the managers."""
+        self._managers.close("the play is over")
+        self._subscriber.unregister()
+        for client in self._clients:
+            client.close()
+        self._managers.destroy()

@@ -1,0 +1,232 @@
+"""The same stimuli over rclpy, rospy and no middleware at all: the same executions, transitions, causes, results and messages."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from alula_testing.traces import Behaviour, Script, Step, play
+from alula_testing.traces.stage_none import NoneStage
+
+ALULA_ROOT = Path(__file__).resolve().parents[1]
+ANSWER_S = 120.0
+
+
+class Player:
+    """A process that plays scripts over one middleware."""
+
+    def __init__(self, world: str) -> None:
+        self._asked = 0
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_"))}
+        self._process = subprocess.Popen(
+            [str(ALULA_ROOT / "setup" / f"in_{world}"), "python", "-m", "alula_testing.traces", world],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+
+    def ask(self, script: Script) -> None:
+        self._asked += 1
+        self._process.stdin.write(json.dumps(script.to_plain()) + "\n")
+        self._process.stdin.flush()
+
+    def answer(self) -> dict[str, Any]:
+        # After a script that failed elsewhere, an answer may be left that nobody read.
+        while self._asked:
+            self._asked -= 1
+            trace = json.loads(self._process.stdout.readline())
+        assert "error" not in trace, trace["error"]
+        return trace
+
+    def end(self) -> None:
+        self._process.stdin.close()
+        try:
+            self._process.wait(ANSWER_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def players() -> Iterator[dict[str, Player]]:
+    started = {world: Player(world) for world in ("ros1", "ros2")}
+    yield started
+    for player in started.values():
+        player.end()
+
+
+def traces_of(players: dict[str, Player], script: Script) -> dict[str, dict[str, Any]]:
+    """Play a script over all middlewares at the same time."""
+    for player in players.values():
+        player.ask(script)
+    return {"none": play(script, NoneStage)} | {world: player.answer() for world, player in players.items()}
+
+
+def compare(players: dict[str, Player], script: Script) -> dict[str, Any]:
+    """Return the trace that all middlewares agree on."""
+    traces = traces_of(players, script)
+    for world in players:
+        assert traces[world] == traces["none"], world
+    return traces["none"]
+
+
+TAKEOFF = {"height": 3, "speed": 1}
+STRAIGHT = {"target": [1, 2.5, 3], "speed": 1}
+READY = (
+    Step("transition", resource="SDK_authority", state="AVAILABLE"),
+    Step("transition", resource="homepoint_status", state="VALID"),
+)
+FLYING = (*READY, Step("transition", resource="flight_status", state="IN_AIR"))
+
+
+def states(trace: dict[str, Any], label: str) -> list[str]:
+    return [event[3] for event in trace["events"] if len(event) == 8 and event[2] == label]
+
+
+def test_refusals_with_their_reasons_to_the_one_who_asked(players):
+    script = Script(
+        (
+            Step("start", "early", "takeoff", TAKEOFF),
+            *READY,
+            Step("start", "high", "takeoff", {"height": 300, "speed": 1}),
+            Step("start", "first", "takeoff", TAKEOFF),
+            Step("start", "second", "takeoff", TAKEOFF, client=1),
+            Step("start", "other", "goto_straight", STRAIGHT, client=1),
+            Step("late"),
+            Step("finish", "first", result="AT_ALTITUDE"),
+            Step("transition", resource="axes_authority", state="USED"),
+            Step("transition", resource="wings", state="USED"),
+        ),
+        {"takeoff": (Behaviour(), Behaviour(refuse="too high"))},
+    )
+    trace = compare(players, script)
+    assert {label: end[:2] for label, end in trace["ends"].items()} == {
+        "early": ["NOT_READY", "sdk_authority"],
+        "high": ["NOT_VALIDATED", ""],
+        "first": ["TERMINATED", "AT_ALTITUDE"],
+        "second": ["NOT_READY", "not_moving"],
+        "other": ["NOT_READY", "not_moving"],
+    }
+    assert trace["ends"]["high"][2] == "too high"
+    assert trace["hooks"] == {"early": [], "high": [], "first": ["on_dispatch"], "second": [], "other": []}
+    assert trace["replies"][2]["axes_authority"] == "USED"
+    accepted = [reply[0] for reply in trace["replies"] if isinstance(reply, list)]
+    assert accepted == [True, True, False, False]
+
+
+def test_ends_of_every_kind(players):
+    script = Script(
+        (
+            *FLYING,
+            Step("start", "arrives", "goto_straight", STRAIGHT),
+            Step("start", "stopped", "goto_straight", STRAIGHT),
+            Step("interrupt", "stopped"),
+            Step("start", "violated", "goto_straight", STRAIGHT),
+            Step("transition", resource="SDK_authority", state="UNAVAILABLE"),
+            Step("transition", resource="SDK_authority", state="AVAILABLE"),
+            Step("start", "wrong", "hover", {"duration": 1}),
+            Step("finish", "wrong", result="NONSENSE"),
+            Step("interrupt", "arrives"),
+        ),
+        {"goto_straight": (Behaviour(ends="ARRIVED", message="there"),)},
+    )
+    trace = compare(players, script)
+    assert {label: end[0] for label, end in trace["ends"].items()} == {
+        "arrives": "TERMINATED",
+        "stopped": "INTERRUPTED",
+        "violated": "RESOURCE_INVARIANT_VIOLATED",
+        "wrong": "FAILED",
+    }
+    assert states(trace, "arrives") == ["REQUESTED", "RUNNING", "TERMINATED"]
+    assert trace["ends"]["arrives"][1:3] == ["ARRIVED", "there"]
+    assert trace["hooks"]["violated"] == ["on_dispatch", "on_violation"]
+    assert [event[4] for event in trace["events"] if event[1] == "axes_authority"][:2] == [
+        "goto_straight arrives take_control",
+        "goto_straight arrives release_control",
+    ]
+
+
+@pytest.mark.parametrize("hook", ["validate", "on_dispatch", "on_interrupt", "on_violation"])
+def test_hooks_that_raise(players, hook):
+    script = Script(
+        (
+            *FLYING,
+            Step("start", "one", "hover", {"duration": 1}),
+            Step("transition", resource="SDK_authority", state="UNAVAILABLE") if hook == "on_violation" else Step("interrupt", "one"),
+            Step("transition", resource="SDK_authority", state="AVAILABLE"),
+            Step("start", "two", "hover", {"duration": 1}),
+        ),
+        {"hover": (Behaviour(raises=hook),)},
+    )
+    trace = compare(players, script)
+    if hook == "on_violation":
+        assert trace["ends"]["one"][0] == "RESOURCE_INVARIANT_VIOLATED"
+    else:
+        assert trace["ends"]["one"][::2] == ["FAILED", f"{hook} raised RuntimeError: {hook} was told to"]
+    assert states(trace, "two") == ["REQUESTED", "RUNNING"]
+
+
+INPUTS = {
+    "takeoff": TAKEOFF,
+    "goto": STRAIGHT,
+    "goto_straight": STRAIGHT,
+    "rotate_head": {"heading": 1, "rate": 0.5},
+    "lock_head": {"heading": 1},
+    "hover": {"duration": 1},
+    "land": {},
+}
+ENDS = ["AT_ALTITUDE", "ARRIVED", "ALIGNED", "DONE", "LANDED", "ABORTED"]
+STATES = {
+    "SDK_authority": ["AVAILABLE", "UNAVAILABLE"],
+    "axes_authority": ["AVAILABLE", "USED"],
+    "flight_status": ["ON_GROUND", "IN_AIR"],
+    "homepoint_status": ["INVALID", "VALID"],
+}
+BEHAVIOURS = st.one_of(
+    st.just(Behaviour()),
+    st.builds(Behaviour, refuse=st.just("no")),
+    st.builds(Behaviour, ends=st.sampled_from(ENDS), message=st.text("ab ", max_size=3), after_s=st.just(0.01)),
+    st.builds(Behaviour, raises=st.sampled_from(["validate", "on_dispatch", "on_interrupt", "on_violation", "on_failure"])),
+)
+TRANSITIONS = st.sampled_from([Step("transition", resource=r, state=s) for r, possible in STATES.items() for s in possible])
+
+
+@st.composite
+def scripts(draw) -> Script:
+    """Any stimuli in any order, most of them in flight."""
+    steps: list[Step] = list(draw(st.sampled_from([FLYING, READY, ()])))
+    labels: list[str] = []
+    for _ in range(draw(st.integers(3, 12))):
+        kind = draw(st.sampled_from(["start", "start", "start", "transition", "interrupt", "finish", "late"]))
+        if kind == "start":
+            labels.append(f"call{len(labels)}!")
+            skill = draw(st.sampled_from(list(INPUTS)))
+            steps.append(Step("start", labels[-1], skill, INPUTS[skill], client=draw(st.integers(0, 1))))
+        elif kind == "transition":
+            steps.append(draw(TRANSITIONS))
+        elif kind == "late":
+            steps.append(Step("late"))
+        elif labels:
+            steps.append(Step(kind, draw(st.sampled_from(labels)), result=draw(st.sampled_from(ENDS)) if kind == "finish" else ""))
+    return Script(tuple(steps), {skill: tuple(draw(st.lists(BEHAVIOURS, max_size=3))) for skill in INPUTS})
+
+
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@given(script=scripts())
+def test_any_script_has_the_same_trace_everywhere(players, script):
+    trace = compare(players, script)
+    numbers = [event[0] for event in trace["events"]]
+    assert numbers == list(range(1, len(numbers) + 1))
+    for label, (outcome, _, _, done) in trace["ends"].items():
+        terminal = [state for state in states(trace, label) if state not in {"REQUESTED", "RUNNING", "PAUSED", "INTERRUPTING"}]
+        assert terminal == ([outcome] if done else [])
