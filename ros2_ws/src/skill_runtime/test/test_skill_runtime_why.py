@@ -58,7 +58,7 @@ def test_data_start_effects_invariants_and_validate_count_too():
     bench = Bench(model)
     assert bench.engine.why("takeoff").reason == "charged: battery has no fresh value"
     assert bench.engine.why("takeoff").unmet[0].data == {"battery.level": None}
-    give(bench, "battery", type("Battery", (), {"level": 0.1}))
+    bench.engine.update_data("battery", type("Battery", (), {"level": 0.1}))
     assert bench.engine.why("takeoff").unmet[0].data == {"battery.level": 0.1}
     bench = Bench(flying_skillset(flying_skill("takeoff", preconditions=(), start=RELEASE)))
     assert [one.name for one in bench.engine.why("takeoff").unmet] == ["start effect"]
@@ -101,7 +101,3 @@ def test_each_skill_keeps_its_last_result_and_what_is_open():
     assert last.requested_ns < last.started_ns < last.ended_ns
     assert bench.engine.skills["takeoff"].open == ()
     assert [record.state for record in bench.engine.skills["land"].open] == [S.RUNNING]
-
-
-def give(bench, name, value):
-    bench.engine._data = {name: value}

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 from skill_language.model import Skillset
 from skill_runtime.core import semantics
-from skill_runtime.core.conditions import Data
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import Listener
 from skill_runtime.core.execution import Execution, ExecutionState
@@ -21,7 +20,6 @@ from skill_runtime.core.hook_calls import HookAnswer, HookCaller, LocalHooks
 from skill_runtime.core.ledger import Entry, ResourceStatus
 from skill_runtime.core.pauses import PauseReply, Pauses, Reply
 from skill_runtime.core.records import SkillRecord
-from skill_runtime.core.semantics import Running
 from skill_runtime.core.stops import DEFAULT_TIMEOUT_S, Stops
 from skill_runtime.core.why import Why, resources_of, sentence, unmet
 from skill_runtime.hooks import SkillHooks
@@ -31,7 +29,10 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class TransitionReply:
-    """Answer to an extern transition; ``state`` is the resource's state afterwards, empty when there is no such resource."""
+    """Answer to an extern transition or an event.
+
+    ``state`` is the resource's state afterwards, empty for an event and when there is no such resource.
+    """
 
     accepted: bool
     reason: str
@@ -56,7 +57,6 @@ class SkillsetEngine:
         clock_ns: the mission clock, nanoseconds.
         hooks: one a skill, or whoever calls them elsewhere.
         listener: gets the events of each step.
-        data: fresh values by name, for preconditions; a name that is missing has no fresh value.
         defer: runs a stop hook that a step of somebody else has made necessary; by default in the thread of that step. It
             should not wait for other hooks: emergencies come this way.
         on_error: gets one text for each error that no execution can carry.
@@ -74,7 +74,6 @@ class SkillsetEngine:
         hooks: Mapping[str, SkillHooks] | HookCaller,
         listener: Listener,
         *,
-        data: Data | None = None,
         defer: Callable[[Job], None] = run_at_once,
         on_error: Callable[[str], None] = log_error,
         interrupt_timeout_s: float = DEFAULT_TIMEOUT_S,
@@ -82,7 +81,7 @@ class SkillsetEngine:
         semantics.check_supported(skillset)
         self.skillset = skillset
         self._hooks: HookCaller = LocalHooks(skillset, hooks) if isinstance(hooks, Mapping) else hooks
-        self._data: Data = {} if data is None else data
+        self._data_names = tuple(data.name for data in skillset.data)
         self._floor = Floor(skillset, clock_ns, self._hooks, listener, defer=defer, on_error=on_error)
         self._lock = self._floor.lock
         self._ledger = self._floor.ledger
@@ -128,6 +127,7 @@ class SkillsetEngine:
 
     def transition(self, resource: str, to: str) -> TransitionReply:
         """Take an extern transition, or say why not."""
+        self.tick()
         with self._lock:
             reason = semantics.extern_refusal(self.skillset, self._ledger.situation, resource, to)
             stops = [] if reason else self._ledger.commit(semantics.transition(self.skillset, self._ledger.situation, resource, to))
@@ -135,19 +135,44 @@ class SkillsetEngine:
         self._floor.after_step(stops)
         return reply
 
+    def trigger(self, event: str) -> TransitionReply:
+        """Take an event of the model, or say why not: its guard is false, or its effect is no transition now."""
+        self.tick()
+        with self._lock:
+            reason = semantics.event_refusal(self.skillset, self._ledger.situation, event)
+            stops = [] if reason else self._ledger.commit(semantics.event(self.skillset, self._ledger.situation, event))
+        self._floor.after_step(stops)
+        return TransitionReply(not reason, reason, "")
+
+    def update_data(self, name: str, value: object | None) -> None:
+        """Take a fresh value of a data, or None: there is no fresh one any more. What that breaks is ended in the same step.
+
+        Raises:
+            SkillRuntimeError: there is no such data.
+        """
+        if name not in self._data_names:
+            raise SkillRuntimeError(f"skillset {self.skillset.name} has no data {name}; it has {', '.join(self._data_names) or 'none'}")
+        self.tick()
+        with self._lock:
+            stops = self._ledger.commit(semantics.receive(self.skillset, self._ledger.situation, name, value))
+        self._floor.after_step(stops)
+
     def interrupt(self, execution_id: str) -> bool:
         """Ask for the end of an execution: ``on_interrupt``, then the step (see ``stops``). False when it has ended or is not known.
 
         While ``validate`` runs, it ends at once and never starts; while ``on_dispatch`` runs, the hook follows after it.
         """
+        self.tick()
         return self._stops.interrupt(execution_id)
 
     def interrupted(self, execution_id: str, message: str = "") -> bool:
         """Say that the stop which ``on_interrupt`` has begun is done; False when none is under way."""
+        self.tick()
         return self._stops.interrupted(execution_id, message)
 
     def set_paused(self, execution_id: str, reply: Reply, *, paused: bool) -> None:
         """Pause or resume an execution; ``reply`` gets the answer once the hook has given it."""
+        self.tick()
         self._pauses.set_paused(execution_id, paused=paused, reply=reply)
 
     def pause(self, execution_id: str) -> PauseReply:
@@ -161,6 +186,7 @@ class SkillsetEngine:
     def terminate(self, execution_id: str, result: str, message: str = "", outputs: Mapping[str, object] | None = None) -> bool:
         """End a running execution with a result of the model; False when it is not running (any more)."""
         values = dict(outputs or {})
+        self.tick()
         with self._lock:
             entry = self._ledger.running(execution_id)
             if entry is None:
@@ -177,6 +203,7 @@ class SkillsetEngine:
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED; False when it has ended or is not known."""
+        self.tick()
         return self._floor.fail(execution_id, message)
 
     def set_outputs(self, execution_id: str, outputs: Mapping[str, object]) -> None:
@@ -196,8 +223,9 @@ class SkillsetEngine:
         """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running.
 
         Only a RUNNING one is asked; one that is PAUSED or INTERRUPTING has the progress that it had, and hooks elsewhere tell
-        theirs by ``report_progress``.
+        theirs by ``report_progress``. An answer that differs from the one before is progress, which puts off the progress deadline.
         """
+        self.tick()
         with self._lock:
             entry = self._ledger.running(execution_id)
             if entry is None:
@@ -213,15 +241,19 @@ class SkillsetEngine:
 
     def report_progress(self, execution_id: str, value: object) -> float | None:
         """Keep an execution's progress, held within 0 to 1; what is no number ends it as FAILED."""
-        execution = self.execution(execution_id)
-        if execution is None:
-            return None
         try:
-            execution.progress = min(1.0, max(0.0, float(value)))  # type: ignore[arg-type]  # that is tried
+            told = min(1.0, max(0.0, float(value)))  # type: ignore[arg-type]  # that is tried
         except (TypeError, ValueError) as error:
             self.fail(execution_id, f"progress raised {type(error).__name__}: {error}")
             return None
-        return None if execution.done else execution.progress
+        with self._lock:
+            entry = self._ledger.running(execution_id)
+            if entry is None:
+                return None
+            if told != entry.execution.progress and entry.execution.state is ExecutionState.RUNNING:
+                self._ledger.progressed(entry)
+            entry.execution.progress = told
+        return told
 
     def fail_all(self, message: str) -> None:
         """End whatever was asked for or runs as FAILED."""
@@ -238,12 +270,16 @@ class SkillsetEngine:
 
     @property
     def due_ns(self) -> int | None:
-        """Return the mission clock's time at which ``tick`` must be called next, or None; asked after each step."""
+        """Return when, on the mission clock, time alone may next change something: then ``tick`` is to be called."""
         with self._lock:
-            return self._stops.due_ns()
+            return min((due for due in (self._ledger.due_ns, self._stops.due_ns()) if due is not None), default=None)
 
     def tick(self) -> None:
-        """Do what is due by now."""
+        """Do what has become due: a duration that has run out, a progress deadline, a stop that is too late.
+
+        Every other step begins with it, so that a late call makes the step late, not another one.
+        """
+        self._floor.elapse()
         self._stops.tick()
 
     # --- questions ---------------------------------------------------------------------------------------------------
@@ -293,9 +329,10 @@ class SkillsetEngine:
 
     def explain(self, skill: str, refusal: str = "") -> Why:
         """Answer as ``why``, with what ``validate`` has said already."""
-        model, data = self.skillset.skill(skill), dict(self._data)
+        model = self.skillset.skill(skill)
+        self.tick()
         with self._lock:
-            found = unmet(self.skillset, self._ledger.situation, model, data)
+            found = unmet(self.skillset, self._ledger.situation, model)
             history = self._floor.records.history(resources_of(model))
             reason = sentence(found, refusal, self._floor.closed)
         return Why(skill, not reason, reason, refusal, found, history)
@@ -304,7 +341,7 @@ class SkillsetEngine:
 
     def _validated(self, entry: Entry, refusal: str) -> None:
         """Refuse the request or take its start step and call ``on_dispatch``."""
-        data = dict(self._data)
+        self.tick()
         started = False
         stops: list[Entry] = []
         with self._lock:
@@ -313,20 +350,19 @@ class SkillsetEngine:
             if refusal:
                 self._ledger.end_request(entry, ExecutionState.NOT_VALIDATED, refusal)
             else:
-                stops, started = self._start(entry, data)
+                stops, started = self._start(entry)
         self._floor.after_step([other for other in stops if other is not entry])
         if started:
             self._floor.call(entry, "on_dispatch", lambda _: self._stops.hook_returned(entry))
 
-    def _start(self, entry: Entry, data: Data) -> tuple[list[Entry], bool]:
+    def _start(self, entry: Entry) -> tuple[list[Entry], bool]:
         """Take the start step with the lock held; return what is to be stopped, and whether the execution runs."""
         entry.dispatching = True
-        key: Running = entry.key
-        stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, key, data))
+        stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, entry.key))
         started = entry.execution.state is ExecutionState.RUNNING
         if not started:
             # Also when its own invariant broke in the very step: nothing was dispatched, nothing is to be stopped.
-            self._ledger.entries.pop(key.id, None)
+            self._ledger.entries.pop(entry.key.id, None)
         return stops, started
 
     def _paused(self, execution_id: str, *, paused: bool) -> PauseReply:

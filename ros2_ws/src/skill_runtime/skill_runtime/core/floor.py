@@ -64,6 +64,15 @@ class Floor:
         for entry in stops:
             self.defer(functools.partial(self.call, entry, entry.stop_hook))
 
+    def elapse(self) -> None:
+        """Take the step of what time alone has broken."""
+        with self.lock:
+            due_ns = self.ledger.due_ns
+            if due_ns is None or (situation := self.ledger.situation).now_ns < due_ns:
+                return
+            stops = self.ledger.commit(semantics.elapse(self.skillset, situation))
+        self.after_step(stops)
+
     def call(self, entry: Entry, hook: str, then: Afterwards = nothing) -> None:
         """Call a hook; what it raises ends its execution. ``then`` gets what it returns, None when it raised."""
 

@@ -51,10 +51,18 @@ class Pauses:
             if state.terminal or state is ExecutionState.INTERRUPTING:
                 reason = f"it was {state.value} before it was {verb}"
             elif not reason:
+                self._expect_progress(entry, paused=paused)
                 self._floor.ledger.enter_phase(entry, phase)
         self._floor.deliver()
         reply(PauseReply(not reason, reason))
         self._stops.hook_returned(entry)
+
+    def _expect_progress(self, entry: Entry, *, paused: bool) -> None:
+        """Let the progress deadline rest during the pause, and begin anew after it."""
+        if paused:
+            self._floor.ledger.interrupting(entry)
+        else:
+            self._floor.ledger.progressed(entry)
 
 
 def _known_reply(execution_id: str, entry: Entry | None, *, paused: bool) -> PauseReply | None:

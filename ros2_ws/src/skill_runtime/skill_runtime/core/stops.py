@@ -98,6 +98,7 @@ class Stops:
     def _ask(self, entry: Entry) -> None:
         timeout_s = self._floor.skillset.skill(entry.key.skill).interrupt.timeout_s or self._timeout_s
         entry.stop_hook = "on_interrupt"
+        self._floor.ledger.interrupting(entry)
         self._floor.ledger.enter_phase(entry, ExecutionState.INTERRUPTING)
         self._deadlines[entry.key.id] = _Deadline(entry, self._floor.clock_ns() + round(timeout_s * 1e9), timeout_s)
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from skill_language.model import DataIs, Expression, ResourceIs, Skill, Skillset, atoms
 from skill_language.printing.text import bare_text
 from skill_runtime.core import semantics
-from skill_runtime.core.conditions import Data, States, holds, present
-from skill_runtime.core.errors import DataMissingError, EffectError
+from skill_runtime.core.conditions import Data, States, judge, present, value_of
+from skill_runtime.core.effects import effect_changes
+from skill_runtime.core.errors import EffectError
 from skill_runtime.core.events import TransitionEvent
-from skill_runtime.core.semantics import Entered, Running, Situation
+from skill_runtime.core.situation import Entered, Running, Situation
 
 START_EFFECT = "start effect"
 
@@ -43,24 +44,24 @@ class Why:
     history: tuple[TransitionEvent, ...]
 
 
-def unmet(skillset: Skillset, situation: Situation, skill: Skill, data: Data) -> tuple[Unmet, ...]:
+def unmet(skillset: Skillset, situation: Situation, skill: Skill) -> tuple[Unmet, ...]:
     """Return what keeps the skill from running if it were started now, in the model's order."""
-    found = list(_preconditions(skill, situation.states, data))
+    found = list(_preconditions(skill, situation))
     if found:
         return tuple(found)
     execution = Running("", skill.name)
     try:
-        semantics.effect_changes(skillset, execution, skill.start, "start", situation.states)
+        effect_changes(skillset, execution, skill.start, "start", situation.states)
     except EffectError as error:
         resources = [assignment.resource for assignment in skill.start.assignments]
         effect = ", ".join(f"{assignment.resource} -> {assignment.target}" for assignment in skill.start.assignments)
         return (Unmet(START_EFFECT, effect, str(error), {name: situation.states[name] for name in resources}, {}),)
-    step = semantics.start(skillset, situation, execution, data)
+    step = semantics.start(skillset, situation, execution)
     ends = (happening for happening in step.happenings if isinstance(happening, Entered) and happening.execution == execution)
     for end in ends:
         if end.state.terminal:  # its own invariant is false as soon as it has started
             invariant = next(i for i in skill.invariants if i.name == end.result)
-            return (_unmet(end.result, invariant.condition, end.message, step.situation.states, data),)
+            return (_unmet(end.result, invariant.condition, end.message, step.situation),)
     return ()
 
 
@@ -77,32 +78,23 @@ def sentence(found: tuple[Unmet, ...], refusal: str, closed: str) -> str:
     return "; ".join(part for part in parts if part)
 
 
-def _preconditions(skill: Skill, states: States, data: Data) -> Iterator[Unmet]:
+def _preconditions(skill: Skill, situation: Situation) -> Iterator[Unmet]:
     for precondition in skill.preconditions:
         condition = precondition.condition
-        try:
-            if holds(condition, states, data):
-                continue
-            reason = present(condition, states) or f"{', '.join(_told(condition, data))} does not meet it"
-        except DataMissingError as error:
-            reason = str(error)
-        yield _unmet(precondition.name, condition, f"{precondition.name}: {reason}", states, data)
+        if judge(condition, situation.states, situation.data) is not True:
+            reason = present(condition, situation.states, situation.data)
+            yield _unmet(precondition.name, condition, f"{precondition.name}: {reason}", situation)
 
 
-def _unmet(name: str, condition: Expression, reason: str, states: States, data: Data) -> Unmet:
-    asked = [atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs)]
-    return Unmet(name, bare_text(condition), reason, {resource: states[resource] for resource in asked}, dict(_values(condition, data)))
+def _unmet(name: str, condition: Expression, reason: str, situation: Situation) -> Unmet:
+    return Unmet(name, bare_text(condition), reason, _states(condition, situation.states), _values(condition, situation.data))
 
 
-def _told(condition: Expression, data: Data) -> Iterator[str]:
-    return (f"{name} = {value}" for name, value in _values(condition, data))
+def _states(condition: Expression, states: States) -> dict[str, str]:
+    return {atom.resource: states[atom.resource] for atom in atoms(condition) if isinstance(atom, ResourceIs)}
 
 
-def _values(condition: Expression, data: Data) -> Iterator[tuple[str, object]]:
-    """Yield ``battery.level`` and its value for each data that a condition asks, None where there is no fresh value."""
-    for atom in atoms(condition):
-        if isinstance(atom, DataIs):
-            value = data.get(atom.data)
-            for name in atom.path:
-                value = getattr(value, name, None)
-            yield ".".join((atom.data, *atom.path)), value
+def _values(condition: Expression, data: Data) -> dict[str, object]:
+    """Return ``battery.level`` and its value for each data that a condition asks, None where there is no fresh value."""
+    asked = [atom for atom in atoms(condition) if isinstance(atom, DataIs)]
+    return {".".join((atom.data, *atom.path)): value_of(atom, data) for atom in asked}

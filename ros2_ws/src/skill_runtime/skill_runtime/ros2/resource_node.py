@@ -23,7 +23,7 @@ from skill_runtime.core.stops import DEFAULT_TIMEOUT_S
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2.answers import Answers
 from skill_runtime.ros2.data_manager import DataBindings, DataManager
-from skill_runtime.ros2.due_timer import DueTimer
+from skill_runtime.ros2.due import DueTimer
 from skill_runtime.ros2.resource_manager import EventPublisher, ResourceManager
 from skill_runtime.ros2.skill_states import SkillStatesPublisher
 from skill_runtime.ros2.workers import Workers
@@ -54,15 +54,15 @@ class ResourceNode(Node):  # type: ignore[misc]  # rclpy has no types
             lambda: int(self.get_clock().now().nanoseconds),
             hooks,
             self._on_events,
-            data=DataManager(self, skillset, _generated_bindings(skillset) if data_bindings is None else data_bindings),
             defer=self.workers.submit,
             on_error=self.get_logger().error,
             interrupt_timeout_s=timeout_s,
         )
+        self._due = DueTimer(self, self.engine)
+        DataManager(self, skillset, _generated_bindings(skillset) if data_bindings is None else data_bindings, self._update_data)
         self._events = EventPublisher(self, skillset.name)
         self._resources = ResourceManager(self, self.engine)
         self._skill_states = SkillStatesPublisher(self, skillset)
-        self._due = DueTimer(self, self.engine)
         Answers(self, self.engine, self.workers, self.make_inputs)
         self._model_json = to_json(skillset)
         self.create_service(Describe, f"{skillset.name}/describe", self._describe)
@@ -89,7 +89,11 @@ class ResourceNode(Node):  # type: ignore[misc]  # rclpy has no types
         self._events.publish(events)
         self.on_step(events)
         self._skill_states.on_events(events)
-        self._due.arm()
+        self._due.look()
+
+    def _update_data(self, name: str, value: object | None) -> None:
+        self.engine.update_data(name, value)
+        self._due.look()
 
     def _describe(self, _: Any, response: Any) -> Any:
         response.model_json = self._model_json

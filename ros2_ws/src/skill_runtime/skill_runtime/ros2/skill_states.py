@@ -33,6 +33,8 @@ class SkillStatesPublisher:
         self._changed: set[str] = set()
         self._publisher = node.create_publisher(SkillStates, f"{skillset.name}/skill_states", LATCHED)
         self._timer: Any = node.create_timer(TOGETHER_S, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
+        # A timer that is set from another thread does not wake the executor; a guard condition does.
+        self._wake = node.create_guard_condition(self._timer.reset)
         self.publish()
 
     def on_events(self, events: Sequence[EngineEvent]) -> None:
@@ -45,7 +47,7 @@ class SkillStatesPublisher:
             first = not self._changed
             self._changed |= skills
         if first:
-            self._timer.reset()
+            self._wake.trigger()
 
     def publish(self) -> None:
         """Publish what is known now."""
