@@ -98,6 +98,12 @@ class Director:
         self._phase = self._land
         return "the vehicle stops and lands where it is"
 
+    def remember(self) -> None:
+        """Take note of how each node is; for those who look at the tree later only, instead of ``view`` after each step."""
+        self._watch.remember()
+        if self._landing_watch is not None:
+            self._landing_watch.remember()
+
     def view(self) -> NodeView:
         """Return the tree as it is now; after an abort with the landing beside it."""
         flight = self._watch.look()
