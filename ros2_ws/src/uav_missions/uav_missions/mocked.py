@@ -134,6 +134,16 @@ class MockedMission:
         """Tell whether the vehicle is on the ground."""
         return self.world.managers["navigation"].engine.resources["flight_status"].state == "ON_GROUND"
 
+    @property
+    def lift_off_s(self) -> float | None:
+        """When the vehicle first left the ground, seconds of mission clock."""
+        return None if self._record is None else self._record.lift_off_s
+
+    @property
+    def notes(self) -> list[str]:
+        """Return what went wrong in the mocks themselves."""
+        return [*self.world.errors, *self.play.stage.notes]
+
     # --- ticks -------------------------------------------------------------------------------------------------------
 
     def _tick_regularly(self) -> None:

@@ -24,6 +24,11 @@ class Stage(Protocol):
         """Mission clock."""
         ...
 
+    @property
+    def notes(self) -> list[str]:
+        """What went wrong and belongs to no execution."""
+        ...
+
     def after(self, delay_s: float, job: Job) -> Appointment:
         """Have a job done after a delay of mission clock."""
         ...
