@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from skill_missions.director import Outcome
 from skill_runtime.core import ExecutionEvent
 from skill_runtime.mock import load_behaviour
-from uav_missions.director import Outcome
 from uav_missions.mocked import FaultRequest, MockedMission
 from uav_missions.route import Route, load_route
 

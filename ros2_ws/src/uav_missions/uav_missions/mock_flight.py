@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from skill_language.model import Skillset
+from skill_missions.director import EXIT_CODES, End, Outcome
+from skill_missions.files import write_json
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock import Behaviour, load_behaviour
-from uav_missions.director import EXIT_CODES, End, Outcome
-from uav_missions.files import write_json
 from uav_missions.mocked import FaultRequest, MockedMission
 from uav_missions.route import Route, RouteError, load_route
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skill_language.model import Skillset
+from skill_missions.director import Director, End, Outcome
+from skill_missions.pending import PendingInterrupts
+from skill_missions.skillset import Handle
 from skill_runtime.core.events import EngineEvent
 from skill_runtime.local import LocalClient, LocalWorld, event_record
 from skill_runtime.mock import Behaviour, Play, mock_world
-from uav_missions.blackboard import Blackboard
-from uav_missions.director import Director, End, Outcome
+from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients, MappingMission, Settings
-from uav_missions.pending import PendingInterrupts
 from uav_missions.record import MissionRecord
 from uav_missions.route import Route
-from uav_missions.skillset import Handle
 
 TICK_PERIOD_S = 0.1
 LATENCY_S = 0.005
@@ -100,9 +100,9 @@ class MockedMission:
         self._abort_reasons: list[str] = []
         clients = {skillset.name: _Waking(self.world.client(skillset.name), self._wake) for skillset in skillsets}
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
-        blackboard = Blackboard(clock_ns, route, PendingInterrupts(clock_ns))
+        blackboard = RouteBlackboard(clock_ns=clock_ns, route=route, pending=PendingInterrupts(clock_ns))
         skills = Clients(clients["navigation"], clients["perception"], clients["mapping"])
-        self.director = Director(MappingMission(skills, blackboard, settings), skills, blackboard)
+        self.director = Director(MappingMission(skills, blackboard, settings), blackboard)
         self.world.on_event(self._on_event)
 
     def fly(self) -> End:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from uav_missions.director import Director, End, Outcome
-from uav_missions.drawing import draw
-from uav_missions.files import EventLog, write_json, write_text
+from skill_missions.director import Director, End, Outcome
+from skill_missions.drawing import draw
+from skill_missions.files import EventLog, write_json, write_text
 from uav_missions.route import Route
 
 UNENDED_STATES = ("REQUESTED", "RUNNING")
