@@ -1,4 +1,4 @@
-"""Values of messages, inputs and outputs as what ``json`` can write."""
+"""Values of messages of either ROS world, inputs and outputs as what ``json`` can write."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ def to_plain(value: Any) -> Any:
         return value if math.isfinite(value) else None
     if hasattr(value, "get_fields_and_field_types"):
         return {name: to_plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if hasattr(value, "_slot_types"):
+        return _plain_ros1(value)
+    if hasattr(value, "nsecs"):
+        return {"sec": value.secs, "nanosec": value.nsecs}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
     if isinstance(value, SimpleNamespace):
@@ -30,3 +34,18 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, Sequence | set):
         return [to_plain(part) for part in value]
     return str(value)
+
+
+_ROS1_KINDS = {"bool": bool, "float32": float, "float64": float}
+
+
+def _plain_ros1(message: Any) -> dict[str, Any]:
+    """Return a message of ROS 1 as its ROS 2 twin: truth values and floats as such, headers without their ``seq``."""
+    fields = dict(zip(message.__slots__, message._slot_types, strict=True))  # noqa: SLF001 - genpy's way to tell
+    if message._type == "std_msgs/Header":  # noqa: SLF001
+        del fields["seq"]
+    return {name: to_plain(_ROS1_KINDS.get(kind, _same)(getattr(message, name))) for name, kind in fields.items()}
+
+
+def _same(value: Any) -> Any:
+    return value

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
-from skillset_interfaces.msg import DataValue, ResourceState, ResourceTransition, Unmet
 from skillset_interfaces.srv import SetPaused
 from skillset_interfaces.srv import Why as WhyService
 
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.pauses import PauseReply
-from skill_runtime.core.why import Why
-from skill_runtime.plain import to_plain
+from skill_runtime.messages import fill_why
 from skill_runtime.ros2.deferred import Answer
 from skill_runtime.ros2.workers import Workers
 
@@ -49,7 +46,7 @@ class Answers:
                 response.reason = str(error)
                 return response
             refusal = await self._validated(request.skill, inputs)
-        return why_message(response, self._engine.explain(request.skill, refusal), self._engine.resources)
+        return fill_why(response, self._engine.explain(request.skill, refusal), self._engine.resources)
 
     async def _validated(self, skill: str, inputs: object) -> str:
         answer: Answer[str] = Answer()
@@ -63,31 +60,3 @@ class Answers:
         reply = await answer.within(HOOK_ANSWERS_S, silent)
         response.accepted, response.reason = reply.accepted, reply.reason
         return response
-
-
-def why_message(response: Any, why: Why, resources: Any) -> Any:
-    """Fill the service's response."""
-    response.known, response.ready, response.reason, response.refusal = True, why.ready, why.reason, why.refusal
-    for one in why.unmet:
-        states = [(name, state, resources[name]) for name, state in one.states.items()]
-        response.unmet.append(
-            Unmet(
-                name=one.name,
-                condition=one.condition,
-                reason=one.reason,
-                resources=[
-                    ResourceState(name=name, state=state, previous_state=s.previous, stamp_ns=s.stamp_ns) for name, state, s in states
-                ],
-                data=[data_message(name, value) for name, value in one.data.items()],
-            )
-        )
-    response.history = [
-        ResourceTransition(stamp_ns=e.stamp_ns, resource=e.resource, from_state=e.from_state, to_state=e.to_state, cause=e.cause)
-        for e in why.history
-    ]
-    return response
-
-
-def data_message(name: str, value: object) -> Any:
-    """Return a data's value as a message; None for no fresh value."""
-    return DataValue(name=name, value_json="" if value is None else json.dumps(to_plain(value)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,8 +12,8 @@ from skillset_interfaces.msg import Event, ResourceState, ResourceStates
 from skillset_interfaces.srv import Transition, TriggerEvent
 
 from skill_runtime.core.engine import SkillsetEngine
-from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from skill_runtime.plain import to_plain
+from skill_runtime.core.events import EngineEvent, TransitionEvent
+from skill_runtime.messages import event_message
 from skill_runtime.ros2.names import ALIVE, EVENTS
 
 
@@ -28,7 +27,9 @@ class EventPublisher:
     def publish(self, events: Sequence[EngineEvent]) -> None:
         """Publish in order."""
         for event in events:
-            self._publisher.publish(event_message(self._skillset, event))
+            message = event_message(self._skillset, event)
+            message.header.stamp = Time(nanoseconds=event.stamp_ns).to_msg()
+            self._publisher.publish(message)
 
     def flush(self, timeout_s: float) -> None:
         """Wait (wall clock) until all who listen have all events: those of a process that ends would be lost."""
@@ -75,21 +76,3 @@ class ResourceManager:
         reply = self._engine.trigger(request.event)
         response.accepted, response.reason = reply.accepted, reply.reason
         return response
-
-
-def event_message(skillset: str, event: EngineEvent) -> Any:
-    """Return an engine's event as a message."""
-    message = Event(skillset=skillset, sequence=event.sequence)
-    message.header.stamp = Time(nanoseconds=event.stamp_ns).to_msg()
-    if isinstance(event, ExecutionEvent):
-        message.kind = Event.EXECUTION
-        message.skill, message.id, message.state = event.skill, event.id, event.state.value
-        message.result, message.message = event.result, event.message
-        message.inputs_json = json.dumps(to_plain(event.inputs))
-        if event.state.terminal:
-            message.outputs_json = json.dumps(to_plain(event.outputs))
-    else:
-        message.kind = Event.TRANSITION
-        message.resource, message.cause = event.resource, event.cause
-        message.from_state, message.to_state = event.from_state, event.to_state
-    return message

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Sequence
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from skillset_interfaces.msg import SkillExecution, SkillState, SkillStates
+from skillset_interfaces.msg import SkillState, SkillStates
 
 from skill_language.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
-from skill_runtime.core.records import ExecutionRecord, Records, SkillRecord
-from skill_runtime.plain import to_plain
+from skill_runtime.core.records import Records
+from skill_runtime.messages import skill_message
 from skill_runtime.ros2.names import LATCHED
 
 TOGETHER_S = 0.02
@@ -59,24 +58,3 @@ class SkillStatesPublisher:
             message = SkillStates(skillset=self._skillset, skills=list(self._messages.values()))
             message.header.stamp = self._node.get_clock().now().to_msg()
             self._publisher.publish(message)
-
-
-def skill_message(name: str, skill: SkillRecord) -> Any:
-    """Return what is known of a skill as a message."""
-    last = [] if skill.last is None else [execution_message(skill.last)]
-    return SkillState(name=name, open=[execution_message(record) for record in skill.open], last=last)
-
-
-def execution_message(record: ExecutionRecord) -> Any:
-    """Return an execution's record as a message."""
-    return SkillExecution(
-        id=record.id,
-        state=record.state.value,
-        result=record.result,
-        message=record.message,
-        inputs_json=json.dumps(to_plain(record.inputs)),
-        outputs_json=json.dumps(to_plain(record.outputs) if record.state.terminal else {}),
-        requested_ns=record.requested_ns,
-        started_ns=record.started_ns,
-        ended_ns=record.ended_ns,
-    )
