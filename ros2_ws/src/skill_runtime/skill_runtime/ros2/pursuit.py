@@ -18,7 +18,7 @@ from unique_identifier_msgs.msg import UUID
 
 from skill_runtime.core.execution import ExecutionState
 from skill_runtime.ros2.convert import fields_of, fill
-from skill_runtime.ros2.handle import SkillHandle
+from skill_runtime.handle import SkillHandle
 from skill_runtime.ros2.skill_manager import execution_id
 
 ACKNOWLEDGE_TIMEOUT_S = 5.0
