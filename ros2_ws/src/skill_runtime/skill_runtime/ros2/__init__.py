@@ -1,7 +1,7 @@
 """The skillset interface over rclpy: ``SkillsetNode`` (managers), ``SkillsetClient``, helpers for hooks and entry points."""
 
-from skill_runtime.ros2.client import SkillsetClient
 from skill_runtime.handle import SkillHandle
+from skill_runtime.ros2.client import SkillsetClient
 from skill_runtime.ros2.hooks_ros import RosHooks
 from skill_runtime.ros2.manager_node import SkillsetNode
 from skill_runtime.ros2.spin import run_skillset

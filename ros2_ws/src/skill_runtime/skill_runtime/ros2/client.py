@@ -13,8 +13,8 @@ from rclpy.node import Node
 from skillset_interfaces.msg import Event
 
 from skill_language.model import Skillset
-from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.handle import SkillHandle
+from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.names import EVENTS, LIVELINESS_LEASE_S
 from skill_runtime.ros2.presence import Presence
 from skill_runtime.ros2.pursuit import Pursuit

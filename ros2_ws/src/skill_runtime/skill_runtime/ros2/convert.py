@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
-import math
 import re
-from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
+from collections.abc import Mapping
 from typing import Any
 
 _FLOATS = {"double", "float"}
@@ -29,29 +26,6 @@ def fields_of(message: Any) -> dict[str, str]:
 def values_of(message: Any) -> dict[str, object]:
     """Return the values of a message's fields by name, not taken apart any further."""
     return {name: getattr(message, name) for name in fields_of(message)}
-
-
-def to_plain(value: Any) -> Any:
-    """Return what ``json`` can write: messages, dataclasses and namespaces become dicts, NaN and infinities null."""
-    if isinstance(value, bool | int | str) or value is None:
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if hasattr(value, "get_fields_and_field_types"):
-        return {name: to_plain(part) for name, part in values_of(value).items()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, SimpleNamespace):
-        return to_plain(vars(value))
-    if isinstance(value, Mapping):
-        return {str(name): to_plain(part) for name, part in value.items()}
-    if hasattr(value, "tolist"):
-        return to_plain(value.tolist())
-    if isinstance(value, bytes | bytearray):
-        return list(value)
-    if isinstance(value, Sequence | set):
-        return [to_plain(part) for part in value]
-    return str(value)
 
 
 def fill(message: Any, values: Mapping[str, object], place: str) -> Any:

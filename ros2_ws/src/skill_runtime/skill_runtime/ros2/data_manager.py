@@ -15,11 +15,10 @@ from skillset_interfaces.srv import GetData
 from skill_language.model import Data, Skillset
 from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.ros2.convert import message_class, to_plain
+from skill_runtime.plain import to_plain
+from skill_runtime.ros2.convert import message_class
 from skill_runtime.ros2.names import LATCHED
-
-STALE_PERIODS = 3.0
-"""A value is stale when it is older than so many of the periods that the model promises."""
+from skill_runtime.staleness import is_stale
 
 QUEUE = 10
 DataBindings = Mapping[str, tuple[str, str]]
@@ -68,7 +67,7 @@ class DataManager(Mapping[str, object]):
         return now
 
     def _stale(self, data: Data, received: _Received) -> bool:
-        return data.period_s is not None and self._now_ns() - received.stamp_ns > STALE_PERIODS * data.period_s * 1e9
+        return is_stale(self._now_ns() - received.stamp_ns, data.period_s)
 
     def _answer(self, request: Any, response: Any) -> Any:
         data, received = self._data.get(request.name), self._received.get(request.name)

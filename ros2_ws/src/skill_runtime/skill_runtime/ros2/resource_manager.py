@@ -14,7 +14,7 @@ from skillset_interfaces.srv import Transition
 
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from skill_runtime.ros2.convert import to_plain
+from skill_runtime.plain import to_plain
 from skill_runtime.ros2.names import ALIVE, EVENTS
 
 

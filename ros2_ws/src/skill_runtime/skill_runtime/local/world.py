@@ -1,0 +1,134 @@
+"""A world in one process: skillsets, their clients, and one virtual clock for all."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Mapping
+
+from skill_language.model import Skillset
+from skill_runtime.hooks import SkillHooks
+from skill_runtime.local.client import LocalClient, OnEvent
+from skill_runtime.local.clock import NANOSECONDS, Job, VirtualClock, WorldError
+from skill_runtime.local.managers import HooksFactory, LocalManagers
+from skill_runtime.local.values import Types
+
+
+class LocalWorld:
+    """Serves skillsets and hands out clients; deterministic: the same calls make the same run.
+
+    Args:
+        skillsets: served from the beginning.
+        make_hooks: makes the hooks of each of them, ``make_hooks(managers) -> {skill: hooks}``; ``managers`` has the clock
+            (``after``), ``transition`` and ``publish``.
+        start_s: mission clock at the beginning.
+        latency_s: how long each message between clients and managers takes.
+        types: what the models' types are in ROS, so that lists are told from points.
+    """
+
+    def __init__(
+        self,
+        skillsets: Iterable[Skillset] = (),
+        make_hooks: HooksFactory | None = None,
+        *,
+        start_s: float = 0.0,
+        latency_s: float = 0.0,
+        types: Types | None = None,
+    ) -> None:
+        self.clock = VirtualClock(start_s)
+        self.types: Types = types or {}
+        self.managers: dict[str, LocalManagers] = {}
+        self._latency_s = latency_s
+        self._clients: list[LocalClient] = []
+        self._ids = itertools.count(1)
+        self._running = False
+        for skillset in skillsets:
+            if make_hooks is None:
+                raise WorldError(f"skillset {skillset.name} has no hooks: give make_hooks")
+            self.serve(skillset, make_hooks)
+
+    @property
+    def now_s(self) -> float:
+        """Mission clock."""
+        return self.clock.now_s
+
+    @property
+    def errors(self) -> list[str]:
+        """All errors that no execution could carry."""
+        return [error for managers in self.managers.values() for error in managers.errors]
+
+    # --- who is there ------------------------------------------------------------------------------------------------
+
+    def serve(self, skillset: Skillset, make_hooks: HooksFactory | Mapping[str, SkillHooks]) -> LocalManagers:
+        """Start the managers of a skillset; clients of that name find them.
+
+        Raises:
+            WorldError: they are there already.
+            SkillRuntimeError: a skill has no hooks, or hooks have no skill.
+        """
+        before = self.managers.get(skillset.name)
+        if before is not None and before.alive:
+            raise WorldError(f"the managers of {skillset.name} are there already; kill them first")
+        managers = self.managers[skillset.name] = LocalManagers(self.clock, skillset, make_hooks)
+        for client in self._clients:
+            if client.skillset == skillset.name:
+                client.meet(managers)
+        return managers
+
+    def client(self, name: str) -> LocalClient:
+        """Make a client of a skillset, which may be served later."""
+        client = LocalClient(self, name)
+        self._clients.append(client)
+        managers = self.managers.get(name)
+        if managers is not None and managers.alive:
+            client.meet(managers)
+        return client
+
+    def kill(self, name: str) -> None:
+        """End managers without a word, like ``kill -9``; their clients learn that they have gone.
+
+        Raises:
+            WorldError: they are not there.
+        """
+        managers = self.managers.get(name)
+        if managers is None or not managers.alive:
+            raise WorldError(f"there are no managers of {name} to kill; there are {', '.join(self.managers) or 'none'}")
+        managers.vanish(f"the managers of {name} have gone")
+
+    def on_event(self, callback: OnEvent) -> None:
+        """Have ``callback(skillset, event)`` called for each event of the skillsets that are served now."""
+        for name in self.managers:
+            self.client(name).on_event(callback)
+
+    # --- time --------------------------------------------------------------------------------------------------------
+
+    def run_until(self, condition: Callable[[], bool], *, timeout_s: float) -> bool:
+        """Let time pass, from job to job, until a condition holds; False when it does not within ``timeout_s`` of mission clock.
+
+        Raises:
+            WorldError: called from inside a job, or jobs beget jobs without end.
+        """
+        if self._running:
+            raise WorldError("the world runs already: a job can't wait for it; use add_done_callback or on_change there")
+        until_ns = self.clock.now_ns + round(timeout_s * NANOSECONDS)
+        self._running = True
+        try:
+            while not condition():
+                if not self.clock.do_next(until_ns):
+                    return condition()
+        finally:
+            self._running = False
+        return True
+
+    def run_for(self, duration_s: float) -> None:
+        """Let time pass."""
+        self.run_until(lambda: False, timeout_s=duration_s)
+
+    # --- for clients -------------------------------------------------------------------------------------------------
+
+    def send(self, message: Job) -> None:
+        """Have a message arrive after the latency; messages never overtake each other."""
+        self.clock.after(self._latency_s, message)
+
+    def next_id(self) -> str:
+        """Return an execution's id, 12 hexadecimal digits as on ROS 2, but counted."""
+        return f"{next(self._ids):012x}"

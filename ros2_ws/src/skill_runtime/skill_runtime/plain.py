@@ -1,0 +1,32 @@
+"""Values of messages, inputs and outputs as what ``json`` can write."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+
+def to_plain(value: Any) -> Any:
+    """Return what ``json`` can write: messages, dataclasses and namespaces become dicts, NaN and infinities null."""
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: to_plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, SimpleNamespace):
+        return to_plain(vars(value))
+    if isinstance(value, Mapping):
+        return {str(name): to_plain(part) for name, part in value.items()}
+    if hasattr(value, "tolist"):
+        return to_plain(value.tolist())
+    if isinstance(value, bytes | bytearray):
+        return list(value)
+    if isinstance(value, Sequence | set):
+        return [to_plain(part) for part in value]
+    return str(value)
