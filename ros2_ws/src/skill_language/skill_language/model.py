@@ -8,7 +8,7 @@ it came from, so that whoever finds something wrong with it can show where.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 
@@ -42,6 +42,9 @@ class Comparison(Enum):
     LE = "<="
     GT = ">"
     GE = ">="
+
+
+_INCLUSIVE = {Comparison.GT: Comparison.GE, Comparison.LT: Comparison.LE}
 
 
 @dataclass(frozen=True)
@@ -257,6 +260,15 @@ class Invariant:
     effect: Effect = NO_EFFECT
     hold: Hold | None = None
     span: Span = field(default=NOWHERE, compare=False)
+
+    @property
+    def recovered(self) -> Expression:
+        """Return the condition of a value that had fallen and is good again: the recovery value itself is."""
+        condition, hold = self.condition, self.hold
+        if hold is None or hold.hysteresis is None or not isinstance(condition, DataIs):
+            return condition
+        comparison = _INCLUSIVE.get(condition.comparison, condition.comparison)
+        return replace(condition, comparison=comparison, value=hold.hysteresis, unit=hold.unit or condition.unit)
 
 
 @dataclass(frozen=True)

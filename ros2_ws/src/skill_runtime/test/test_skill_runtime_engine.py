@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 
 import pytest
 from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, TAKE, Bench, Recorder, flying_skill, flying_skillset
 
-from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Interrupt, Invariant, Not, Precondition, Result
+from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
 from skill_runtime.core import ExecutionState, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError, UnsupportedModelError
 
@@ -229,19 +230,20 @@ def test_an_unknown_output_fails():
 def test_preconditions_over_data_need_a_fresh_value():
     charged = Precondition("charged", Not(DataIs("battery", ("level",), Comparison.LE, 20, "%")))
     skill = flying_skill("takeoff", preconditions=(charged,))
-    data: dict = {}
-    bench = Bench(flying_skillset(skill, data=(Data("battery", "Battery"),)), data=data)
+    bench = Bench(flying_skillset(skill, data=(Data("battery", "Battery"),)))
     assert bench.run().message == "charged: battery has no fresh value"
-    data["battery"] = type("Battery", (), {"level": 0.2})
-    assert bench.run().result == "charged"
-    data["battery"] = type("Battery", (), {"level": 0.3})
+    bench.engine.update_data("battery", SimpleNamespace(level=0.2))
+    assert bench.run().message == "charged: battery.level is 0.2"
+    bench.engine.update_data("battery", SimpleNamespace(level=0.3))
     assert bench.run().state is S.RUNNING
 
 
 def test_models_that_cannot_be_executed_are_refused():
     over_data = DataIs("battery", (), Comparison.GT, 1.0)
     with pytest.raises(UnsupportedModelError, match="battery"):
-        Bench(flying_skillset(flying_skill("takeoff", invariants=(Invariant("charged", over_data),))))
+        Bench(flying_skillset(flying_skill("takeoff", results=(Result("DONE", postcondition=over_data),))))
+    with pytest.raises(UnsupportedModelError, match="battery"):
+        Bench(flying_skillset(events=(Event("low", over_data),)))
     with pytest.raises(SkillRuntimeError, match="no hooks for takeoff"):
         SkillsetEngine(flying_skillset(), lambda: 0, {}, lambda _: None)
     with pytest.raises(SkillRuntimeError, match="no skill other"):

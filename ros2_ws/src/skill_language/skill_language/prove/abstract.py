@@ -1,18 +1,20 @@
 """A skillset without data and without clocks, for the search: what data or time decide may go either way.
 
 A precondition becomes what it asks of resources, if some data fulfil the rest. An invariant over data, or one with
-patience (``hold``), becomes what it asks at once of resources alone; that data or time may break it all the same is a
-step of its own, a ``Breaker``. Every run of the skillset is a run of this one.
+patience (``hold``), becomes what it asks at once of resources alone, whatever the data; that data (also the lack of a fresh
+value) or time may break it all the same for an execution is a step of its own, a ``Breaker``. A progress deadline ends an
+execution as an interruption does, so it adds no step. Every run of the skillset is a run of this one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from skill_language.model import (
     TRUE,
     And,
+    Atom,
     Constant,
     DataIs,
     Event,
@@ -22,6 +24,7 @@ from skill_language.model import (
     Not,
     Or,
     Precondition,
+    ResourceIs,
     Skill,
     Skillset,
     atoms,
@@ -29,26 +32,26 @@ from skill_language.model import (
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
 
-FALSE = Constant(value=False)
-
 
 @dataclass(frozen=True)
 class Breaker:
-    """Data or time may break this invariant of a skill in every situation that fulfils ``when``."""
+    """Data or time may break this invariant of an execution in every situation that fulfils ``when``."""
 
     skill: str
     invariant: str
     when: Expression
-    broken: Skillset
-    """The skillset with the invariant false, for the step in which it breaks."""
 
 
 @dataclass(frozen=True)
 class Abstraction:
-    """The skillset over resources alone, and what else can happen in it."""
+    """The skillset over resources alone, and what else can happen in it.
+
+    ``births`` tell when an invariant over data may be false right after the start: ``when`` is asked before it.
+    """
 
     skillset: Skillset
-    breakers: tuple[Breaker, ...]
+    breakers: tuple[Breaker, ...] = ()
+    births: tuple[Breaker, ...] = ()
 
 
 def without_data(skillset: Skillset, deadline: Deadline) -> Abstraction:
@@ -56,48 +59,66 @@ def without_data(skillset: Skillset, deadline: Deadline) -> Abstraction:
     possibly = _Possibly(Solver(skillset, deadline))
     skills = tuple(_skill(skill, possibly) for skill in skillset.skills)
     events = tuple(_event(event, possibly) for event in skillset.events)
-    plain = replace(skillset, skills=skills, events=events)
-    breakers: list[Breaker] = []
-    for skill in skillset.skills:
-        for invariant in skill.invariants:
-            if _at_once(invariant):
-                continue
-            when = possibly(Not(invariant.condition))
-            breakers.append(Breaker(skill.name, invariant.name, when, _with_broken(plain, skill.name, invariant.name)))
-    return Abstraction(plain, tuple(breakers))
+    undecided = [(skill, one) for skill in skillset.skills for one in skill.invariants if not _at_once(one)]
+    breakers = [Breaker(skill.name, one.name, Not(whatever_the_data(one.condition, unknown=False))) for skill, one in undecided]
+    births = [Breaker(skill.name, one.name, _at_birth(skill, one, possibly)) for skill, one in undecided if not _patient(one)]
+    return Abstraction(replace(skillset, skills=skills, events=events), tuple(breakers), tuple(births))
+
+
+def _patient(invariant: Invariant) -> bool:
+    return invariant.hold is not None and invariant.hold.for_s > 0
+
+
+def _at_birth(skill: Skill, invariant: Invariant, possibly: _Possibly) -> Expression:
+    """Return when some data fulfil the preconditions and not the invariant after the start effect."""
+    after = {change.resource: change.target for change in skill.start.assignments}
+    ready = conjunction(precondition.condition for precondition in skill.preconditions)
+    return possibly(And((ready, Not(_replaced(invariant.recovered, lambda atom: _after(atom, after))))))
+
+
+def _after(atom: Atom, after: Mapping[str, str]) -> Expression:
+    if isinstance(atom, ResourceIs) and atom.resource in after:
+        return Constant((after[atom.resource] == atom.state) != atom.negated)
+    return atom
 
 
 def _at_once(invariant: Invariant) -> bool:
-    patient = invariant.hold is not None and invariant.hold.for_s > 0
-    return not patient and not any(isinstance(atom, DataIs) for atom in atoms(invariant.condition))
+    return not _patient(invariant) and not any(isinstance(atom, DataIs) for atom in atoms(invariant.condition))
 
 
 def _skill(skill: Skill, possibly: _Possibly) -> Skill:
     asked = conjunction(precondition.condition for precondition in skill.preconditions)
     preconditions = (Precondition("preconditions", possibly(asked)),) if skill.preconditions else ()
-    invariants = tuple(_invariant(invariant, possibly) for invariant in skill.invariants)
+    invariants = tuple(map(_invariant, skill.invariants))
     return replace(skill, preconditions=preconditions, invariants=invariants)
 
 
-def _invariant(invariant: Invariant, possibly: _Possibly) -> Invariant:
+def _invariant(invariant: Invariant) -> Invariant:
     if _at_once(invariant):
         return invariant
-    patient = invariant.hold is not None and invariant.hold.for_s > 0
-    return replace(invariant, condition=TRUE if patient else possibly(invariant.condition), hold=None)
+    condition = TRUE if _patient(invariant) else whatever_the_data(invariant.condition, unknown=True)
+    return replace(invariant, condition=condition, hold=None)
 
 
 def _event(event: Event, possibly: _Possibly) -> Event:
     return replace(event, guard=possibly(event.guard))
 
 
-def _with_broken(plain: Skillset, skill_name: str, invariant_name: str) -> Skillset:
-    def broken(invariant: Invariant) -> Invariant:
-        return replace(invariant, condition=FALSE) if invariant.name == invariant_name else invariant
-
-    def changed(skill: Skill) -> Skill:
-        return replace(skill, invariants=tuple(map(broken, skill.invariants))) if skill.name == skill_name else skill
-
-    return replace(plain, skills=tuple(map(changed, plain.skills)))
+def whatever_the_data(condition: Expression, *, unknown: bool) -> Expression:
+    """Return over resources alone when a condition is true with all data unknown, the unknown being counted as ``unknown``."""
+    match condition:
+        case DataIs():
+            return Constant(unknown)
+        case Not(operand=operand):
+            return Not(whatever_the_data(operand, unknown=not unknown))
+        case And(operands=operands):
+            return And(tuple(whatever_the_data(operand, unknown=unknown) for operand in operands))
+        case Or(operands=operands):
+            return Or(tuple(whatever_the_data(operand, unknown=unknown) for operand in operands))
+        case Implies(premise=premise, conclusion=conclusion):
+            return Implies(whatever_the_data(premise, unknown=not unknown), whatever_the_data(conclusion, unknown=unknown))
+        case _:
+            return condition
 
 
 def conjunction(conditions: Iterator[Expression]) -> Expression:
@@ -139,16 +160,19 @@ class _Possibly:
 
 
 def _with_data(condition: Expression, values: Mapping[DataIs, bool]) -> Expression:
+    return _replaced(condition, lambda atom: Constant(values[atom]) if isinstance(atom, DataIs) else atom)
+
+
+def _replaced(condition: Expression, new: Callable[[Atom], Expression]) -> Expression:
+    """Return a condition with something else in the place of each atom."""
     match condition:
-        case DataIs():
-            return Constant(values[condition])
         case Not(operand=operand):
-            return Not(_with_data(operand, values))
+            return Not(_replaced(operand, new))
         case And(operands=operands):
-            return And(tuple(_with_data(operand, values) for operand in operands))
+            return And(tuple(_replaced(operand, new) for operand in operands))
         case Or(operands=operands):
-            return Or(tuple(_with_data(operand, values) for operand in operands))
+            return Or(tuple(_replaced(operand, new) for operand in operands))
         case Implies(premise=premise, conclusion=conclusion):
-            return Implies(_with_data(premise, values), _with_data(conclusion, values))
+            return Implies(_replaced(premise, new), _replaced(conclusion, new))
         case _:
-            return condition
+            return new(condition)

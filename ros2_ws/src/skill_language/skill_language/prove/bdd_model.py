@@ -34,7 +34,7 @@ from skill_language.model import (
     Skillset,
     atoms,
 )
-from skill_language.prove.abstract import Abstraction
+from skill_language.prove.abstract import Abstraction, Breaker
 from skill_language.prove.solver import sources
 
 ENDED = "ended"
@@ -196,8 +196,9 @@ def encode(abstraction: Abstraction, copies: int) -> Encoded:
         _starts(model, skill)
         _ends(model, skill)
     for breaker in abstraction.breakers:
-        name = broken_name(breaker.skill, breaker.invariant)
-        model.steps.append(Update(model.runs(breaker.skill) & model.term(breaker.when), {name: True}, touches=breaker.skill))
+        _breaks(model, breaker)
+    for birth in abstraction.births:
+        model.faults["after start", birth.skill, birth.invariant] |= model.startable[birth.skill] & model.term(birth.when)
     model.steps = _distinct(model)
     model.clusters = [_cluster(model, skills) for skills in _entangled(model.skillset)]
     model.idle = model.all_of(cluster.idle for cluster in model.clusters)
@@ -325,6 +326,16 @@ def _ends(model: Encoded, skill: Skill) -> None:
         applies = model.applies(result.effect)
         _end_faults(model, ("result", skill.name, result.name), running, result.effect, applies, result.postcondition)
         model.steps += [update for update, _ in _ending(model, skill, running & applies, result.effect, applies)]
+
+
+def _breaks(model: Encoded, breaker: Breaker) -> None:
+    """Data or time end one execution by an invariant."""
+    skill = model.skillset.skill(breaker.skill)
+    effect = next(one.effect for one in skill.invariants if one.name == breaker.invariant)
+    guard, applies = model.runs(skill.name) & model.term(breaker.when), model.applies(effect)
+    if effect.assignments:
+        model.faults["effect", "invariant", skill.name, breaker.invariant] = guard & ~applies
+    model.steps += [update for update, _ in _ending(model, skill, guard, effect, applies)]
 
 
 def _end_faults(model: Encoded, key: tuple[str, ...], running: Any, effect: Effect, applies: Any, post: Expression) -> None:

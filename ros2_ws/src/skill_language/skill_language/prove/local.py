@@ -141,9 +141,9 @@ class _Checks:
         solver = self._solver
         after = {change.resource: change.target for change in skill.start.assignments}
         terms = [solver.term(p.condition) for p in skill.preconditions]
-        terms += [solver.applies(skill.start), solver.negation(solver.term(invariant.condition, after))]
+        terms += [solver.applies(skill.start), solver.negation(solver.term(invariant.recovered, after))]
         for earlier in skill.invariants[: skill.invariants.index(invariant)]:
-            terms.append(solver.term(earlier.condition, after))
+            terms.append(solver.term(earlier.recovered, after))
         model = solver.example(*terms)
         if model is None:
             return

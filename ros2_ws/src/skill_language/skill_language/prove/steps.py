@@ -14,13 +14,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from skill_language.model import Effect, Event, Skill, Skillset
+from skill_language.model import Effect, Skill, Skillset
 from skill_language.prove.abstract import Abstraction, Breaker
 from skill_runtime.core import semantics
 from skill_runtime.core.conditions import holds
+from skill_runtime.core.effects import effect_changes
 from skill_runtime.core.errors import EffectError
 from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.semantics import Change, Entered, Running, Situation, Step
+from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
 
 Key = tuple[str, ...]
 """What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""
@@ -55,6 +56,7 @@ class World:
         self.crowded: set[str] = set()
         """Skills of which more executions could have started than are looked at, and would have mattered."""
         self._breakers = abstraction.breakers
+        self._births = abstraction.births
         self._names = tuple(resource.name for resource in self.skillset.resources)
         self._ordered = {s.name for s in self.skillset.skills if any(i.effect.assignments for i in s.invariants)}
         self.idle = {s.name for s in self.skillset.skills if not any(effect.assignments for effect in _effects(s))}
@@ -96,14 +98,12 @@ class World:
 
     def _events(self, situation: Situation) -> Iterator[Move]:
         for event in self.skillset.events:
-            if holds(event.guard, situation.states, {}):
-                changes = _event_changes(self.skillset, event, situation)
-                if changes is None:
-                    yield Move("event", (event.name,), self.state(situation), faults=(("effect", "event", event.name),))
-                elif changes:
-                    states = {**situation.states, **{change.resource: change.target for change in changes}}
-                    step = semantics.settle(self.skillset, Step(Situation(states, situation.running), changes))
-                    yield self._move("event", (event.name,), step)
+            if not holds(event.guard, situation.states, {}):
+                continue
+            if semantics.event_refusal(self.skillset, situation, event.name):
+                yield Move("event", (event.name,), self.state(situation), faults=(("effect", "event", event.name),))
+            elif event.effect.assignments:
+                yield self._move("event", (event.name,), semantics.event(self.skillset, situation, event.name))
 
     def _starts(self, situation: Situation) -> Iterator[Move]:
         counts = [execution.skill for execution in situation.running]
@@ -118,7 +118,7 @@ class World:
                 self.crowded |= {skill.name} - self.idle
                 continue
             step = semantics.start(self.skillset, situation, Running("new", skill.name))
-            yield self._move("start", (skill.name,), step, self._broken_at_birth(skill, step))
+            yield self._move("start", (skill.name,), step, (*self._broken_at_birth(skill, step), *self._broken_by_data(skill, situation)))
 
     def _ends(self, situation: Situation) -> Iterator[Move]:
         seen: set[tuple[State, tuple[str, ...]]] = set()
@@ -140,10 +140,18 @@ class World:
         yield self._move("interrupt", (skill.name,), step, self._end_faults(skill, skill.interrupt.effect, key, situation, step, execution))
 
     def _breaks(self, situation: Situation) -> Iterator[Move]:
-        running = {execution.skill for execution in situation.running}
+        seen: set[tuple[State, str, str]] = set()
         for breaker in self._breakers:
-            if breaker.skill in running and holds(breaker.when, situation.states, {}):
-                yield self._move("data", (breaker.skill, breaker.invariant), _broken(breaker, situation))
+            for execution in situation.running:
+                if execution.skill != breaker.skill or not holds(breaker.when, situation.states, {}):
+                    continue
+                move = self._move("data", (breaker.skill, breaker.invariant), self._lost(situation, execution, breaker))
+                if (move.target, *move.subject) not in seen:
+                    seen.add((move.target, breaker.skill, breaker.invariant))
+                    yield move
+
+    def _lost(self, situation: Situation, execution: Running, breaker: Breaker) -> Step:
+        return semantics.lose(self.skillset, situation, execution, breaker.invariant)
 
     # --- faults ---------------------------------------------------------------------------------------------------
 
@@ -153,7 +161,7 @@ class World:
 
     def _fails(self, skill: Skill, effect: Effect, situation: Situation) -> bool:
         try:
-            semantics.effect_changes(self.skillset, Running("", skill.name), effect, "", situation.states)
+            effect_changes(self.skillset, Running("", skill.name), effect, "", situation.states)
         except EffectError:
             return True
         return False
@@ -184,9 +192,10 @@ class World:
                 return (("after start", skill.name, entered.result),)
         return ()
 
-
-def _broken(breaker: Breaker, situation: Situation) -> Step:
-    return semantics.settle(breaker.broken, Step(situation))
+    def _broken_by_data(self, skill: Skill, situation: Situation) -> tuple[Key, ...]:
+        """Find invariants that data may make false right after the start."""
+        births = [birth for birth in self._births if birth.skill == skill.name and holds(birth.when, situation.states, {})]
+        return tuple(("after start", skill.name, birth.invariant) for birth in births)
 
 
 def _effects(skill: Skill) -> Iterator[Effect]:
@@ -196,14 +205,3 @@ def _effects(skill: Skill) -> Iterator[Effect]:
         yield invariant.effect
     for result in skill.results:
         yield result.effect
-
-
-def _event_changes(skillset: Skillset, event: Event, situation: Situation) -> tuple[Change, ...] | None:
-    """Return what an event changes, or None when a change is no arrow; an event may take any arrow, also an extern one."""
-    changes: list[Change] = []
-    for assignment in event.effect.assignments:
-        resource, source = skillset.resource(assignment.resource), situation.states[assignment.resource]
-        if not any(resource.has_arrow(source, assignment.target, extern=extern) for extern in (True, False)):
-            return None
-        changes.append(Change(resource.name, source, assignment.target, f"event {event.name}"))
-    return tuple(changes)

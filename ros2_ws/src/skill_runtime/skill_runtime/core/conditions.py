@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
@@ -12,6 +13,7 @@ from skill_runtime.core.errors import DataMissingError, UnsupportedModelError
 
 States = Mapping[str, str]
 Data = Mapping[str, object]
+NO_DATA: Data = {}
 
 _COMPARE: dict[Comparison, Callable[[Any, Any], Any]] = {
     Comparison.EQ: operator.eq,
@@ -23,12 +25,8 @@ _COMPARE: dict[Comparison, Callable[[Any, Any], Any]] = {
 }
 
 
-def holds(condition: Expression, states: States, data: Data) -> bool:
-    """Tell whether a condition is true.
-
-    Raises:
-        DataMissingError: it is over a data without a fresh value (a negation of the unknown is unknown, too).
-    """
+def judge(condition: Expression, states: States, data: Data) -> bool | None:
+    """Tell whether a condition is true, or None where that hangs on data without a fresh value (Kleene's logic)."""
     match condition:
         case ResourceIs(resource=resource, state=state, negated=negated):
             return (states[resource] == state) != negated
@@ -37,27 +35,74 @@ def holds(condition: Expression, states: States, data: Data) -> bool:
         case Constant(value=value):
             return value
         case Not(operand=operand):
-            return not holds(operand, states, data)
+            return _negated(judge(operand, states, data))
         case And(operands=operands):
-            return all(holds(operand, states, data) for operand in operands)
+            return _first(False, operands, states, data)
         case Or(operands=operands):
-            return any(holds(operand, states, data) for operand in operands)
+            return _first(True, operands, states, data)
         case SkillRuns(skill=skill):
             raise UnsupportedModelError(f"{skill} running: that can be asked in properties only")
         case Implies(premise=premise, conclusion=conclusion):
-            return not holds(premise, states, data) or holds(conclusion, states, data)
+            return _first(True, (Not(premise), conclusion), states, data)
 
 
-def _data_holds(atom: DataIs, data: Data) -> bool:
-    if atom.data not in data:
-        raise DataMissingError(f"{atom.data} has no fresh value")
-    value = data[atom.data]
-    for name in atom.path:
-        value = getattr(value, name)
+def holds(condition: Expression, states: States, data: Data) -> bool:
+    """Tell whether a condition is true.
+
+    Raises:
+        DataMissingError: that hangs on data without a fresh value (a negation of the unknown is unknown, too).
+    """
+    answer = judge(condition, states, data)
+    if answer is None:
+        unknown = next(atom for atom in data_of(condition) if _data_holds(atom, data) is None)
+        raise DataMissingError(_why_unknown(unknown, data))
+    return answer
+
+
+def _negated(answer: bool | None) -> bool | None:  # noqa: FBT001 - a truth value is what it is about
+    return None if answer is None else not answer
+
+
+def _first(decisive: bool, operands: Sequence[Expression], states: States, data: Data) -> bool | None:  # noqa: FBT001 - as above
+    """Return ``decisive`` if an operand is that, None if one may be, else its contrary."""
+    answer: bool | None = not decisive
+    for operand in operands:
+        one = judge(operand, states, data)
+        if one is decisive:
+            return decisive
+        if one is None:
+            answer = None
+    return answer
+
+
+def _data_holds(atom: DataIs, data: Data) -> bool | None:
+    value = value_of(atom, data)
+    if value is None:
+        return None
     wanted = atom.value
     if isinstance(wanted, float | int) and not isinstance(wanted, bool):
         wanted = wanted * in_si(atom)
-    return bool(_COMPARE[atom.comparison](value, wanted))
+    try:
+        return bool(_COMPARE[atom.comparison](value, wanted))
+    except TypeError:
+        return None
+
+
+def value_of(atom: DataIs, data: Data) -> object | None:
+    """Return the value that an atom is about; None when there is none, or it is not a number where one was measured (NaN)."""
+    value = data.get(atom.data)
+    for name in atom.path:
+        value = getattr(value, name, None)
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _why_unknown(atom: DataIs, data: Data) -> str:
+    name = ".".join((atom.data, *atom.path))
+    if atom.data not in data:
+        return f"{atom.data} has no fresh value"
+    if value_of(atom, data) is None:
+        return f"{name} is not in what was received, or not a number"
+    return f"{name} is {value_of(atom, data)!r}, which can't be compared with {atom.value!r}"
 
 
 def in_si(atom: DataIs) -> float:
@@ -71,10 +116,14 @@ def in_si(atom: DataIs) -> float:
     return UNIT_IN_SI[atom.unit]
 
 
-def present(condition: Expression, states: States) -> str:
-    """Say in which states the resources of a condition are: ``axes_authority is USED, flight_status is IN_AIR``."""
+def present(condition: Expression, states: States, data: Data) -> str:
+    """Say how what a condition asks is: ``axes_authority is USED, battery.level is 0.15, fps has no fresh value``."""
     resources = dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs))
-    return ", ".join(f"{resource} is {states[resource]}" for resource in resources)
+    words = [f"{resource} is {states[resource]}" for resource in resources]
+    for atom in data_of(condition):
+        known = _data_holds(atom, data) is not None
+        words.append(f"{'.'.join((atom.data, *atom.path))} is {value_of(atom, data)}" if known else _why_unknown(atom, data))
+    return ", ".join(dict.fromkeys(words))
 
 
 def data_of(condition: Expression) -> list[DataIs]:

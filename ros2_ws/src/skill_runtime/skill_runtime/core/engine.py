@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 from skill_language.model import Skillset
 from skill_runtime.core import semantics
-from skill_runtime.core.conditions import Data
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import Listener
 from skill_runtime.core.execution import Execution, ExecutionState
@@ -29,7 +28,10 @@ Job = Callable[[], None]
 
 @dataclass(frozen=True)
 class TransitionReply:
-    """Answer to an extern transition; ``state`` is the resource's state afterwards, empty when there is no such resource."""
+    """Answer to an extern transition or an event.
+
+    ``state`` is the resource's state afterwards, empty for an event and when there is no such resource.
+    """
 
     accepted: bool
     reason: str
@@ -54,7 +56,6 @@ class SkillsetEngine:
         clock_ns: the mission clock, nanoseconds.
         hooks: one a skill.
         listener: gets the events of each step.
-        data: fresh values by name, for preconditions; a name that is missing has no fresh value.
         defer: runs a stop hook that a step of somebody else has made necessary; by default in the thread of that step.
         on_error: gets one text for each error that no execution can carry.
 
@@ -70,7 +71,6 @@ class SkillsetEngine:
         hooks: Mapping[str, SkillHooks],
         listener: Listener,
         *,
-        data: Data | None = None,
         defer: Callable[[Job], None] = run_at_once,
         on_error: Callable[[str], None] = log_error,
     ) -> None:
@@ -78,7 +78,7 @@ class SkillsetEngine:
         _check_hooks(skillset, hooks)
         self.skillset = skillset
         self._hooks = dict(hooks)
-        self._data: Data = {} if data is None else data
+        self._data_names = tuple(data.name for data in skillset.data)
         self._defer = defer
         self._on_error = on_error
         self._lock = threading.Lock()
@@ -107,6 +107,7 @@ class SkillsetEngine:
 
     def transition(self, resource: str, to: str) -> TransitionReply:
         """Take an extern transition, or say why not."""
+        self.tick()
         with self._lock:
             reason = semantics.extern_refusal(self.skillset, self._ledger.situation, resource, to)
             stops = [] if reason else self._ledger.commit(semantics.transition(self.skillset, self._ledger.situation, resource, to))
@@ -114,11 +115,52 @@ class SkillsetEngine:
         self._after_step(stops)
         return reply
 
+    def trigger(self, event: str) -> TransitionReply:
+        """Take an event of the model, or say why not: its guard is false, or its effect is no transition now."""
+        self.tick()
+        with self._lock:
+            reason = semantics.event_refusal(self.skillset, self._ledger.situation, event)
+            stops = [] if reason else self._ledger.commit(semantics.event(self.skillset, self._ledger.situation, event))
+        self._after_step(stops)
+        return TransitionReply(not reason, reason, "")
+
+    def update_data(self, name: str, value: object | None) -> None:
+        """Take a fresh value of a data, or None: there is no fresh one any more. What that breaks is ended in the same step.
+
+        Raises:
+            SkillRuntimeError: there is no such data.
+        """
+        if name not in self._data_names:
+            raise SkillRuntimeError(f"skillset {self.skillset.name} has no data {name}; it has {', '.join(self._data_names) or 'none'}")
+        self.tick()
+        with self._lock:
+            stops = self._ledger.commit(semantics.receive(self.skillset, self._ledger.situation, name, value))
+        self._after_step(stops)
+
+    @property
+    def due_ns(self) -> int | None:
+        """Return when, on the mission clock, time alone may next change something: then ``tick`` is to be called."""
+        with self._lock:
+            return self._ledger.due_ns
+
+    def tick(self) -> None:
+        """Take the step of what has become due: a duration that has run out, a progress deadline.
+
+        Every other step begins with it, so that a late call makes the step late, not another one.
+        """
+        with self._lock:
+            due_ns = self._ledger.due_ns
+            if due_ns is None or (situation := self._ledger.situation).now_ns < due_ns:
+                return
+            stops = self._ledger.commit(semantics.elapse(self.skillset, situation))
+        self._after_step(stops)
+
     def interrupt(self, execution_id: str) -> bool:
         """Interrupt an execution: ``on_interrupt``, then the step. False when it has ended or is not known.
 
         While ``validate`` runs, it ends at once and never starts; while ``on_dispatch`` runs, the rest follows after it.
         """
+        self.tick()
         with self._lock:
             entry = self._ledger.entries.get(execution_id)
             if entry is None or entry.execution.done:
@@ -129,6 +171,7 @@ class SkillsetEngine:
                 self._ledger.end_request(entry, ExecutionState.INTERRUPTED, "interrupted before it started")
             elif not entry.stop_hook:
                 entry.stop_hook = "on_interrupt"
+                self._ledger.interrupting(entry)
         self._outbox.deliver()
         if now:
             self._stop(entry)
@@ -137,6 +180,7 @@ class SkillsetEngine:
     def terminate(self, execution_id: str, result: str, message: str = "", outputs: Mapping[str, object] | None = None) -> bool:
         """End a running execution with a result of the model; False when it is not running (any more)."""
         values = dict(outputs or {})
+        self.tick()
         with self._lock:
             entry = self._ledger.running(execution_id)
             if entry is None:
@@ -153,6 +197,7 @@ class SkillsetEngine:
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED; False when it has ended or is not known."""
+        self.tick()
         with self._lock:
             entry = self._ledger.entries.get(execution_id)
             if entry is None or entry.execution.done:
@@ -179,7 +224,11 @@ class SkillsetEngine:
             self.fail(execution_id, unknown)
 
     def progress(self, execution_id: str) -> float | None:
-        """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running."""
+        """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running.
+
+        An answer that differs from the one before is progress, which puts off the progress deadline.
+        """
+        self.tick()
         with self._lock:
             entry = self._ledger.running(execution_id)
             if entry is None:
@@ -192,7 +241,10 @@ class SkillsetEngine:
         except Exception as error:  # noqa: BLE001 - whatever a hook raises ends its execution only
             self._hook_raised(entry, "progress", error)
             return None
-        execution.progress = value
+        with self._lock:
+            if value != execution.progress and not execution.done and not entry.stop_hook:
+                self._ledger.progressed(entry)
+            execution.progress = value
         return None if execution.done else value
 
     def fail_all(self, message: str) -> None:
@@ -254,12 +306,12 @@ class SkillsetEngine:
 
     def _start(self, entry: Entry) -> None:
         """Take the start step and call ``on_dispatch``; then what was asked for meanwhile."""
-        data = dict(self._data)
+        self.tick()
         with self._lock:
             if entry.execution.done:
                 return
             entry.dispatching = True
-            stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, entry.key, data))
+            stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, entry.key))
             started = entry.execution.state is ExecutionState.RUNNING
             if not started:
                 # Also when its own invariant broke in the very step: nothing was dispatched, nothing is to be stopped.

@@ -25,7 +25,7 @@ class ExecutionEvent:
 
 @dataclass(frozen=True)
 class TransitionEvent:
-    """A resource changed; ``cause`` is ``extern`` or ``<skill> <id> <effect>``."""
+    """A resource changed; ``cause`` is ``extern``, ``event <name>`` or ``<skill> <id> <effect>``."""
 
     sequence: int
     stamp_ns: int

@@ -6,13 +6,14 @@ Not safe for threads: the engine calls it with its lock held.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from skill_language.model import Skillset
 from skill_runtime.core import semantics
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from skill_runtime.core.execution import Execution, ExecutionState
-from skill_runtime.core.semantics import Change, Entered, Running, Step
+from skill_runtime.core.patience import due_ns
+from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,30 @@ class Ledger:
     def __init__(self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None]) -> None:
         self._clock_ns = clock_ns
         self._publish = publish
-        self.situation = semantics.initial(skillset)
+        self._skillset = skillset
+        self._situation = semantics.initial(skillset)
         born_ns = clock_ns()
-        self.resources = {name: ResourceStatus(state, "", born_ns) for name, state in self.situation.states.items()}
+        self.resources = {name: ResourceStatus(state, "", born_ns) for name, state in self._situation.states.items()}
         self.entries: dict[str, Entry] = {}
         self.sequence = 0
+
+    @property
+    def situation(self) -> Situation:
+        """Return the situation now."""
+        return replace(self._situation, now_ns=self._clock_ns())
+
+    @property
+    def due_ns(self) -> int | None:
+        """Return when time alone next changes something."""
+        return due_ns(self._skillset, self._situation)
+
+    def progressed(self, entry: Entry) -> None:
+        """Record that a running execution has made progress now."""
+        self._situation = semantics.progressed(self._skillset, self.situation, entry.key)
+
+    def interrupting(self, entry: Entry) -> None:
+        """Record that an execution is being interrupted: no progress is expected any more."""
+        self._situation = semantics.interrupting(self._situation, entry.key)
 
     def add(self, execution: Execution) -> Entry:
         """Record a request."""
@@ -61,7 +81,7 @@ class Ledger:
 
     def commit(self, step: Step, *, by_itself: Entry | None = None) -> list[Entry]:
         """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
-        self.situation = step.situation
+        self._situation = step.situation
         events: list[EngineEvent] = []
         ended: list[Entry] = []
         for happening in step.happenings:

@@ -8,93 +8,72 @@ request's effect, then the state that it puts its execution in; then, for each b
 violation's effect and the violated state. Executions break in the order in which they were found broken; those found
 after the same change in the order of their start, each by the first false invariant of the model. An execution once found
 broken ends so, even if the effect of another would have mended its invariant: it was false.
+
+What resources alone make false comes first. When nothing of that is left, what data and time have broken (see ``patience``)
+ends one execution after another, in the order of their start, each with all that its end breaks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
-from skill_language.model import Effect, Invariant, Skill, Skillset
-from skill_runtime.core.conditions import Data, States, data_of, holds, in_si, present
+from skill_language.model import Event, Expression, Skill, Skillset
+from skill_runtime.core import patience
+from skill_runtime.core.conditions import Data, States, data_of, holds, in_si, judge, present
+from skill_runtime.core.effects import after, effect_changes, event_changes, given_back, without
 from skill_runtime.core.errors import DataMissingError, EffectError, UnsupportedModelError
 from skill_runtime.core.execution import ExecutionState
+from skill_runtime.core.settling import settle, violate
+from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
+
+__all__ = [
+    "EXTERN",
+    "Change",
+    "Entered",
+    "Running",
+    "Situation",
+    "Step",
+    "check_supported",
+    "elapse",
+    "event",
+    "event_refusal",
+    "extern_refusal",
+    "fail",
+    "initial",
+    "interrupt",
+    "interrupting",
+    "lose",
+    "progressed",
+    "receive",
+    "start",
+    "terminate",
+    "transition",
+    "unmet_precondition",
+]
 
 EXTERN = "extern"
-NO_DATA: Data = {}
-
-
-@dataclass(frozen=True)
-class Running:
-    """A running execution."""
-
-    id: str
-    skill: str
-
-
-@dataclass(frozen=True)
-class Situation:
-    """All that the next step depends on; ``running`` is in the order of the start."""
-
-    states: States
-    running: tuple[Running, ...] = ()
-
-
-@dataclass(frozen=True)
-class Change:
-    """A resource went from one state to another."""
-
-    resource: str
-    source: str
-    target: str
-    cause: str
-
-
-@dataclass(frozen=True)
-class Entered:
-    """An execution entered a state; ``result`` as in ``Execution``."""
-
-    execution: Running
-    state: ExecutionState
-    result: str = ""
-    message: str = ""
-
-
-@dataclass(frozen=True)
-class Step:
-    """The situation after a step and what happened in it."""
-
-    situation: Situation
-    happenings: tuple[Change | Entered, ...] = ()
-
-    def then(self, *happenings: Change | Entered, situation: Situation) -> Step:
-        """Continue within the same step."""
-        return Step(situation, self.happenings + happenings)
 
 
 def check_supported(skillset: Skillset) -> None:
-    """Refuse what can't be executed: invariants and postconditions over data, durations, deadlines, unknown units.
+    """Refuse what the language has not: data in guards and postconditions, and units that are not known.
 
     Raises:
         UnsupportedModelError: names the place.
     """
     for skill in skillset.skills:
-        for precondition in skill.preconditions:
-            for atom in data_of(precondition.condition):
-                in_si(atom)
-        for invariant in skill.invariants:
-            if invariant.hold is not None:
-                raise UnsupportedModelError(
-                    f"{invariant.span}: {skill.name}, invariant {invariant.name}: durations are proved, not yet executed"
-                )
-        if skill.progress is not None and skill.progress.deadline_s is not None:
-            raise UnsupportedModelError(f"{skill.progress.span}: {skill.name}: a progress deadline is proved, not yet executed")
-        pure = [(f"invariant {i.name}", i.condition) for i in skill.invariants]
-        pure += [(f"postcondition of {r.name}", r.postcondition) for r in skill.results]
-        pure += [("postcondition of the interruption", skill.interrupt.postcondition)]
-        for place, condition in pure:
+        for condition in (*(p.condition for p in skill.preconditions), *(i.condition for i in skill.invariants)):
             for atom in data_of(condition):
-                raise UnsupportedModelError(f"{atom.span}: {skill.name}, {place}: data {atom.data} can be tested in preconditions only")
+                in_si(atom)
+        pure = [(f"{skill.name}, postcondition of {r.name}", r.postcondition) for r in skill.results]
+        _without_data([*pure, (f"{skill.name}, postcondition of the interruption", skill.interrupt.postcondition)])
+    _without_data([(f"guard of event {event.name}", event.guard) for event in skillset.events])
+
+
+def _without_data(conditions: Sequence[tuple[str, Expression]]) -> None:
+    for place, condition in conditions:
+        for atom in data_of(condition):
+            raise UnsupportedModelError(f"{atom.span}: {place}: data {atom.data} can be tested in preconditions and invariants only")
 
 
 def initial(skillset: Skillset) -> Situation:
@@ -105,18 +84,18 @@ def initial(skillset: Skillset) -> Situation:
 # --- steps -----------------------------------------------------------------------------------------------------------
 
 
-def start(skillset: Skillset, situation: Situation, execution: Running, data: Data = NO_DATA) -> Step:
+def start(skillset: Skillset, situation: Situation, execution: Running) -> Step:
     """Test preconditions and apply the start effect as one: the execution is RUNNING, or NOT_READY and nothing changed."""
     skill = skillset.skill(execution.skill)
-    refusal = unmet_precondition(skill, situation.states, data)
+    refusal = unmet_precondition(skill, situation.states, situation.data)
     if refusal is not None:
         return Step(situation, (Entered(execution, ExecutionState.NOT_READY, *refusal),))
     try:
         changes = effect_changes(skillset, execution, skill.start, "start", situation.states)
     except EffectError as error:
         return Step(situation, (Entered(execution, ExecutionState.NOT_READY, "", str(error)),))
-    begun = Situation(_after(situation.states, changes), (*situation.running, execution))
-    return settle(skillset, Step(begun, (*changes, Entered(execution, ExecutionState.RUNNING))))
+    begun = replace(situation, states=after(situation.states, changes), running=(*situation.running, execution))
+    return settle(skillset, Step(progressed(skillset, begun, execution), (*changes, Entered(execution, ExecutionState.RUNNING))))
 
 
 def extern_refusal(skillset: Skillset, situation: Situation, resource: str, target: str) -> str:
@@ -136,7 +115,51 @@ def extern_refusal(skillset: Skillset, situation: Situation, resource: str, targ
 def transition(skillset: Skillset, situation: Situation, resource: str, target: str) -> Step:
     """Take an extern transition that ``extern_refusal`` does not refuse."""
     change = Change(resource, situation.states[resource], target, EXTERN)
-    return settle(skillset, Step(replace(situation, states=_after(situation.states, (change,))), (change,)))
+    return settle(skillset, Step(replace(situation, states=after(situation.states, (change,))), (change,)))
+
+
+def event_refusal(skillset: Skillset, situation: Situation, name: str) -> str:
+    """Return why this event of the model can't be taken now, or "" when it can."""
+    found = _event(skillset, name)
+    if found is None:
+        return f"skillset {skillset.name} has no event {name}; it has {', '.join(one.name for one in skillset.events) or 'none'}"
+    if not holds(found.guard, situation.states, situation.data):
+        return f"event {name}: its guard is false: {present(found.guard, situation.states, situation.data) or 'it is never true'}"
+    try:
+        event_changes(skillset, found, situation.states)
+    except EffectError as error:
+        return str(error)
+    return ""
+
+
+def event(skillset: Skillset, situation: Situation, name: str) -> Step:
+    """Take an event that ``event_refusal`` does not refuse."""
+    found = _event(skillset, name)
+    changes = event_changes(skillset, found, situation.states) if found is not None else ()
+    return settle(skillset, Step(replace(situation, states=after(situation.states, changes)), changes))
+
+
+def receive(skillset: Skillset, situation: Situation, data: str, value: object | None) -> Step:
+    """Take a fresh value of a data, or (None) the loss of it."""
+    return settle(skillset, Step(patience.with_value(skillset, situation, data, value)))
+
+
+def elapse(skillset: Skillset, situation: Situation) -> Step:
+    """Let the situation's time have come: what it has broken is ended."""
+    return settle(skillset, Step(situation))
+
+
+def progressed(skillset: Skillset, situation: Situation, execution: Running) -> Situation:
+    """Return the situation after an execution has made progress."""
+    progress = skillset.skill(execution.skill).progress
+    if progress is None or progress.deadline_s is None:
+        return situation
+    return replace(situation, progressed={**situation.progressed, execution.id: situation.now_ns})
+
+
+def interrupting(situation: Situation, execution: Running) -> Situation:
+    """Return the situation after an interruption was asked for: no progress is expected any more."""
+    return replace(situation, progressed={name: at_ns for name, at_ns in situation.progressed.items() if name != execution.id})
 
 
 def terminate(skillset: Skillset, situation: Situation, execution: Running, result_name: str, message: str = "") -> Step:
@@ -151,13 +174,10 @@ def terminate(skillset: Skillset, situation: Situation, execution: Running, resu
         changes = effect_changes(skillset, execution, result.effect, result.name, situation.states)
     except (KeyError, EffectError) as error:
         return fail(skillset, situation, execution, str(error.args[0]))
-    states = _after(situation.states, changes)
-    if holds(result.postcondition, states, NO_DATA):
-        entered = Entered(execution, ExecutionState.TERMINATED, result.name, message)
-    else:
-        reason = f"postcondition of {skill.name} {result.name} is false: {present(result.postcondition, states)}"
-        entered = Entered(execution, ExecutionState.FAILED, "", reason)
-    return settle(skillset, Step(_without(situation, execution, states), (*changes, entered)))
+    states = after(situation.states, changes)
+    ended = Entered(execution, ExecutionState.TERMINATED, result.name, message)
+    entered = _if_fulfilled(ended, result.postcondition, f"{skill.name} {result.name}", replace(situation, states=states))
+    return settle(skillset, Step(without(situation, execution, states), (*changes, entered)))
 
 
 def interrupt(skillset: Skillset, situation: Situation, execution: Running, message: str = "") -> Step:
@@ -167,13 +187,11 @@ def interrupt(skillset: Skillset, situation: Situation, execution: Running, mess
         changes = effect_changes(skillset, execution, skill.interrupt.effect, "interrupt", situation.states)
     except EffectError as error:
         return fail(skillset, situation, execution, str(error))
-    states = _after(situation.states, changes)
-    if holds(skill.interrupt.postcondition, states, NO_DATA):
-        entered = Entered(execution, ExecutionState.INTERRUPTED, "", message)
-    else:
-        reason = f"postcondition of the interruption of {skill.name} is false: {present(skill.interrupt.postcondition, states)}"
-        entered = Entered(execution, ExecutionState.FAILED, "", reason)
-    return settle(skillset, Step(_without(situation, execution, states), (*changes, entered)))
+    states = after(situation.states, changes)
+    ended = Entered(execution, ExecutionState.INTERRUPTED, "", message)
+    where = f"the interruption of {skill.name}"
+    entered = _if_fulfilled(ended, skill.interrupt.postcondition, where, replace(situation, states=states))
+    return settle(skillset, Step(without(situation, execution, states), (*changes, entered)))
 
 
 def fail(skillset: Skillset, situation: Situation, execution: Running, message: str) -> Step:
@@ -182,52 +200,15 @@ def fail(skillset: Skillset, situation: Situation, execution: Running, message: 
     Its interrupt effect is applied where it is a transition now, so that what the skill holds does not stay taken;
     otherwise nothing changes.
     """
-    skill = skillset.skill(execution.skill)
-    try:
-        changes = effect_changes(skillset, execution, skill.interrupt.effect, "failure", situation.states)
-    except EffectError:
-        changes = ()
-    states = _after(situation.states, changes)
+    changes = given_back(skillset, execution, situation.states)
     entered = Entered(execution, ExecutionState.FAILED, "", message)
-    return settle(skillset, Step(_without(situation, execution, states), (*changes, entered)))
+    return settle(skillset, Step(without(situation, execution, after(situation.states, changes)), (*changes, entered)))
 
 
-def settle(skillset: Skillset, step: Step) -> Step:
-    """End every running execution whose invariant is false, with its effect, until none is left."""
-    found: dict[Running, Entered] = {}
-    while True:
-        for execution in step.situation.running:
-            if execution not in found:
-                found.update(_broken(skillset, step, execution))
-        if not found:
-            return step
-        execution = next(iter(found))
-        step = _violate(skillset, step, found.pop(execution))
-
-
-def _broken(skillset: Skillset, step: Step, execution: Running) -> dict[Running, Entered]:
-    """Return how a running execution ends by its first false invariant, or nothing when all are true."""
-    states = step.situation.states
-    invariant = false_invariant(skillset.skill(execution.skill), states)
-    if invariant is None:
-        return {}
-    message = f"{invariant.name}: {present(invariant.condition, states)}"
-    causes = [happening for happening in step.happenings if isinstance(happening, Change)]
-    if causes:
-        last = causes[-1]
-        message += f", after {last.resource} {last.source} -> {last.target} ({last.cause})"
-    return {execution: Entered(execution, ExecutionState.RESOURCE_INVARIANT_VIOLATED, invariant.name, message)}
-
-
-def _violate(skillset: Skillset, step: Step, entered: Entered) -> Step:
-    """End one execution by its broken invariant; an effect that is no transition is told in the message and not applied."""
-    states, execution = step.situation.states, entered.execution
-    invariant = next(i for i in skillset.skill(execution.skill).invariants if i.name == entered.result)
-    try:
-        changes = effect_changes(skillset, execution, invariant.effect, invariant.name, states)
-    except EffectError as error:
-        changes, entered = (), replace(entered, message=f"{entered.message}; {error}")
-    return step.then(*changes, entered, situation=_without(step.situation, execution, _after(states, changes)))
+def lose(skillset: Skillset, situation: Situation, execution: Running, invariant_name: str) -> Step:
+    """Have data or time break an invariant of one running execution: what ``receive`` and ``elapse`` do, value and time aside."""
+    invariant = next(one for one in skillset.skill(execution.skill).invariants if one.name == invariant_name)
+    return settle(skillset, violate(skillset, Step(situation), execution, invariant, invariant_name))
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
@@ -239,45 +220,20 @@ def unmet_precondition(skill: Skill, states: States, data: Data) -> tuple[str, s
         try:
             if holds(precondition.condition, states, data):
                 continue
-            reason = present(precondition.condition, states) or "the data does not meet it"
+            reason = present(precondition.condition, states, data) or "it is never true"
         except DataMissingError as error:
             reason = str(error)
         return precondition.name, f"{precondition.name}: {reason}"
     return None
 
 
-def false_invariant(skill: Skill, states: States) -> Invariant | None:
-    """Return the first invariant of the skill that is false, in the model's order."""
-    return next((invariant for invariant in skill.invariants if not holds(invariant.condition, states, NO_DATA)), None)
+def _if_fulfilled(ended: Entered, postcondition: Expression, where: str, after_effect: Situation) -> Entered:
+    """Return the end as it is, or as FAILED where its postcondition is false after the effect."""
+    states, data = after_effect.states, after_effect.data
+    if judge(postcondition, states, data) is True:
+        return ended
+    return Entered(ended.execution, ExecutionState.FAILED, "", f"postcondition of {where} is false: {present(postcondition, states, data)}")
 
 
-def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place: str, states: States) -> tuple[Change, ...]:
-    """Return what an effect changes from these states; ``place`` names it where the model does not.
-
-    Every assignment must be an arrow for skills from the resource's present state, also one to the state that it is in:
-    who releases what nobody holds has lost count.
-
-    Raises:
-        EffectError: one is not; then none may be applied.
-    """
-    name = effect.name or place
-    changes: dict[str, Change] = {}
-    for assignment in effect.assignments:
-        resource, source, target = skillset.resource(assignment.resource), states[assignment.resource], assignment.target
-        if resource.name in changes:
-            raise EffectError(f"skill {execution.skill}, effect {name}: resource {resource.name} is assigned twice")
-        if not resource.has_arrow(source, target, extern=False):
-            raise EffectError(
-                f"skill {execution.skill}, effect {name}: resource {resource.name} is {source}"
-                f" and has no transition {source} -> {target} for skills"
-            )
-        changes[resource.name] = Change(resource.name, source, target, f"{execution.skill} {execution.id} {name}")
-    return tuple(changes.values())
-
-
-def _after(states: States, changes: tuple[Change, ...]) -> Mapping[str, str]:
-    return {**states, **{change.resource: change.target for change in changes}} if changes else states
-
-
-def _without(situation: Situation, execution: Running, states: States) -> Situation:
-    return Situation(states, tuple(other for other in situation.running if other != execution))
+def _event(skillset: Skillset, name: str) -> Event | None:
+    return next((one for one in skillset.events if one.name == name), None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,31 +36,49 @@ def plain_value(data: Data, message: Any) -> Any:
     return message.data if data.type in PRIMITIVES else message
 
 
-class DataManager(Mapping[str, object]):
-    """The fresh values by name (a mapping, for preconditions), their topics and the service ``get_data``."""
+class DataManager:
+    """Tells ``update`` of each fresh value, and with None that it has become stale; the data's topics and service ``get_data``."""
 
-    def __init__(self, node: Node, skillset: Skillset, bindings: DataBindings) -> None:
+    def __init__(self, node: Node, skillset: Skillset, bindings: DataBindings, update: Callable[[str, object | None], None]) -> None:
         missing = [data.name for data in skillset.data if data.name not in bindings]
         if missing:
             raise SkillRuntimeError(f"skillset {skillset.name}: no binding to a topic for data {', '.join(missing)}")
         self._node = node
+        self._update = update
         self._data = {data.name: data for data in skillset.data}
         self._received: dict[str, _Received] = {}
         self._lock = threading.Lock()
-        for name in self._data:
-            topic, type_name = bindings[name]
+        for data in skillset.data:
+            topic, type_name = bindings[data.name]
             message_type = message_class(type_name)
-            publisher = node.create_publisher(message_type, f"{skillset.name}/data/{name}", LATCHED)
-            node.create_subscription(message_type, topic, self._receiver(name, publisher.publish), QoSProfile(depth=QUEUE))
+            publisher = node.create_publisher(message_type, f"{skillset.name}/data/{data.name}", LATCHED)
+            node.create_subscription(message_type, topic, self._receiver(data, publisher.publish), QoSProfile(depth=QUEUE))
         node.create_service(GetData, f"{skillset.name}/get_data", self._answer)
 
-    def _receiver(self, name: str, publish: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _receiver(self, data: Data, publish: Callable[[Any], None]) -> Callable[[Any], None]:
+        staleness = self._staleness(data)
+
         def receive(message: Any) -> None:
             with self._lock:
-                self._received[name] = _Received(message, self._now_ns())
+                self._received[data.name] = _Received(message, self._now_ns())
+            if staleness is not None:
+                staleness.reset()
             publish(message)
+            self._update(data.name, plain_value(data, message))
 
         return receive
+
+    def _staleness(self, data: Data) -> Any:
+        """Return the timer that rings when the data is stale, not yet running; None for data that are never stale."""
+        if data.period_s is None:
+            return None
+
+        def ring() -> None:
+            timer.cancel()
+            self._update(data.name, None)
+
+        timer = self._node.create_timer(STALE_PERIODS * data.period_s, ring, autostart=False)
+        return timer
 
     def _now_ns(self) -> int:
         now: int = self._node.get_clock().now().nanoseconds
@@ -78,18 +96,3 @@ class DataManager(Mapping[str, object]):
             response.stamp_ns = received.stamp_ns
             response.value_json = json.dumps(to_plain(received.value))
         return response
-
-    def _fresh(self) -> dict[str, object]:
-        with self._lock:
-            received = dict(self._received)
-        fresh = {name: value for name, value in received.items() if not self._stale(self._data[name], value)}
-        return {name: plain_value(self._data[name], value.value) for name, value in fresh.items()}
-
-    def __getitem__(self, name: str) -> object:
-        return self._fresh()[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._fresh())
-
-    def __len__(self) -> int:
-        return len(self._fresh())

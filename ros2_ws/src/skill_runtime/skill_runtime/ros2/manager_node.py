@@ -17,6 +17,7 @@ from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2.data_manager import DataBindings, DataManager
+from skill_runtime.ros2.due import DueTimer
 from skill_runtime.ros2.names import action_type
 from skill_runtime.ros2.resource_manager import EventPublisher, ResourceManager
 from skill_runtime.ros2.skill_manager import SkillManager
@@ -56,16 +57,16 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         super().__init__(skillset.name, **node_options)
         self._workers = ThreadPoolExecutor(WORKERS, thread_name_prefix=f"{skillset.name}_hooks")
         hooks = hooks_factory(self)
-        data = DataManager(self, skillset, _generated_bindings(skillset) if data_bindings is None else data_bindings)
         self.engine = SkillsetEngine(
             skillset,
             lambda: int(self.get_clock().now().nanoseconds),
             hooks,
             self._on_events,
-            data=data,
             defer=self._submit,
             on_error=self.get_logger().error,
         )
+        self._due = DueTimer(self, self.engine)
+        DataManager(self, skillset, _generated_bindings(skillset) if data_bindings is None else data_bindings, self._update_data)
         self._events = EventPublisher(self, skillset.name)
         self._resources = ResourceManager(self, self.engine)
         self._managers = {
@@ -81,6 +82,10 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         self._workers.shutdown(wait=True)
         self._events.flush(FLUSH_S)
 
+    def _update_data(self, name: str, value: object | None) -> None:
+        self.engine.update_data(name, value)
+        self._due.look()
+
     def _on_events(self, events: Sequence[EngineEvent]) -> None:
         """Pass on one step: resources before events before results, so that who sees a result sees its effects."""
         self._resources.on_events(events)
@@ -88,6 +93,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         for event in events:
             if isinstance(event, ExecutionEvent):
                 self._managers[event.skill].on_event(event)
+        self._due.look()
 
     def _submit(self, job: Callable[[], object]) -> None:
         self._workers.submit(job).add_done_callback(self._check)

@@ -1,4 +1,4 @@
-"""The resource manager's interface (paper, section 4.2): states latched, extern transitions as a service, and the events."""
+"""The resource manager's interface (paper, section 4.2): states latched, services for extern transitions and events, and what happens."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.time import Time
 from skillset_interfaces.msg import Event, ResourceState, ResourceStates
-from skillset_interfaces.srv import Transition
+from skillset_interfaces.srv import Transition, TriggerEvent
 
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
@@ -36,7 +36,7 @@ class EventPublisher:
 
 
 class ResourceManager:
-    """Publishes ``resource_states`` once a step, and serves ``transition``."""
+    """Publishes ``resource_states`` once a step, and serves ``transition`` and ``trigger``."""
 
     def __init__(self, node: Node, engine: SkillsetEngine) -> None:
         self._name = engine.skillset.name
@@ -49,6 +49,7 @@ class ResourceManager:
         }
         self._publish(node.get_clock().now().nanoseconds)
         node.create_service(Transition, f"{self._name}/transition", self._answer)
+        node.create_service(TriggerEvent, f"{self._name}/trigger", self._answer_trigger)
 
     def on_events(self, events: Sequence[EngineEvent]) -> None:
         """Follow the transitions of one step."""
@@ -68,6 +69,11 @@ class ResourceManager:
     def _answer(self, request: Any, response: Any) -> Any:
         reply = self._engine.transition(request.resource, request.to)
         response.accepted, response.reason, response.state = reply.accepted, reply.reason, reply.state
+        return response
+
+    def _answer_trigger(self, request: Any, response: Any) -> Any:
+        reply = self._engine.trigger(request.event)
+        response.accepted, response.reason = reply.accepted, reply.reason
         return response
 
 

@@ -1,0 +1,35 @@
+"""Calls an engine when something has become due: one timer on the node's clock, asleep while nothing is."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from skill_runtime.core.engine import SkillsetEngine
+
+
+class DueTimer:
+    """Serves ``due_ns`` of an engine; ``look`` is to be called after every step that may have changed it."""
+
+    def __init__(self, node: Node, engine: SkillsetEngine) -> None:
+        self._engine = engine
+        self._clock = node.get_clock()
+        self._timer = node.create_timer(1.0, self._ring, autostart=False)
+        # A timer that is set from another thread does not wake the executor; a guard condition does.
+        self._wake = node.create_guard_condition(self._set)
+
+    def look(self) -> None:
+        """Have the timer set anew, from any thread."""
+        self._wake.trigger()
+
+    def _set(self) -> None:
+        due_ns = self._engine.due_ns
+        if due_ns is None:
+            self._timer.cancel()
+            return
+        self._timer.timer_period_ns = max(1, due_ns - self._clock.now().nanoseconds)
+        self._timer.reset()
+
+    def _ring(self) -> None:
+        self._timer.cancel()
+        self._engine.tick()
+        self._set()
