@@ -133,19 +133,15 @@ class Access(Protocol):
         ...
 
 
-class SkillView(Generic[OutputsT, ResultT]):
-    """One skill: call it to start it."""
+class Skill(Generic[OutputsT, ResultT]):
+    """One skill; the generated clients add a ``__call__`` with its inputs."""
 
     def __init__(self, client: Access, name: str) -> None:
         self.name = name
         self._client = client
 
-    def __call__(self, **inputs: object) -> Handle[OutputsT, ResultT]:
-        """Start an execution; never waits. See ``SkillsetClient.start``."""
-        return self.start(inputs)
-
     def start(self, inputs: Mapping[str, object]) -> Handle[OutputsT, ResultT]:
-        """Start an execution with the inputs by name."""
+        """Start an execution with the inputs by name; never waits. See ``SkillsetClient.start``."""
         return cast("Handle[OutputsT, ResultT]", self._client.start(self.name, **inputs))
 
     @property
@@ -153,9 +149,17 @@ class SkillView(Generic[OutputsT, ResultT]):
         """How the last execution ended, whoever asked for it and whenever: also before this client was there."""
         return self._client.last(self.name)
 
-    def why(self, **inputs: object) -> Pending[Why]:
+    def why(self, inputs: Mapping[str, object] | None = None) -> Pending[Why]:
         """Ask whether the skill could start now, and if not, why not; with inputs, its ``validate`` is asked, too."""
-        return self._client.why(self.name, inputs or None)
+        return self._client.why(self.name, inputs)
+
+
+class SkillView(Skill[dict[str, Any], str]):
+    """One skill by its name: call it to start it."""
+
+    def __call__(self, **inputs: object) -> Handle[dict[str, Any], str]:
+        """Start an execution; never waits. See ``SkillsetClient.start``."""
+        return self.start(inputs)
 
 
 class ResourceView(Generic[StateT]):
@@ -196,7 +200,7 @@ class ResourceView(Generic[StateT]):
         def look(now: dict[str, str]) -> None:
             state = now.get(self.name)
             if state in states:
-                reached.resolve(cast("StateT", state))
+                reached.resolve(state)
 
         forget = self._client.on_change(look)
         reached.add_done_callback(lambda _: forget())
@@ -244,7 +248,11 @@ class DataView(Generic[ValueT]):
         return arrival
 
 
-AnySkill = SkillView[dict[str, Any], str]
+class TypedSkillset:
+    """A skillset as the generated clients make it: attributes for its skills and resources, ``data`` for its data."""
+
+    def __init__(self, client: Access) -> None:
+        self.client = client
 
 
 class SkillsetView:
@@ -256,7 +264,7 @@ class SkillsetView:
     def __init__(self, client: Access) -> None:
         self.client = client
         model = client.model
-        self.skills = {skill.name: AnySkill(client, skill.name) for skill in model.skills}
+        self.skills = {skill.name: SkillView(client, skill.name) for skill in model.skills}
         self.resources = {resource.name: ResourceView[str](client, resource.name) for resource in model.resources}
         self.data = DataViews({data.name: DataView[Any](client, data.name) for data in model.data}, client.skillset)
 

@@ -74,7 +74,7 @@ class Waitable:
         except RuntimeError:
             # An rclpy executor (7.1.6) resumes its coroutines at each turn, whatever they yield.
             while not self._ended.is_set():
-                yield
+                yield None
             return
         arrival: asyncio.Future[None] = loop.create_future()
 

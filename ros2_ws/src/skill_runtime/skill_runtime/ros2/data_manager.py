@@ -18,7 +18,7 @@ from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.plain import to_plain
 from skill_runtime.ros2.convert import message_class
 from skill_runtime.ros2.names import LATCHED
-from skill_runtime.staleness import is_stale
+from skill_runtime.staleness import STALE_PERIODS, is_stale
 
 QUEUE = 10
 DataBindings = Mapping[str, tuple[str, str]]
