@@ -31,7 +31,9 @@ def spins_here(executor: object) -> bool:
     """Tell whether this thread is inside a callback, or any other part, of the executor's ``spin``."""
     frame = inspect.currentframe()
     while frame is not None:
-        if frame.f_globals.get("__name__") == "rclpy.executors" and frame.f_locals.get("self") is executor:
+        # By name: in the threads of an executor that has several, frames of its handlers know it, too.
+        spins = frame.f_code.co_name.lstrip("_").startswith("spin") and frame.f_globals.get("__name__") == "rclpy.executors"
+        if spins and frame.f_locals.get("self") is executor:
             return True
         frame = frame.f_back
     return False
@@ -64,8 +66,7 @@ class SpunHost:
                     f"this thread spins the node {self._node.get_name()} and can't wait for what only its spinning brings: "
                     "await it, give it a callback, or wait in another thread"
                 )
-            event.wait(min(LOOK_S, left_s))
-            if end is None:
+            if not event.wait(min(LOOK_S, left_s)) and end is None:
                 pulse.check(executor)
         return event.is_set()
 
@@ -93,6 +94,8 @@ class _Pulse:
 
     def check(self, executor: Any) -> None:
         """Have the executor give a sign now and then; raise CannotWaitError when one stays away."""
+        if executor._is_shutdown:  # noqa: SLF001 - rclpy 7.1.6 has no question for it
+            raise CannotWaitError("the node's executor was shut down; nothing arrives any more")
         now_s = time.monotonic()
         if self._felt.is_set():
             self._felt.clear()
