@@ -68,6 +68,17 @@ class Sample:
     stamp_ns: int | None
 
 
+@dataclass(frozen=True)
+class DataReading:
+    """A data as its managers know it; stamp and value only when something was received."""
+
+    known: bool
+    received: bool
+    stale: bool
+    stamp_ns: int
+    value_json: str
+
+
 class DataFeed(Protocol):
     """The values of one data, as a client gets them."""
 

@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakSet
 
+from action_msgs.srv import CancelGoal
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from skillset_interfaces.msg import Event
-from skillset_interfaces.srv import Transition
+from skillset_interfaces.srv import GetData, Transition
 
 from skill_language.model import Skillset
 from skill_runtime.core.execution import ExecutionState
@@ -25,7 +26,7 @@ from skill_runtime.ros2.presence import Presence
 from skill_runtime.ros2.pursuit import Pursuit, outputs_of
 from skill_runtime.ros2.questions import Questions
 from skill_runtime.ros2.spinning import SpunHost
-from skill_runtime.views import Forget, SkillsetView, TransitionAnswer, Why
+from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer, Why
 from skill_runtime.waiting import Pending
 
 __all__ = ["SkillHandle", "SkillsetClient"]
@@ -199,6 +200,26 @@ class SkillsetClient:
             feed.tick()
             self._wake()
         return feed
+
+    def read_data(self, name: str) -> Pending[DataReading]:
+        """Ask the managers for a data's value as JSON: also of a type that is not known here."""
+
+        def answer(response: Any, tries: int) -> DataReading:  # noqa: ARG001
+            return DataReading(response.known, response.received, response.stale, response.stamp_ns, response.value_json)
+
+        return self._questions.ask(GetData, f"{self.root}/get_data", GetData.Request(name=name), answer)
+
+    def input_types(self, skill: str) -> dict[str, str]:
+        """Return a skill's inputs with their ROS types, as ``{"height": "double"}``; raise ValueError."""
+        self._check_skill(skill)
+        return fields_of(self._presence.actions[skill].Goal)
+
+    def interrupt_all(self, skill: str) -> Pending[int]:
+        """Ask for the end of all executions of a skill, whoever asked for them; the answer is how many there were."""
+        self._check_skill(skill)
+        service = f"{self.root}/skill/{skill}/_action/cancel_goal"
+        # A goal of zeros at a time of zero are all goals (action_msgs/srv/CancelGoal).
+        return self._questions.ask(CancelGoal, service, CancelGoal.Request(), lambda response, _: len(response.goals_canceling))
 
     def moment(self) -> Pending[Any]:
         """Return an answer that nobody has given yet; it fails when the managers go."""
