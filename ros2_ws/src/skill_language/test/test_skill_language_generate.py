@@ -113,7 +113,7 @@ def test_an_action(files):
     goal, result, feedback = ([line.split("#")[0].strip() for line in part.splitlines() if line[0] != "#"] for part in parts)
     assert goal == ["geometry_msgs/Point target", "geometry_msgs/Point[] via", "bool fast", "uint8 tries", "string label"]
     assert result == ["string outcome", "string result", "string message", "float64 travelled", "geometry_msgs/Point[] seen"]
-    assert feedback == ["float64 progress", "float64 travelled", "geometry_msgs/Point[] seen"]
+    assert feedback == ["float64 progress", "string state", "float64 travelled", "geometry_msgs/Point[] seen"]
     comment = parts[0].splitlines()[2].partition("#")[2]
     assert comment.isascii()
     assert not set('"\\') & set(comment)

@@ -28,6 +28,7 @@ ACKNOWLEDGE_TIMEOUT_S = 5.0
 RESULT_GRACE_S = 0.5
 """The event of an end waits so long for the result: who has it has seen the resources after the step, too."""
 
+_FEEDBACK_FIELDS = ("progress", "state")
 _RESULT_FIELDS = ("outcome", "result", "message")
 
 
@@ -125,7 +126,7 @@ class Pursuit:
     def _on_feedback(self, message: Any) -> None:
         feedback = message.feedback
         self._acknowledge()
-        self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name != "progress"})
+        self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name not in _FEEDBACK_FIELDS})
 
     def _on_result(self, future: Any) -> None:
         result = None if future.result() is None else future.result().result
