@@ -23,8 +23,9 @@ from pathlib import Path
 from alula_flight.claims import DomainClaim, NoFreeDomainError, claim_domain, free_port
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
+from alula_flight.mocked import MockFront
 from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run, sweep_shared_memory
-from alula_flight.spec import SCENARIOS, RequestError, RunSpec, parse_fault
+from alula_flight.spec import SCENARIOS, SENSORS, RequestError, RunSpec, parse_fault
 
 CANNOT_START = 2
 GIVEN_UP = 1
@@ -42,8 +43,10 @@ class Arguments(argparse.Namespace):
     fail: list[str]
     out: Path | None
     seed: int
-    rate: float
+    rate: float | None
     autopilot: str | None
+    mock: bool
+    behaviour: list[Path]
 
 
 def parse(arguments: list[str]) -> RunSpec:
@@ -53,29 +56,46 @@ def parse(arguments: list[str]) -> RunSpec:
     parser.add_argument("--fail", action="append", default=[], metavar="WHAT[@SECONDS]", help="break a sensor, seconds after lift-off")
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/<time>-<scenario>)")
     parser.add_argument("--seed", type=int, default=0, help="seed of world details, wind and noise (default 0)")
-    parser.add_argument("--rate", type=float, default=1.0, help="simulated seconds per second at most, 0: no limit (default 1)")
+    parser.add_argument("--rate", type=float, help="simulated seconds per second at most, 0: no limit (default 1)")
     parser.add_argument("--autopilot", metavar="URL", help="fly a real autopilot (pymavlink connection) instead of the simulator")
+    parser.add_argument("--mock", action="store_true", help="fly over mocks in virtual time: no simulator, no ROS graph, seconds")
+    parser.add_argument(
+        "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what the mocks do, on top of the drone's own"
+    )
     given = parser.parse_args(arguments, namespace=Arguments())
     if given.scenario not in SCENARIOS:
         raise RequestError(f"there is no scenario '{given.scenario}'; choose one of {', '.join(SCENARIOS)}")
     if not 0 <= given.seed < 2**31:
         raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")
-    if not 0 <= given.rate <= 1000:  # also refuses nan
+    if given.rate is not None and not 0 <= given.rate <= 1000:  # also refuses nan
         raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to 1000")
     if given.autopilot is not None and given.fail:
         raise RequestError("--fail breaks simulated sensors; with --autopilot there are none")
+    check_mock(given)
     return RunSpec(
         scenario=given.scenario,
         out_dir=str(run_folder(given.out, given.scenario)),
         run_id=uuid.uuid4().hex,
         seed=given.seed,
-        rate=given.rate,
-        faults=tuple(str(parse_fault(text)) for text in given.fail),
+        rate=1.0 if given.rate is None else given.rate,
+        faults=tuple(str(parse_fault(text, None if given.mock else SENSORS)) for text in given.fail),
         autopilot=given.autopilot,
-        master_port=free_port(),
-        mavlink_port=free_port(),
+        master_port=0 if given.mock else free_port(),
+        mavlink_port=0 if given.mock else free_port(),
         domain=0,
+        mock=given.mock,
+        behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
     )
+
+
+def check_mock(given: Arguments) -> None:
+    """Refuse what does not go together with mocks, or without them."""
+    if given.behaviour and not given.mock:
+        raise RequestError("--behaviour says what mocks do; add --mock")
+    if given.mock and given.autopilot is not None:
+        raise RequestError("--mock flies without a vehicle; leave out --autopilot")
+    if given.mock and given.rate is not None:
+        raise RequestError("--mock flies in virtual time, which no --rate limits; leave it out")
 
 
 def run_folder(wanted: Path | None, scenario: str) -> Path:
@@ -198,6 +218,7 @@ def finish(spec: RunSpec, mission_exit: int | None) -> int:
             faults=list(spec.faults),
             died=[{"name": d.name, "when_s": d.when_s, "how": d.how} for d in died],
             mission_exit=mission_exit,
+            mock=spec.mock,
         )
     )
     for line in verdict_lines(summary, died, out):
@@ -209,6 +230,8 @@ def main(arguments: list[str]) -> int:
     """Fly; return 0 accomplished, 1 given up, 2 could not start."""
     try:
         request = parse(arguments)
+        if request.mock:
+            return fly_mocked(request)
         claim = claim_domain()
     except (RequestError, NoFreeDomainError) as error:
         sys.stderr.write(f"alula fly: {error}\n")
@@ -222,6 +245,28 @@ def main(arguments: list[str]) -> int:
         return CANNOT_START
     spec_path = out / "run.json"
     spec.save(spec_path)
+    say = announce(spec)
+    code = Front(spec, claim, say).fly(spec_path)
+    say("making the report")
+    return finish(spec, code)
+
+
+def fly_mocked(spec: RunSpec) -> int:
+    """Fly over mocks; raise RequestError when that can't be, and leave nothing behind then."""
+    say = announce(spec)
+    code, words = MockFront(spec, say).fly()
+    out = Path(spec.out_dir)
+    if code == CANNOT_START and not (out / "mission.json").exists():
+        raise RequestError(words.strip() or "the mission could not start")
+    spec.save(out / "run.json")
+    (out / "logs").mkdir(exist_ok=True)
+    (out / "logs" / "mission.log").write_text(words, encoding="utf-8")
+    say("making the report")
+    return finish(spec, code)
+
+
+def announce(spec: RunSpec) -> Callable[[str], None]:
+    """Say what is going to be flown; return what says a line with the seconds since then."""
     started = time.monotonic()
 
     def say(line: str) -> None:
@@ -229,10 +274,8 @@ def main(arguments: list[str]) -> int:
         sys.stdout.flush()
 
     failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
-    say(f"flying '{spec.scenario}', seed {spec.seed}{failing}; results in {out}")
-    code = Front(spec, claim, say).fly(spec_path)
-    say("making the report")
-    return finish(spec, code)
+    say(f"flying '{spec.scenario}'{' over mocks' if spec.mock else ''}, seed {spec.seed}{failing}; results in {spec.out_dir}")
+    return say
 
 
 if __name__ == "__main__":

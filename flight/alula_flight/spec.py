@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -27,20 +28,23 @@ class Fault:
         return self.sensor if self.after_lift_off_s is None else f"{self.sensor}@{self.after_lift_off_s:g}"
 
 
-def parse_fault(text: str) -> Fault:
-    """Read ``zed@30`` or ``zed``; raise RequestError for anything else."""
+def parse_fault(text: str, known: Collection[str] | None = SENSORS) -> Fault:
+    """Read ``zed@30`` or ``zed``; raise RequestError for anything else. ``known`` None: somebody else knows what there is to break."""
     match = _FAULT.match(text)
     if match is None:
         raise RequestError(f"--fail {text}: write WHAT@SECONDS, as in zed@30, or WHAT alone for a failure from the start")
     sensor, seconds = match["sensor"], match["seconds"]
-    if sensor not in SENSORS:
-        raise RequestError(f"--fail {text}: there is no '{sensor}' to break; choose one of {', '.join(SENSORS)}")
+    if known is not None and sensor not in known:
+        raise RequestError(f"--fail {text}: there is no '{sensor}' to break; choose one of {', '.join(known)}")
     return Fault(sensor, None if seconds is None else float(seconds))
 
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run. ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at most, 0 unlimited."""
+    """One run. ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at most, 0 unlimited.
+
+    ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
+    """
 
     scenario: str
     out_dir: str
@@ -52,6 +56,8 @@ class RunSpec:
     master_port: int
     mavlink_port: int
     domain: int
+    mock: bool = False
+    behaviour: tuple[str, ...] = ()
 
     def save(self, path: Path) -> None:
         """Write the specification beside the results."""
@@ -61,7 +67,7 @@ class RunSpec:
     def load(cls, path: Path) -> RunSpec:
         """Read what `save` wrote."""
         values = json.loads(path.read_text(encoding="utf-8"))
-        return cls(**{**values, "faults": tuple(values["faults"])})
+        return cls(**{**values, "faults": tuple(values["faults"]), "behaviour": tuple(values.get("behaviour", ()))})
 
     def launch_arguments(self) -> list[str]:
         """Return the arguments of ``fly.launch``."""

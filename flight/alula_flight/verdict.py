@@ -24,21 +24,35 @@ def number(value: float | None, unit: str, digits: int = 2) -> str:
     return "unknown" if value is None else f"{value:.{digits}f} {unit}".rstrip()
 
 
-def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
-    """Return the verdict, a line each."""
-    outcome = summary.get("outcome")
-    reason = summary.get("reason")
-    lines = ["", MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")]
-    lines += [f"  {death.sentence()}" for death in died]
+def flight_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what a flight through a world was."""
     chart = summary.get("map") or {}
     coverage = chart.get("coverage")
-    lines += [
+    return [
         f"  landed: {'yes' if summary.get('landed') else 'no'}, duration {number(summary.get('duration_s'), 's', 1)}, "
         f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {summary.get('collisions')}, "
         f"nearest surface {number(summary.get('min_clearance_m'), 'm')}",
         f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
         f"coverage {number(None if coverage is None else 100 * coverage, '%', 1)}",
     ]
+
+
+def mock_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what a flight over mocks was; there is no world to collide with or to map."""
+    mock = summary["mock"]
+    return [
+        f"  landed: {'yes' if summary.get('landed') else 'no'}, duration {number(summary.get('duration_s'), 's', 1)}; "
+        f"flown over mocks in {number(mock.get('wall_s'), 's')}, {number(mock.get('factor'), 'times faster than the clock', 0)}"
+    ]
+
+
+def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
+    """Return the verdict, a line each."""
+    outcome = summary.get("outcome")
+    reason = summary.get("reason")
+    lines = ["", MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")]
+    lines += [f"  {death.sentence()}" for death in died]
+    lines += mock_lines(summary) if summary.get("mock") else flight_lines(summary)
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:
         failure = recovery["failure_s"]

@@ -18,7 +18,10 @@ class Death(TypedDict):
 
 @dataclass(frozen=True)
 class RunFacts:
-    """One run. ``faults`` as on the command line (``zed@30``); ``mission_exit`` None: the mission did not end by itself."""
+    """One run. ``faults`` as on the command line (``zed@30``); ``mission_exit`` None: the mission did not end by itself.
+
+    ``mock``: flown over mocks, so there is neither a bag nor a world nor a map, and no bridge.
+    """
 
     scenario: str
     seed: int
@@ -26,3 +29,4 @@ class RunFacts:
     faults: Sequence[str]
     died: Sequence[Death]
     mission_exit: int | None
+    mock: bool = False

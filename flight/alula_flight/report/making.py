@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from pathlib import Path
+
 from alula_flight.report.events import History, fold, read_events
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.files import Problems, write_aside, write_json
 from alula_flight.report.map_picture import MapScene, draw_map
 from alula_flight.report.map_quality import Floats, MapQuality, judge_map, load_map, load_route
-from alula_flight.report.phases import find_phases
+from alula_flight.report.mocked import read_mock
+from alula_flight.report.phases import Phases, find_phases
 from alula_flight.report.recording import Recording, read_recording
 from alula_flight.report.recovery import find_recovery, injected
 from alula_flight.report.summary import Summary, summarise
@@ -15,6 +19,18 @@ from alula_flight.report.timeline import make_timeline
 from alula_flight.report.timeline_picture import draw_timeline
 from alula_flight.report.truth import Encounter, disagreements, encounter, rests
 from alula_flight.report.world import World
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The flight and its map against the simulator's true surfaces, as far as they are known."""
+
+    world: World | None = None
+    recomputed: Encounter = field(default_factory=Encounter)
+    resting: bool | None = None
+    points: Floats | None = None
+    route: Floats | None = None
+    quality: MapQuality = field(default_factory=MapQuality)
 
 
 def make_report(facts: RunFacts) -> Summary:
@@ -28,15 +44,51 @@ def make_report(facts: RunFacts) -> Summary:
     folder, problems = facts.out_dir, Problems()
 
     # 1. What happened in the skillsets, and what the functional layer recorded.
-    history, recording = History(), Recording()
+    history, recording, mock = History(), Recording(), None
     with problems.survive("events.jsonl"):
         history = fold(read_events(folder / "events.jsonl", problems), problems)
-    with problems.survive("functional.bag"):
-        recording = read_recording(folder, problems)
+    if facts.mock:
+        recording, mock = read_mock(folder, problems)
+    else:
+        with problems.survive("functional.bag"):
+            recording = read_recording(folder, problems)
     phases = find_phases(history, recording)
     recovery = find_recovery(facts.scenario, history, recording, phases)
 
-    # 2. The flight against the true world.
+    # 2. The flight, and 3. its map, against the true world, where there is one.
+    truth = Truth() if facts.mock else _compare(folder, recording, phases, problems)
+
+    # 4. The pictures.
+    failed = next((fault.sensor for fault in injected(recording)), "")
+    with problems.survive("timeline"):
+        timeline = make_timeline(history, phases, recovery, failed)
+        write_json(folder / "timeline.json", timeline)
+        write_aside(folder / "timeline.svg", lambda aside: draw_timeline(timeline, aside, title=_title(facts)))
+    if not facts.mock:
+        with problems.survive("map.png"):
+            failure_s = recovery.failure_s or recovery.detected_s if recovery is not None else None
+            scene = MapScene(truth.points, truth.quality.missed_enu_m, truth.world, truth.route, recording.path, failure_s, failed)
+            write_aside(folder / "map.png", lambda aside: draw_map(scene, aside, title=_title(facts)))
+
+    # 5. The numbers, last, because they tell what went wrong with the rest.
+    summary = summarise(
+        facts,
+        history=history,
+        recording=recording,
+        phases=phases,
+        recovery=recovery,
+        recomputed=truth.recomputed,
+        resting=truth.resting,
+        quality=truth.quality,
+        mock=mock,
+        problems=problems,
+    )
+    write_json(folder / "summary.json", summary)
+    return summary
+
+
+def _compare(folder: Path, recording: Recording, phases: Phases, problems: Problems) -> Truth:
+    """Compare with the true world: the path first, then the map."""
     world: World | None = None
     with problems.survive("world.ply"):
         world = World.load(folder / "world.ply")
@@ -46,8 +98,6 @@ def make_report(facts: RunFacts) -> Summary:
         resting = rests(recording.truth, world, phases)
         for sentence in disagreements(recording, recomputed):
             problems.note(sentence)
-
-    # 3. The map against the true world.
     points: Floats | None = None
     route: Floats | None = None
     with problems.survive("map.ply"):
@@ -57,34 +107,9 @@ def make_report(facts: RunFacts) -> Summary:
     quality = MapQuality()
     with problems.survive("the map's quality"):
         quality = judge_map(points, route, world, problems)
-
-    # 4. The pictures.
-    failed = next((fault.sensor for fault in injected(recording)), "")
-    with problems.survive("timeline"):
-        timeline = make_timeline(history, phases, recovery, failed)
-        write_json(folder / "timeline.json", timeline)
-        write_aside(folder / "timeline.svg", lambda aside: draw_timeline(timeline, aside, title=_title(facts)))
-    with problems.survive("map.png"):
-        failure_s = recovery.failure_s or recovery.detected_s if recovery is not None else None
-        scene = MapScene(points, quality.missed_enu_m, world, route, recording.path, failure_s, failed)
-        write_aside(folder / "map.png", lambda aside: draw_map(scene, aside, title=_title(facts)))
-
-    # 5. The numbers, last, because they tell what went wrong with the rest.
-    summary = summarise(
-        facts,
-        history=history,
-        recording=recording,
-        phases=phases,
-        recovery=recovery,
-        recomputed=recomputed,
-        resting=resting,
-        quality=quality,
-        problems=problems,
-    )
-    write_json(folder / "summary.json", summary)
-    return summary
+    return Truth(world, recomputed, resting, points, route, quality)
 
 
 def _title(facts: RunFacts) -> str:
     failing = f", failing {', '.join(facts.faults)}" if facts.faults else ""
-    return f"{facts.scenario}, seed {facts.seed}{failing}"
+    return f"{facts.scenario}, seed {facts.seed}{failing}{', over mocks' if facts.mock else ''}"

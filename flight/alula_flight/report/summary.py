@@ -9,6 +9,7 @@ from alula_flight.report.events import History
 from alula_flight.report.facts import Death, RunFacts
 from alula_flight.report.files import Problems, ReportError, mapping, read_json
 from alula_flight.report.map_quality import MapQuality
+from alula_flight.report.mocked import MockSummary
 from alula_flight.report.phases import Phases, flight_status
 from alula_flight.report.recording import ON_GROUND, Recording
 from alula_flight.report.recovery import Recovery, injected
@@ -80,7 +81,7 @@ class LiftOff(TypedDict):
 
 
 class Summary(TypedDict):
-    """The whole file. ``collisions``, ``min_clearance_m``, ``distance_m``: the worse of ``accounts``."""
+    """The whole file. ``collisions``, ``min_clearance_m``, ``distance_m``: the worse of ``accounts``. ``mock``: None in the simulator."""
 
     scenario: str
     outcome: str | None
@@ -100,6 +101,7 @@ class Summary(TypedDict):
     injected: list[InjectedFault]
     died: list[Death]
     mission_exit: int | None
+    mock: MockSummary | None
     lift_off: LiftOff
     accounts: dict[str, EncounterSummary | None]
     problems: list[str]
@@ -171,10 +173,11 @@ def summarise(
     resting: bool | None,
     quality: MapQuality,
     problems: Problems,
+    mock: MockSummary | None = None,
 ) -> Summary:
     """Put everything together."""
     outcome, reason = read_outcome(facts, problems)
-    bridge = read_bridge(facts, problems)
+    bridge = None if facts.mock else read_bridge(facts, problems)
     note_doubts(facts, recording, phases, problems)
     on_ground = landed(history, recording, problems, resting=resting)
     said = recording.simulator
@@ -199,6 +202,7 @@ def summarise(
         injected=[InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(recording)],
         died=[Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],
         mission_exit=facts.mission_exit,
+        mock=mock,
         lift_off=LiftOff(stamp_s=phases.zero_s, source=phases.zero_from),
         accounts={"simulator": _encounter(simulated), "recomputed": _encounter(recomputed)},
         problems=problems.sentences,

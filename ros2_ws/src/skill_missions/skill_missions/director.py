@@ -106,6 +106,12 @@ class Director:
         self._phase = self._halt
         return "the robot stops where it is"
 
+    def remember(self) -> None:
+        """Take note of how each node is; for those who look at the tree later only, instead of ``view`` after each step."""
+        self._watch.remember()
+        if self._stop_watch is not None:
+            self._stop_watch.remember()
+
     def view(self) -> NodeView:
         """Return the tree as it is now; after an abort with what stops the robot beside it."""
         tree = self._watch.look()

@@ -59,25 +59,27 @@ def kind_of(node: Behaviour) -> str:
 
 
 class TreeWatch:
-    """Remembers what each node last was: py_trees forgets it when it leaves a branch. To be asked after each tick."""
+    """Remembers what each node last was: py_trees forgets it when it leaves a branch. To be asked, or told, after each tick."""
 
     def __init__(self, root: Behaviour) -> None:
         self._root = root
-        self._last: dict[Behaviour, tuple[str, str]] = {}
+        self._kinds = {node: kind_of(node) for node in root.iterate()}
+        self._last: dict[Behaviour, tuple[str, str]] = dict.fromkeys(self._kinds, (Status.INVALID.value, ""))
+
+    def remember(self) -> None:
+        """Take note of the tree now."""
+        for node in self._kinds:
+            if node.status is not Status.INVALID:
+                self._last[node] = (node.status.value, node.feedback_message)
+            elif self._last[node][0] == Status.RUNNING.value:
+                self._last[node] = (INTERRUPTED, node.feedback_message)
 
     def look(self) -> NodeView:
         """Return the tree now."""
+        self.remember()
         return self._view(self._root)
 
     def _view(self, node: Behaviour) -> NodeView:
-        status, message = self._remember(node)
+        status, message = self._last[node]
         skill = node.skill_name if isinstance(node, SkillLeaf) else ""
-        return NodeView(node.name, kind_of(node), status, message, skill, tuple(self._view(child) for child in node.children))
-
-    def _remember(self, node: Behaviour) -> tuple[str, str]:
-        before = self._last.get(node, (Status.INVALID.value, ""))
-        if node.status is not Status.INVALID:
-            self._last[node] = (node.status.value, node.feedback_message)
-        elif before[0] == Status.RUNNING.value:
-            self._last[node] = (INTERRUPTED, node.feedback_message)
-        return self._last.get(node, before)
+        return NodeView(node.name, self._kinds[node], status, message, skill, tuple(self._view(child) for child in node.children))

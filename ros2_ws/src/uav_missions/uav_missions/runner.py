@@ -26,13 +26,13 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
 from skill_missions.director import EXIT_CODES, Director, End, Outcome
-from skill_missions.drawing import draw
-from skill_missions.files import EventLog, event_record, write_json, write_text
+from skill_missions.files import event_record
 from skill_missions.pending import PendingInterrupts
 from skill_missions.skillset import Handle
 from skill_runtime.ros2 import SkillsetClient
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients, MappingMission, Settings
+from uav_missions.record import MissionRecord
 from uav_missions.route import Route, RouteError, load_route
 
 SKILLSETS = ("navigation", "perception", "mapping")
@@ -43,7 +43,6 @@ ALL_EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, dura
 
 
 LAST_EVENTS_S = 2.0  # wall clock to wait for the events of what has ended
-UNENDED_STATES = ("REQUESTED", "RUNNING")
 
 
 class WakingClient:
@@ -78,13 +77,9 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self, out: Path, scenario: str, route: Route) -> None:
         super().__init__("mission")
         self.due = False
-        self._out = out
-        self._scenario = scenario
+        self.record = MissionRecord(out, scenario, route)
         self._route = route
-        self._lift_off_s: float | None = None
         self._view_json = ""
-        self._unended: set[str] = set()
-        self._events = EventLog(out / "events.jsonl")
         self._skillsets = {name: WakingClient(self, name, self.wake) for name in SKILLSETS}
         self.director = self._make_director()
         self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", 10)
@@ -93,8 +88,6 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.create_subscription(Event, f"/{name}/events", self._on_event, ALL_EVENTS)
         self.create_service(Trigger, "/mission/abort", self._on_abort)
         self.create_timer(TICK_PERIOD_S, self.wake)
-        write_json(out / "route.json", {"frame": "map", "route": [list(waypoint) for waypoint in route.waypoints]})
-        self.write_mission(End(Outcome.RUNNING))
 
     @property
     def now_s(self) -> float:
@@ -124,35 +117,10 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.wake()
         return answer
 
-    @property
-    def unended(self) -> bool:
-        """Tell whether executions are open as far as the events have told: a result may be here before its event."""
-        return bool(self._unended)
-
     def finish(self, end: End) -> None:
         """Write what is left to write."""
         self._publish_tree()
-        view = self.director.view()
-        title = f"Mission {self._scenario}: {end.outcome.value.replace('_', ' ')}"
-        write_json(self._out / "tree.json", view.as_dict())
-        write_text(self._out / "tree.svg", draw(view, title))
-        self._events.close()
-        self.write_mission(end)
-
-    def write_mission(self, end: End) -> None:
-        """Write ``mission.json``: also at the start, so that a mission that is killed leaves one that says ``running``."""
-        over = end.outcome is not Outcome.RUNNING
-        content = {
-            "scenario": self._scenario,
-            "outcome": end.outcome.value,
-            "reason": end.reason,
-            "start_s": self.director.start_s,
-            "lift_off_s": self._lift_off_s,
-            "end_s": self.now_s if over else None,
-            "waypoints": len(self._route.waypoints),
-            "waypoints_reached": self._route.reached,
-        }
-        write_json(self._out / "mission.json", content)
+        self.record.finish(end, self.director, self.now_s)
 
     def _make_director(self) -> Director:
         clock_ns = lambda: int(self.get_clock().now().nanoseconds)  # noqa: E731
@@ -172,13 +140,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._tree.publish(String(data=view_json))
 
     def _on_event(self, event: Event) -> None:
-        record = event_record(event)
-        self._events.add(record)
-        if record.get("skill"):
-            change = self._unended.add if record["state"] in UNENDED_STATES else self._unended.discard
-            change(str(record["id"]))
-        if record.get("resource") == "flight_status" and record["from_state"] == "ON_GROUND" and self._lift_off_s is None:
-            self._lift_off_s = float(str(record["stamp_s"]))
+        self.record.note(event_record(event))
         self.wake()
 
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -218,7 +180,7 @@ def fly(node: MissionNode, signals: Sequence[int]) -> End:
         if standstill.lasts(node.now_s):
             return End(Outcome.NOT_STARTED if node.director.start_s is None else Outcome.GIVEN_UP, "the mission clock stands still")
     patience = time.monotonic() + LAST_EVENTS_S
-    while node.unended and time.monotonic() < patience:
+    while node.record.unended and time.monotonic() < patience:
         executor.spin_once(timeout_sec=TURN_S)
     return node.director.end
 

@@ -1,0 +1,77 @@
+"""A play on the in-process middleware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import SimpleNamespace
+
+from skill_language.model import Skillset
+from skill_runtime.core.events import EngineEvent, TransitionEvent
+from skill_runtime.local import LocalWorld, Timer
+from skill_runtime.mock.behaviour import Behaviour
+from skill_runtime.mock.play import Play
+
+
+class LocalStage:
+    """The stage that a world is."""
+
+    def __init__(self, world: LocalWorld) -> None:
+        self._world = world
+        self.notes: list[str] = []
+
+    @property
+    def now_s(self) -> float:
+        """Mission clock."""
+        return self._world.now_s
+
+    def after(self, delay_s: float, job: Callable[[], None]) -> Timer:
+        """Have a job done after a delay."""
+        return self._world.clock.after(delay_s, job)
+
+    def transition(self, skillset: str, resource: str, to: str) -> str:
+        """Take an extern transition."""
+        managers = self._world.managers.get(skillset)
+        if managers is None or not managers.alive:
+            return f"the managers of {skillset} are not there"
+        return managers.transition(resource, to).reason
+
+    def state(self, skillset: str, resource: str) -> str:
+        """Return the state of a resource."""
+        managers = self._world.managers.get(skillset)
+        return "" if managers is None else managers.engine.resources[resource].state
+
+    def publish(self, skillset: str, data: str, value: object) -> None:
+        """Publish a value."""
+        managers = self._world.managers.get(skillset)
+        if managers is not None and managers.alive:
+            managers.publish(data, _namespaces(value))
+
+    def note(self, error: str) -> None:
+        """Keep what went wrong."""
+        self.notes.append(error)
+
+
+def mock_world(
+    skillsets: Iterable[Skillset], behaviour: Behaviour | None = None, *, seed: int = 0, start_s: float = 0.0, latency_s: float = 0.0
+) -> tuple[LocalWorld, Play]:
+    """Serve skillsets by mocks in one process; the play's clock begins with the first step of the world's."""
+    world = LocalWorld(start_s=start_s, latency_s=latency_s)
+    play = Play(behaviour or Behaviour(), LocalStage(world), seed=seed)
+    for skillset in skillsets:
+        for resource in skillset.resources:
+            play.on_state(skillset.name, resource.name, resource.initial)
+        world.serve(skillset, play.hooks_of(skillset))
+
+    def follow(skillset: str, event: EngineEvent) -> None:
+        if isinstance(event, TransitionEvent):
+            play.on_state(skillset, event.resource, event.to_state)
+
+    world.on_event(follow)
+    world.clock.soon(play.begin)
+    return world, play
+
+
+def _namespaces(value: object) -> object:
+    if isinstance(value, Mapping):
+        return SimpleNamespace(**{str(name): _namespaces(part) for name, part in value.items()})
+    return [_namespaces(part) for part in value] if isinstance(value, list) else value

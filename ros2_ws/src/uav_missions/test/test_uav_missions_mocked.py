@@ -1,0 +1,142 @@
+"""The real mission over mocks: it does what it does in the simulator, in no time, and campaigns of hundreds hold what they promise."""
+
+from __future__ import annotations
+
+import importlib
+import random
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from skill_missions.director import Outcome
+from skill_runtime.core import ExecutionEvent
+from skill_runtime.mock import load_behaviour
+from uav_missions.mocked import FaultRequest, MockedMission
+from uav_missions.route import Route, load_route
+
+ALULA_ROOT = Path(__file__).resolve().parents[4]
+ROUTE = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/config/yard.yaml").waypoints
+SKILLSETS = [importlib.import_module(f"{name}_managers.model").SKILLSET for name in ("navigation", "perception", "mapping")]
+BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], SKILLSETS)
+
+# What `./alula fly mapping --rate 0 --fail zed@30` recorded in the simulator, in the order of the requests.
+SIMULATED = [
+    ("takeoff", "TERMINATED", "AT_ALTITUDE"),
+    ("zed_depthmap", "RESOURCE_INVARIANT_VIOLATED", "zed_ok"),
+    ("lidar_mapping", "INTERRUPTED", ""),
+    ("goto_straight", "TERMINATED", "ARRIVED"),
+    ("goto_straight", "TERMINATED", "ARRIVED"),
+    ("goto_straight", "INTERRUPTED", ""),
+    ("lidar_depthmap", "INTERRUPTED", ""),
+    ("rotate_head", "TERMINATED", "ALIGNED"),
+    ("lock_head", "INTERRUPTED", ""),
+    ("goto", "TERMINATED", "ARRIVED"),
+    ("rotate_head", "TERMINATED", "ALIGNED"),
+    ("lock_head", "INTERRUPTED", ""),
+    ("goto", "TERMINATED", "ARRIVED"),
+    ("rotate_head", "TERMINATED", "ALIGNED"),
+    ("lock_head", "INTERRUPTED", ""),
+    ("goto", "TERMINATED", "ARRIVED"),
+    ("land", "TERMINATED", "LANDED"),
+]
+SIDE_BY_SIDE = {"zed_depthmap", "lidar_mapping"}  # two skillsets are asked in one tick: over a network either may be first
+
+
+def make(*faults: FaultRequest, **options) -> MockedMission:
+    return MockedMission(SKILLSETS, BEHAVIOUR, Route(ROUTE), faults=faults, **options)
+
+
+def executions(mission: MockedMission) -> list[tuple[str, str, str]]:
+    """Return skill, outcome and result of each execution in the order of the requests."""
+    found: dict[str, tuple[str, str, str]] = {}
+    for _, event in mission.events:
+        if isinstance(event, ExecutionEvent):
+            found[event.id] = (event.skill, event.state.value, event.result)
+    return list(found.values())
+
+
+def ends(mission: MockedMission) -> Counter:
+    return Counter(event.id for _, event in mission.events if isinstance(event, ExecutionEvent) and event.state.terminal)
+
+
+def comparable(story: list[tuple[str, str, str]]) -> list[object]:
+    """Put what is asked for side by side into one set."""
+    beside = [entry for entry in story if entry[0] in SIDE_BY_SIDE]
+    rest: list[object] = [entry for entry in story if entry[0] not in SIDE_BY_SIDE]
+    return [rest[0], set(beside), *rest[1:]]
+
+
+def test_losing_the_zed_is_flown_as_in_the_simulator():
+    mission = make(FaultRequest("zed", 30.0))
+    assert mission.fly().outcome is Outcome.DEGRADED
+    assert comparable(executions(mission)) == comparable(SIMULATED)
+    lift_off_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "IN_AIR")
+    lost_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "BROKEN")
+    watching_ns = next(
+        event.stamp_ns for _, event in mission.events if getattr(event, "skill", "") == "lidar_depthmap" and event.state.value == "RUNNING"
+    )
+    assert (lost_ns - lift_off_ns) / 1e9 == pytest.approx(30.34, abs=0.05)
+    assert 0.0 < (watching_ns - lost_ns) / 1e9 < 0.2
+
+
+def test_a_nominal_flight_is_accomplished_in_the_time_that_it_takes_in_the_simulator():
+    mission = make()
+    assert mission.fly().outcome is Outcome.ACCOMPLISHED
+    assert [skill for skill, _, _ in executions(mission)].count("goto_straight") == len(ROUTE)
+    assert 90.0 < mission.world.now_s < 110.0  # 99 s from lift-off in the simulator, 4.5 s before
+    assert mission.landed
+    assert mission.open_executions == []
+
+
+def test_both_sensors_dead_is_given_up_and_landed():
+    mission = make(FaultRequest("zed", 8.0), FaultRequest("lidar", 8.0))
+    end = mission.fly()
+    assert end.outcome is Outcome.GIVEN_UP
+    assert "zed_ok" in end.reason
+    assert [skill for skill, _, _ in executions(mission)][-3:] == ["lidar_depthmap", "hover", "land"]
+    assert mission.landed
+
+
+def test_a_lidar_that_is_broken_from_the_start_keeps_the_mission_on_the_ground():
+    mission = make(FaultRequest("lidar", None))
+    end = mission.fly()
+    assert end.outcome is Outcome.NOT_STARTED
+    assert "LiDAR is broken" in end.reason
+    assert executions(mission) == []
+
+
+def test_an_abort_lands_first():
+    mission = make()
+    mission.world.clock.after(20.0, lambda: mission.abort("operator"))
+    end = mission.fly()
+    assert (end.outcome, end.reason) == (Outcome.ABORTED, "operator")
+    assert executions(mission)[-1] == ("land", "TERMINATED", "LANDED")
+
+
+def test_the_same_seed_flies_the_same_flight():
+    first, second = make(FaultRequest("zed", 40.0), seed=5), make(FaultRequest("zed", 40.0), seed=5)
+    first.fly()
+    second.fly()
+    assert [event for _, event in first.events] == [event for _, event in second.events]
+
+
+def test_a_campaign_always_comes_to_an_end_and_down():
+    """Seeds, failures of sensors at random times, and functions that fail by chance on top."""
+    troubles = load_behaviour(
+        [ALULA_ROOT / "skillsets/uav/mock.yaml", Path(__file__).with_name("uav_missions_troubles.yaml")],
+        SKILLSETS,
+    )
+    outcomes: Counter[Outcome] = Counter()
+    for seed in range(150):
+        chance = random.Random(seed)  # noqa: S311 - no secret
+        faults = [FaultRequest(name, chance.uniform(0.0, 110.0)) for name in chance.sample(["zed", "lidar"], chance.randint(0, 2))]
+        mission = MockedMission(SKILLSETS, troubles, Route(ROUTE), faults=faults, seed=seed, tick_period_s=1.0)
+        outcomes[mission.fly().outcome] += 1
+        assert mission.landed, seed
+        assert mission.open_executions == [], seed
+        assert set(ends(mission).values()) <= {1}, seed
+        assert mission.world.errors == [], seed
+        assert mission.play.stage.notes == [], seed
+    assert set(outcomes) == {Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP}
+    assert min(outcomes.values()) > 10

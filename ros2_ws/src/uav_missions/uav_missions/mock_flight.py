@@ -1,0 +1,98 @@
+"""A flight over mocks as a process, without ROS: ``python -m uav_missions.mock_flight --out DIR --route FILE --behaviour FILE``.
+
+It leaves what any mission leaves, and ``mock.json``: how long it took, and what failed when. Ends with 0 (accomplished, also when
+degraded), 1 (given up or aborted), 2 (could not start, or was asked for something that can't be; then nothing is written).
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from skill_language.model import Skillset
+from skill_missions.director import EXIT_CODES, End, Outcome
+from skill_missions.files import write_json
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.mock import Behaviour, load_behaviour
+from uav_missions.mocked import FaultRequest, MockedMission
+from uav_missions.route import Route, RouteError, load_route
+
+SKILLSETS = ("navigation", "perception", "mapping")
+CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(prog="mock_flight", description="Fly a mission over mocks, in virtual time.")
+    parser.add_argument("--scenario", choices=["mapping"], default="mapping", help="which mission")
+    parser.add_argument("--out", type=Path, required=True, help="the run's folder, new or empty")
+    parser.add_argument("--route", type=Path, required=True, help="YAML or JSON file with the key 'route': a list of [x, y, z]")
+    parser.add_argument("--behaviour", type=Path, action="append", default=[], help="behaviour file; later ones come first")
+    parser.add_argument("--fail", type=fault, action="append", default=[], metavar="WHAT[@SECONDS]", help="a fault of the behaviour")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the behaviour's chance")
+    return parser.parse_args(arguments)
+
+
+def fault(text: str) -> FaultRequest:
+    """Read ``zed@30`` or ``zed``."""
+    name, at, seconds = text.partition("@")
+    return FaultRequest(name, float(seconds) if at else None)
+
+
+def drone() -> list[Skillset]:
+    """Return the models that the drone's managers execute."""
+    return [importlib.import_module(f"{name}_managers.model").SKILLSET for name in SKILLSETS]
+
+
+def prepare(options: argparse.Namespace) -> tuple[list[Skillset], Behaviour, Route]:
+    """Read what the flight needs.
+
+    Raises:
+        SkillRuntimeError, RouteError: one of the files, or a fault that the behaviour has not.
+    """
+    skillsets = drone()
+    behaviour = load_behaviour(options.behaviour, skillsets)
+    for request in options.fail:
+        if request.name not in behaviour.faults:
+            known = ", ".join(behaviour.faults) or "none"
+            raise SkillRuntimeError(f"--fail {request.name}: the behaviour has no such fault; it has {known}")
+    return skillsets, behaviour, load_route(options.route)
+
+
+def write_account(path: Path, mission: MockedMission, lift_off_s: float | None) -> None:
+    """Write ``mock.json``; times are mission clock, but for ``wall_s``."""
+    simulated_s = mission.world.now_s
+    content = {
+        "simulated_s": simulated_s,
+        "wall_s": mission.wall_s,
+        "factor": simulated_s / mission.wall_s,
+        "lift_off_s": lift_off_s,
+        "faults": [{"sensor": name, "mode": "mock", "t_s": when_s} for name, when_s in mission.play.faults.items()],
+        "notes": mission.notes,
+    }
+    write_json(path, content)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Fly; return the exit code."""
+    options = parse(sys.argv[1:] if arguments is None else arguments)
+    try:
+        skillsets, behaviour, route = prepare(options)
+        options.out.mkdir(parents=True, exist_ok=True)
+    except (SkillRuntimeError, RouteError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        return CANNOT_START
+    mission = MockedMission(skillsets, behaviour, route, faults=options.fail, seed=options.seed, out=options.out, scenario=options.scenario)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
+    end: End = mission.fly()
+    write_account(options.out / "mock.json", mission, mission.lift_off_s)
+    return EXIT_CODES[end.outcome]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,174 @@
+"""The mission over mocks in one process: the same tree and the same director as in the air, in virtual time, without ROS."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from skill_language.model import Skillset
+from skill_missions.director import Director, End, Outcome
+from skill_missions.pending import PendingInterrupts
+from skill_missions.skillset import Handle
+from skill_runtime.core.events import EngineEvent
+from skill_runtime.local import LocalClient, LocalWorld, event_record
+from skill_runtime.mock import Behaviour, Play, mock_world
+from uav_missions.blackboard import RouteBlackboard
+from uav_missions.mapping import Clients, MappingMission, Settings
+from uav_missions.record import MissionRecord
+from uav_missions.route import Route
+
+TICK_PERIOD_S = 0.1
+LATENCY_S = 0.005
+LIMIT_S = 3600.0
+"""Mission clock after which a mission that goes round in circles is aborted, and after which twice it is left."""
+
+
+@dataclass(frozen=True)
+class FaultRequest:
+    """A fault of the behaviour, seconds after its anchor (lift-off); None: at the beginning."""
+
+    name: str
+    after_s: float | None
+
+
+class _Waking:
+    """A skillset's client that has the tree ticked at once when an execution ends or a resource changes."""
+
+    def __init__(self, client: LocalClient, wake: Callable[[], None]) -> None:
+        self.skillset = client.skillset
+        self._client = client
+        self._wake = wake
+        client.on_change(lambda _: wake())
+
+    @property
+    def ready(self) -> bool:
+        """Tell whether it can be called."""
+        return self._client.ready
+
+    @property
+    def resources(self) -> Mapping[str, str]:
+        """State of every resource."""
+        return self._client.resources
+
+    def start(self, skill: str, **inputs: object) -> Handle:
+        """Start an execution."""
+        handle = self._client.start(skill, **inputs)
+        handle.add_done_callback(lambda _: self._wake())
+        return handle
+
+
+class MockedMission:
+    """A mission from power-up to its end.
+
+    Args:
+        skillsets: the drone's.
+        behaviour: of the mocks.
+        route: to be flown.
+        faults: what fails on the way.
+        seed: of the behaviour's chance.
+        out: the run's folder; None leaves nothing behind.
+        tick_period_s: of the tree, besides the ticks after events; 10 Hz as in the air.
+        latency_s: of each message between mission and managers.
+    """
+
+    def __init__(
+        self,
+        skillsets: Sequence[Skillset],
+        behaviour: Behaviour,
+        route: Route,
+        *,
+        faults: Sequence[FaultRequest] = (),
+        seed: int = 0,
+        out: Path | None = None,
+        scenario: str = "mapping",
+        tick_period_s: float = TICK_PERIOD_S,
+        latency_s: float = LATENCY_S,
+        settings: Settings | None = None,
+    ) -> None:
+        self.world: LocalWorld
+        self.play: Play
+        self.world, self.play = mock_world(skillsets, behaviour, seed=seed, latency_s=latency_s)
+        self.events: list[tuple[str, EngineEvent]] = []
+        self.wall_s = 0.0
+        for fault in faults:
+            self.play.fail(fault.name, fault.after_s)
+        self._tick_period_s = tick_period_s
+        self._record = None if out is None else MissionRecord(out, scenario, route)
+        self._due = False
+        self._abort_reasons: list[str] = []
+        clients = {skillset.name: _Waking(self.world.client(skillset.name), self._wake) for skillset in skillsets}
+        clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
+        blackboard = RouteBlackboard(clock_ns=clock_ns, route=route, pending=PendingInterrupts(clock_ns))
+        skills = Clients(clients["navigation"], clients["perception"], clients["mapping"])
+        self.director = Director(MappingMission(skills, blackboard, settings), blackboard)
+        self.world.on_event(self._on_event)
+
+    def fly(self) -> End:
+        """Fly to the end; time is that of the world, so this takes a moment."""
+        begun = time.perf_counter()
+        self._tick_regularly()
+        over = lambda: self.director.end is not None  # noqa: E731
+        if not self.world.run_until(over, timeout_s=LIMIT_S):
+            self.director.abort(f"not over after {LIMIT_S:g} s")
+            self.world.run_until(over, timeout_s=LIMIT_S)
+        self.world.run_for(0.0)
+        end = self.director.end or End(Outcome.ABORTED, "the landing did not end")
+        self.wall_s = time.perf_counter() - begun
+        if self._record is not None:
+            self._record.finish(end, self.director, self.world.now_s)
+        return end
+
+    def abort(self, reason: str) -> None:
+        """Have the mission stop and land at its next tick; may be called by a signal's handler."""
+        self._abort_reasons.append(reason)
+
+    @property
+    def open_executions(self) -> list[str]:
+        """Return what has not ended."""
+        return [str(execution) for managers in self.world.managers.values() for execution in managers.engine.executions]
+
+    @property
+    def landed(self) -> bool:
+        """Tell whether the vehicle is on the ground."""
+        return self.world.managers["navigation"].engine.resources["flight_status"].state == "ON_GROUND"
+
+    @property
+    def lift_off_s(self) -> float | None:
+        """When the vehicle first left the ground, seconds of mission clock."""
+        return None if self._record is None else self._record.lift_off_s
+
+    @property
+    def notes(self) -> list[str]:
+        """Return what went wrong in the mocks themselves."""
+        return [*self.world.errors, *self.play.stage.notes]
+
+    # --- ticks -------------------------------------------------------------------------------------------------------
+
+    def _tick_regularly(self) -> None:
+        if self.director.end is None:
+            self.world.clock.after(self._tick_period_s, self._tick_regularly)
+            self._wake()
+
+    def _wake(self) -> None:
+        """Have the tree ticked once after all that happens at this moment."""
+        if not self._due:
+            self._due = True
+            self.world.clock.soon(self._tick)
+
+    def _tick(self) -> None:
+        self._due = False
+        if self._abort_reasons:
+            self.director.abort(self._abort_reasons.pop())
+        try:
+            self.director.step()
+        except Exception as error:  # noqa: BLE001 - as in the air: whatever breaks in a tree, the vehicle has to come down
+            self.director.abort(f"the tree raised {type(error).__name__}: {error}")
+        self.director.remember()
+
+    def _on_event(self, skillset: str, event: EngineEvent) -> None:
+        self.events.append((skillset, event))
+        if self._record is not None:
+            self._record.note(event_record(skillset, event))
+        self._wake()
