@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from skill_language.model import Skillset
 from skill_runtime.core.engine import TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.execution import ExecutionState
-from skill_runtime.handle import SkillHandle
+from skill_runtime.handle import Handle
 from skill_runtime.local.data import DataReading
 from skill_runtime.local.managers import LocalManagers
 from skill_runtime.local.values import complete, fit
@@ -22,7 +22,7 @@ OnEvent = Callable[[str, EngineEvent], None]
 OnData = Callable[[object], None]
 
 
-class LocalHandle(SkillHandle):
+class LocalHandle(Handle[dict[str, Any], str]):
     """An execution that was asked for; its waiting lets virtual time pass."""
 
     def __init__(self, world: LocalWorld, skill: str, execution_id: str, interrupt: Callable[[], None]) -> None:
