@@ -89,9 +89,8 @@ make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup
 generate() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
     export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/skill_language"
-    rm -rf "$ALULA_STATE/generated.new"
-    python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated.new" &&
-      rm -rf "$ALULA_STATE/generated" && mv "$ALULA_STATE/generated.new" "$ALULA_STATE/generated" )
+    # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
+    python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune )
 }
 
 build_ros1() {

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from skill_missions.director import Outcome
+from skill_missions.mocked import FaultRequest, MockedMission
 from skill_runtime.core import ExecutionEvent
 from skill_runtime.mock import load_behaviour
-from uav_missions.mocked import FaultRequest, MockedMission
+from uav_missions.plan import mapping_plan
 from uav_missions.route import Route, load_route
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
@@ -44,7 +45,11 @@ SIDE_BY_SIDE = {"zed_depthmap", "lidar_mapping"}  # two skillsets are asked in o
 
 
 def make(*faults: FaultRequest, **options) -> MockedMission:
-    return MockedMission(SKILLSETS, BEHAVIOUR, Route(ROUTE), faults=faults, **options)
+    return MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(Route(ROUTE)), faults=faults, **options)
+
+
+def landed(mission: MockedMission) -> bool:
+    return mission.state("navigation", "flight_status") == "ON_GROUND"
 
 
 def executions(mission: MockedMission) -> list[tuple[str, str, str]]:
@@ -69,7 +74,7 @@ def comparable(story: list[tuple[str, str, str]]) -> list[object]:
 
 def test_losing_the_zed_is_flown_as_in_the_simulator():
     mission = make(FaultRequest("zed", 30.0))
-    assert mission.fly().outcome is Outcome.DEGRADED
+    assert mission.run().outcome is Outcome.DEGRADED
     assert comparable(executions(mission)) == comparable(SIMULATED)
     lift_off_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "IN_AIR")
     lost_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "BROKEN")
@@ -82,25 +87,25 @@ def test_losing_the_zed_is_flown_as_in_the_simulator():
 
 def test_a_nominal_flight_is_accomplished_in_the_time_that_it_takes_in_the_simulator():
     mission = make()
-    assert mission.fly().outcome is Outcome.ACCOMPLISHED
+    assert mission.run().outcome is Outcome.ACCOMPLISHED
     assert [skill for skill, _, _ in executions(mission)].count("goto_straight") == len(ROUTE)
     assert 90.0 < mission.world.now_s < 110.0  # 99 s from lift-off in the simulator, 4.5 s before
-    assert mission.landed
+    assert landed(mission)
     assert mission.open_executions == []
 
 
 def test_both_sensors_dead_is_given_up_and_landed():
     mission = make(FaultRequest("zed", 8.0), FaultRequest("lidar", 8.0))
-    end = mission.fly()
+    end = mission.run()
     assert end.outcome is Outcome.GIVEN_UP
     assert "zed_ok" in end.reason
     assert [skill for skill, _, _ in executions(mission)][-3:] == ["lidar_depthmap", "hover", "land"]
-    assert mission.landed
+    assert landed(mission)
 
 
 def test_a_lidar_that_is_broken_from_the_start_keeps_the_mission_on_the_ground():
     mission = make(FaultRequest("lidar", None))
-    end = mission.fly()
+    end = mission.run()
     assert end.outcome is Outcome.NOT_STARTED
     assert "LiDAR is broken" in end.reason
     assert executions(mission) == []
@@ -109,15 +114,15 @@ def test_a_lidar_that_is_broken_from_the_start_keeps_the_mission_on_the_ground()
 def test_an_abort_lands_first():
     mission = make()
     mission.world.clock.after(20.0, lambda: mission.abort("operator"))
-    end = mission.fly()
+    end = mission.run()
     assert (end.outcome, end.reason) == (Outcome.ABORTED, "operator")
     assert executions(mission)[-1] == ("land", "TERMINATED", "LANDED")
 
 
 def test_the_same_seed_flies_the_same_flight():
     first, second = make(FaultRequest("zed", 40.0), seed=5), make(FaultRequest("zed", 40.0), seed=5)
-    first.fly()
-    second.fly()
+    first.run()
+    second.run()
     assert [event for _, event in first.events] == [event for _, event in second.events]
 
 
@@ -131,9 +136,9 @@ def test_a_campaign_always_comes_to_an_end_and_down():
     for seed in range(150):
         chance = random.Random(seed)  # noqa: S311 - no secret
         faults = [FaultRequest(name, chance.uniform(0.0, 110.0)) for name in chance.sample(["zed", "lidar"], chance.randint(0, 2))]
-        mission = MockedMission(SKILLSETS, troubles, Route(ROUTE), faults=faults, seed=seed, tick_period_s=1.0)
-        outcomes[mission.fly().outcome] += 1
-        assert mission.landed, seed
+        mission = MockedMission(SKILLSETS, troubles, mapping_plan(Route(ROUTE)), faults=faults, seed=seed, tick_period_s=1.0)
+        outcomes[mission.run().outcome] += 1
+        assert landed(mission), seed
         assert mission.open_executions == [], seed
         assert set(ends(mission).values()) <= {1}, seed
         assert mission.world.errors == [], seed

@@ -16,12 +16,12 @@ from pathlib import Path
 from skill_language.model import Skillset
 from skill_missions.director import EXIT_CODES, End, Outcome
 from skill_missions.files import write_json
+from skill_missions.mocked import FaultRequest, MockedMission
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock import Behaviour, load_behaviour
-from uav_missions.mocked import FaultRequest, MockedMission
+from uav_missions.plan import SKILLSETS, mapping_plan, write_route
 from uav_missions.route import Route, RouteError, load_route
 
-SKILLSETS = ("navigation", "perception", "mapping")
 CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
 
 
@@ -83,14 +83,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         skillsets, behaviour, route = prepare(options)
         options.out.mkdir(parents=True, exist_ok=True)
+        write_route(options.out, route)
     except (SkillRuntimeError, RouteError, OSError) as error:
         sys.stderr.write(f"{error}\n")
         return CANNOT_START
-    mission = MockedMission(skillsets, behaviour, route, faults=options.fail, seed=options.seed, out=options.out, scenario=options.scenario)
+    mission = MockedMission(skillsets, behaviour, mapping_plan(route), faults=options.fail, seed=options.seed, out=options.out)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
-    end: End = mission.fly()
-    write_account(options.out / "mock.json", mission, mission.lift_off_s)
+    end: End = mission.run()
+    write_account(options.out / "mock.json", mission, mission.departure_s)
     return EXIT_CODES[end.outcome]
 
 

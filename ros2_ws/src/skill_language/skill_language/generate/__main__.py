@@ -13,7 +13,7 @@ from pathlib import Path
 
 from skill_language.errors import Diagnostic, LanguageError
 from skill_language.generate.robot_files import robot_files
-from skill_language.generate.writer import write_files
+from skill_language.generate.writer import prune, write_files
 from skill_language.load import load_robot
 from skill_language.model import Span
 
@@ -23,10 +23,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="alula generate", description="Make interfaces, managers and the bridge's configuration.")
     parser.add_argument("robots", nargs="+", metavar="FOLDER", type=Path, help="a robot: *.skill, types.yaml, bindings.yaml")
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder to put packages and configurations into")
+    parser.add_argument("--prune", action="store_true", help="remove whatever else is in DIR: what is left of models that are gone")
     options = parser.parse_args(arguments)
     try:
         files = _all_files(options.robots)
         changed = write_files(files, options.out)
+        if options.prune:
+            prune(files, options.out)
     except LanguageError as error:
         sys.stderr.write(f"{error}\n")
         return 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,6 +33,19 @@ def write_files(files: Mapping[str, str], out: Path) -> list[str]:
         for entry in changed:
             _replace(Path(staging, "new", entry), out / entry, Path(staging, f"old-{entry}"))
     return changed
+
+
+def prune(files: Mapping[str, str], out: Path) -> None:
+    """Remove every entry of a folder that holds none of these files.
+
+    Raises:
+        OSError: one can't be removed.
+    """
+    wanted = {path.split("/", 1)[0] for path in files}
+    for entry in out.iterdir():
+        if entry.name in wanted:
+            continue
+        shutil.rmtree(entry) if entry.is_dir() and not entry.is_symlink() else entry.unlink()
 
 
 def _replace(new: Path, place: Path, aside: Path) -> None:

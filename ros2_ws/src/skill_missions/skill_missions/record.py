@@ -1,4 +1,4 @@
-"""What a mission leaves in the run's folder, whatever middleware it flew over."""
+"""What a mission leaves in the run's folder, whatever middleware it ran over."""
 
 from __future__ import annotations
 
@@ -8,22 +8,20 @@ from pathlib import Path
 from skill_missions.director import Director, End, Outcome
 from skill_missions.drawing import draw
 from skill_missions.files import EventLog, write_json, write_text
-from uav_missions.route import Route
+from skill_missions.plan import MissionPlan
 
 UNENDED_STATES = ("REQUESTED", "RUNNING")
 
 
 class MissionRecord:
-    """Writes ``route.json`` and ``mission.json`` at once, ``events.jsonl`` on the way, ``tree.json`` and ``tree.svg`` at the end."""
+    """Writes ``mission.json`` at once, ``events.jsonl`` on the way, ``tree.json`` and ``tree.svg`` at the end."""
 
-    def __init__(self, out: Path, scenario: str, route: Route) -> None:
+    def __init__(self, out: Path, plan: MissionPlan) -> None:
         self._out = out
-        self._scenario = scenario
-        self._route = route
-        self._lift_off_s: float | None = None
+        self._plan = plan
+        self._departure_s: float | None = None
         self._unended: set[str] = set()
         self._events = EventLog(out / "events.jsonl")
-        write_json(out / "route.json", {"frame": "map", "route": [list(waypoint) for waypoint in route.waypoints]})
         # So that a mission that is killed leaves one that says `running`.
         self._write_mission(End(Outcome.RUNNING), None, None)
 
@@ -33,9 +31,9 @@ class MissionRecord:
         return bool(self._unended)
 
     @property
-    def lift_off_s(self) -> float | None:
-        """When the vehicle first left the ground, seconds of mission clock."""
-        return self._lift_off_s
+    def departure_s(self) -> float | None:
+        """When the plan's state of departure was left first, seconds of mission clock."""
+        return self._departure_s
 
     def note(self, record: Mapping[str, object]) -> None:
         """Write an event."""
@@ -43,26 +41,25 @@ class MissionRecord:
         if record.get("skill"):
             change = self._unended.add if record["state"] in UNENDED_STATES else self._unended.discard
             change(str(record["id"]))
-        if record.get("resource") == "flight_status" and record["from_state"] == "ON_GROUND" and self._lift_off_s is None:
-            self._lift_off_s = float(str(record["stamp_s"]))
+        if self._departure_s is None and self._plan.departure == (record.get("resource"), record.get("from_state")):
+            self._departure_s = float(str(record["stamp_s"]))
 
     def finish(self, end: End, director: Director, end_s: float) -> None:
         """Write what is left to write."""
         view = director.view()
         write_json(self._out / "tree.json", view.as_dict())
-        write_text(self._out / "tree.svg", draw(view, f"Mission {self._scenario}: {end.outcome.value.replace('_', ' ')}"))
+        write_text(self._out / "tree.svg", draw(view, f"Mission {self._plan.scenario}: {end.outcome.value.replace('_', ' ')}"))
         self._events.close()
         self._write_mission(end, director.start_s, end_s)
 
     def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
         content = {
-            "scenario": self._scenario,
+            "scenario": self._plan.scenario,
             "outcome": end.outcome.value,
             "reason": end.reason,
             "start_s": start_s,
-            "lift_off_s": self._lift_off_s,
+            "lift_off_s": self._departure_s,
             "end_s": end_s,
-            "waypoints": len(self._route.waypoints),
-            "waypoints_reached": self._route.reached,
+            **self._plan.facts(),
         }
         write_json(self._out / "mission.json", content)

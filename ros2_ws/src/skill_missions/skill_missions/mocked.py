@@ -1,4 +1,4 @@
-"""The mission over mocks in one process: the same tree and the same director as in the air, in virtual time, without ROS."""
+"""The mission over mocks in one process: the same tree and the same director as over ROS 2, in virtual time, without ROS."""
 
 from __future__ import annotations
 
@@ -9,15 +9,12 @@ from pathlib import Path
 
 from skill_language.model import Skillset
 from skill_missions.director import Director, End, Outcome
-from skill_missions.pending import PendingInterrupts
+from skill_missions.plan import MissionPlan
+from skill_missions.record import MissionRecord
 from skill_missions.skillset import Handle
 from skill_runtime.core.events import EngineEvent
 from skill_runtime.local import LocalClient, LocalWorld, event_record
 from skill_runtime.mock import Behaviour, Play, mock_world
-from uav_missions.blackboard import RouteBlackboard
-from uav_missions.mapping import Clients, MappingMission, Settings
-from uav_missions.record import MissionRecord
-from uav_missions.route import Route
 
 TICK_PERIOD_S = 0.1
 LATENCY_S = 0.005
@@ -27,7 +24,7 @@ LIMIT_S = 3600.0
 
 @dataclass(frozen=True)
 class FaultRequest:
-    """A fault of the behaviour, seconds after its anchor (lift-off); None: at the beginning."""
+    """A fault of the behaviour, seconds after its anchor; None: at the beginning."""
 
     name: str
     after_s: float | None
@@ -63,13 +60,13 @@ class MockedMission:
     """A mission from power-up to its end.
 
     Args:
-        skillsets: the drone's.
+        skillsets: those that the plan names.
         behaviour: of the mocks.
-        route: to be flown.
+        plan: the mission.
         faults: what fails on the way.
         seed: of the behaviour's chance.
         out: the run's folder; None leaves nothing behind.
-        tick_period_s: of the tree, besides the ticks after events; 10 Hz as in the air.
+        tick_period_s: of the tree, besides the ticks after events; 10 Hz as over ROS 2.
         latency_s: of each message between mission and managers.
     """
 
@@ -77,15 +74,13 @@ class MockedMission:
         self,
         skillsets: Sequence[Skillset],
         behaviour: Behaviour,
-        route: Route,
+        plan: MissionPlan,
         *,
         faults: Sequence[FaultRequest] = (),
         seed: int = 0,
         out: Path | None = None,
-        scenario: str = "mapping",
         tick_period_s: float = TICK_PERIOD_S,
         latency_s: float = LATENCY_S,
-        settings: Settings | None = None,
     ) -> None:
         self.world: LocalWorld
         self.play: Play
@@ -95,18 +90,17 @@ class MockedMission:
         for fault in faults:
             self.play.fail(fault.name, fault.after_s)
         self._tick_period_s = tick_period_s
-        self._record = None if out is None else MissionRecord(out, scenario, route)
+        self._record = None if out is None else MissionRecord(out, plan)
         self._due = False
         self._abort_reasons: list[str] = []
         clients = {skillset.name: _Waking(self.world.client(skillset.name), self._wake) for skillset in skillsets}
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
-        blackboard = RouteBlackboard(clock_ns=clock_ns, route=route, pending=PendingInterrupts(clock_ns))
-        skills = Clients(clients["navigation"], clients["perception"], clients["mapping"])
-        self.director = Director(MappingMission(skills, blackboard, settings), blackboard)
+        mission, blackboard = plan.make(clients, clock_ns, plan.parameters)
+        self.director = Director(mission, blackboard)
         self.world.on_event(self._on_event)
 
-    def fly(self) -> End:
-        """Fly to the end; time is that of the world, so this takes a moment."""
+    def run(self) -> End:
+        """Run to the end; time is that of the world, so this takes a moment."""
         begun = time.perf_counter()
         self._tick_regularly()
         over = lambda: self.director.end is not None  # noqa: E731
@@ -114,14 +108,14 @@ class MockedMission:
             self.director.abort(f"not over after {LIMIT_S:g} s")
             self.world.run_until(over, timeout_s=LIMIT_S)
         self.world.run_for(0.0)
-        end = self.director.end or End(Outcome.ABORTED, "the landing did not end")
+        end = self.director.end or End(Outcome.ABORTED, "the stop did not end")
         self.wall_s = time.perf_counter() - begun
         if self._record is not None:
             self._record.finish(end, self.director, self.world.now_s)
         return end
 
     def abort(self, reason: str) -> None:
-        """Have the mission stop and land at its next tick; may be called by a signal's handler."""
+        """Have the robot stop at the next tick; may be called by a signal's handler."""
         self._abort_reasons.append(reason)
 
     @property
@@ -129,15 +123,14 @@ class MockedMission:
         """Return what has not ended."""
         return [str(execution) for managers in self.world.managers.values() for execution in managers.engine.executions]
 
-    @property
-    def landed(self) -> bool:
-        """Tell whether the vehicle is on the ground."""
-        return self.world.managers["navigation"].engine.resources["flight_status"].state == "ON_GROUND"
+    def state(self, skillset: str, resource: str) -> str:
+        """Return the state of a resource."""
+        return self.world.managers[skillset].engine.resources[resource].state
 
     @property
-    def lift_off_s(self) -> float | None:
-        """When the vehicle first left the ground, seconds of mission clock."""
-        return None if self._record is None else self._record.lift_off_s
+    def departure_s(self) -> float | None:
+        """When the plan's state of departure was left first, seconds of mission clock; None also without a record."""
+        return None if self._record is None else self._record.departure_s
 
     @property
     def notes(self) -> list[str]:
@@ -163,7 +156,7 @@ class MockedMission:
             self.director.abort(self._abort_reasons.pop())
         try:
             self.director.step()
-        except Exception as error:  # noqa: BLE001 - as in the air: whatever breaks in a tree, the vehicle has to come down
+        except Exception as error:  # noqa: BLE001 - as over ROS 2: whatever breaks in a tree, the robot has to come to rest
             self.director.abort(f"the tree raised {type(error).__name__}: {error}")
         self.director.remember()
 

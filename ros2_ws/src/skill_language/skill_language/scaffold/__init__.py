@@ -1,0 +1,1 @@
+"""Working skeletons to begin with: ``./alula new robot NAME``."""
