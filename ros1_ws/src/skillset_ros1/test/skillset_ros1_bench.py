@@ -47,8 +47,17 @@ class Recorder(SkillHooks):
         value = self._note("progress", execution)
         return 0.5 if value is None else value
 
-    def on_interrupt(self, execution) -> None:
-        self._note("on_interrupt", execution)
+    def on_interrupt(self, execution) -> bool | None:
+        return self._note("on_interrupt", execution)
+
+    def on_emergency(self, execution) -> None:
+        self._note("on_emergency", execution)
+
+    def on_pause(self, execution) -> str | None:
+        return self.acts["on_pause"](execution) if "on_pause" in self.acts else super().on_pause(execution)
+
+    def on_resume(self, execution) -> str | None:
+        return self.acts["on_resume"](execution) if "on_resume" in self.acts else super().on_resume(execution)
 
     def on_violation(self, execution) -> None:
         self._note("on_violation", execution)
