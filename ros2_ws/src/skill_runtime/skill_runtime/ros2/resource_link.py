@@ -38,9 +38,10 @@ class LinkUser(Protocol):
 class ResourceLink:
     """Says hello until it is welcome, and anew when the resource manager has gone."""
 
-    def __init__(self, node: Node, skillset: str, skill: str, user: LinkUser) -> None:
+    def __init__(self, node: Node, skillset: str, skill: str, user: LinkUser, on_welcome: Callable[[], None]) -> None:
         self._name = f"the resource manager of {skillset}"
         self._user = user
+        self._on_welcome = on_welcome
         self._manager = ""
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
@@ -111,6 +112,7 @@ class ResourceLink:
             self._manager = manager
         self._end.trust()
         self._timer.cancel()
+        self._on_welcome()
 
     def _lose(self, reason: str) -> None:
         with self._lock:

@@ -58,29 +58,26 @@ class SkillNode(Node):  # type: ignore[misc]  # rclpy has no types
 
     def __init__(self, skillset: Skillset, skill: str, interfaces: ModuleType, hooks_factory: HooksFactory, **node_options: Any) -> None:
         super().__init__(f"{skillset.name}_{skill}", **node_options)
-        model = skillset.skill(skill)
+        self._model = skillset.skill(skill)
         self.served_skills = (skill,)
         self.workers = Workers(f"{skillset.name}_{skill}_hooks", self.get_logger().error)
-        hooks = hooks_factory(self)[skill]
-        action = action_type(interfaces, skill)
-
-        def inputs_from(values: Mapping[str, object]) -> object:
-            return inputs_from_values(hooks, action, skill, values)
-
+        self._hooks = hooks_factory(self)[skill]
+        self._action = action_type(interfaces, skill)
         self.engine = RemoteEngine(
             skillset,
             skill,
-            hooks,
+            self._hooks,
             self.workers,
             listener=self._on_event,
-            inputs_from=inputs_from,
+            inputs_from=self._inputs_from,
             on_error=self.get_logger().error,
         )
         # On a thread of its own, so that whoever waits for a reply, also on this node's executor, gets it.
         options = {name: value for name, value in node_options.items() if name in {"namespace", "context"}}
         self._link_node = Node(f"{skillset.name}_{skill}_link", enable_rosout=False, start_parameter_services=False, **options)
-        self.engine.link = ResourceLink(self._link_node, skillset.name, skill, self.engine)
-        self._manager = SkillManager(self, self.engine, model, action, hooks, self.workers.submit)
+        self._manager: SkillManager | None = None
+        self._welcome = self.create_guard_condition(self._serve)
+        self.engine.link = ResourceLink(self._link_node, skillset.name, skill, self.engine, self._welcome.trigger)
         self._link_executor = SingleThreadedExecutor(context=self.context)
         self._link_executor.add_node(self._link_node)
         self._link_thread = threading.Thread(target=self._spin_link, name="link", daemon=True)
@@ -91,8 +88,17 @@ class SkillNode(Node):  # type: ignore[misc]  # rclpy has no types
         """Tell whether the resource manager is there."""
         return self.engine.link.connected
 
+    def _serve(self) -> None:
+        """Serve the action from the first welcome on: who finds it there can call the skill."""
+        if self._manager is None:
+            self._manager = SkillManager(self, self.engine, self._model, self._action, self._hooks, self.workers.submit)
+
     def _on_event(self, event: ExecutionEvent) -> None:
-        self._manager.on_event(event)
+        if self._manager is not None:
+            self._manager.on_event(event)
+
+    def _inputs_from(self, values: Mapping[str, object]) -> object:
+        return inputs_from_values(self._hooks, self._action, self._model.name, values)
 
     def close(self, reason: str) -> None:
         """Fail whatever runs here for this reason, so that functions are stopped."""
