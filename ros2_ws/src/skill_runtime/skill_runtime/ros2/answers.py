@@ -14,7 +14,7 @@ from skillset_interfaces.srv import Why as WhyService
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.pauses import PauseReply
 from skill_runtime.core.why import Why
-from skill_runtime.ros2.convert import to_plain
+from skill_runtime.plain import to_plain
 from skill_runtime.ros2.deferred import Answer
 from skill_runtime.ros2.workers import Workers
 

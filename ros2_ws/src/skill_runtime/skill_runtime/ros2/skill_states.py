@@ -14,7 +14,7 @@ from skillset_interfaces.msg import SkillExecution, SkillState, SkillStates
 from skill_language.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.records import ExecutionRecord, Records, SkillRecord
-from skill_runtime.ros2.convert import to_plain
+from skill_runtime.plain import to_plain
 from skill_runtime.ros2.names import LATCHED
 
 TOGETHER_S = 0.02
