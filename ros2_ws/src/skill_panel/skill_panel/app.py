@@ -9,13 +9,12 @@ from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
-from textual.content import Content
-from textual.widgets import Button, DataTable, Footer, Header, RichLog, Static, Tab, Tabs
+from textual.widgets import Button, DataTable, Footer, Header, RichLog, Static
 
 from skill_panel.form import FormError, fields, values
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watched
-from skill_panel.widgets import FORM_KEYS, DataLines, ResourceLine, ResourceList, SkillForm, SkillTable
+from skill_panel.widgets import FORM_KEYS, DataLines, ResourceLine, ResourceList, SkillForm, SkillsetBar, SkillTable
 
 REFRESH_S = 0.1
 NOBODY = """No skillset is running {where}.
@@ -68,7 +67,7 @@ class Panel(App[None]):
     def compose(self) -> ComposeResult:
         """Lay out the screen."""
         yield Header()
-        yield Tabs(id="skillsets")
+        yield SkillsetBar(id="skillsets")
         yield Static(id="nobody")
         with Horizontal(id="middle"):
             with Vertical(id="left"):
@@ -88,7 +87,6 @@ class Panel(App[None]):
 
     async def on_mount(self) -> None:
         """Begin to show what is heard."""
-        self.query_one(Tabs).can_focus = False
         self.query_one("#log", RichLog).can_focus = False
         await self._refresh()
         self.set_interval(REFRESH_S, self._refresh)
@@ -103,7 +101,7 @@ class Panel(App[None]):
     async def _refresh(self) -> None:
         """Show what has changed."""
         watched = self._source.watched
-        await self._refresh_tabs([one.root for one in watched])
+        self._refresh_bar([one.root for one in watched])
         somebody = bool(watched)
         for name in ("skillsets", "middle", "log"):
             self.query_one(f"#{name}").display = somebody
@@ -117,15 +115,10 @@ class Panel(App[None]):
         others = "".join(f"{line}\n" for line in (*self._source.problems, *self._others))
         return NOBODY.format(where=self._where, others=f"{others}\n" if others else "")
 
-    async def _refresh_tabs(self, roots: Sequence[str]) -> None:
-        tabs = self.query_one(Tabs)
-        known = [tab.label_text for tab in tabs.query(Tab)]
-        for root in roots:
-            if root not in known:
-                await tabs.add_tab(Tab(Content(root), id=f"tab{len(known)}"))
-                known.append(root)
+    def _refresh_bar(self, roots: Sequence[str]) -> None:
         if self._root not in roots and roots:
             self._choose(roots[0])
+        self.query_one(SkillsetBar).show(roots, self._root)
 
     def _choose(self, root: str) -> None:
         self._root, self._logged, self._shown = root, 0, ("", "")
@@ -166,10 +159,9 @@ class Panel(App[None]):
 
     # --- what is wanted ----------------------------------------------------------------------------------------------
 
-    def on_tabs_tab_activated(self, event: Tabs.TabActivated) -> None:
+    def on_skillset_bar_wanted(self, event: SkillsetBar.Wanted) -> None:
         """Show another skillset."""
-        if event.tab.label_text != self._root:
-            self._choose(event.tab.label_text)
+        self._choose(event.root)
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
         """Go to the inputs of the skill; start it where it has none."""
@@ -235,9 +227,7 @@ class Panel(App[None]):
         """Show the next or the previous skillset."""
         roots = [one.root for one in self._source.watched]
         if self._root in roots:
-            root = roots[(roots.index(self._root) + step) % len(roots)]
-            tab = next(tab for tab in self.query(Tab) if tab.label_text == root)
-            self.query_one(Tabs).active = tab.id or ""
+            self._choose(roots[(roots.index(self._root) + step) % len(roots)])
 
     @property
     def _skill(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
+from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -25,6 +26,29 @@ def bar(progress: float | None) -> str:
         return ""
     done = round(min(1.0, max(0.0, progress)) * BAR_WIDTH)
     return f"{'█' * done}{'░' * (BAR_WIDTH - done)} {progress:4.0%}"
+
+
+class SkillsetBar(Static):
+    """The skillsets in one line, the one on the screen marked; a click chooses another."""
+
+    class Wanted(Message):
+        """Another skillset was chosen."""
+
+        def __init__(self, root: str) -> None:
+            super().__init__()
+            self.root = root
+
+    def show(self, roots: Sequence[str], current: str) -> None:
+        """Show the names."""
+        text = Text()
+        for root in roots:
+            text.append(f" {root} ", Style(reverse=root == current, bold=root == current, meta={"@click": f"choose({root!r})"}))
+            text.append(" ")
+        self.update(text)
+
+    def action_choose(self, root: str) -> None:
+        """Ask for a skillset."""
+        self.post_message(self.Wanted(root))
 
 
 class SkillTable(DataTable[Text]):

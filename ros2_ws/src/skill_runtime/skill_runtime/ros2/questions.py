@@ -32,7 +32,7 @@ class Question:
         self._again_s = again_s
         self._patience_s = patience_s
         self._tries = 0
-        self._asked_s = float("-inf")
+        self._due_s = time.monotonic()
         self._ends_s = time.monotonic() + patience_s
 
     @property
@@ -46,8 +46,8 @@ class Question:
         if now_s > self._ends_s:
             there = "did not answer" if self._client.service_is_ready() else "is not there"
             self._pending.fail(f"service {self._client.srv_name} {there} within {self._patience_s:g} s")
-        elif now_s - self._asked_s > self._again_s and self._client.service_is_ready():
-            self._asked_s = now_s
+        elif now_s >= self._due_s and self._client.service_is_ready():
+            self._due_s = now_s + self._again_s
             self._tries += 1
             self._client.call_async(self._request).add_done_callback(self._take)
 
