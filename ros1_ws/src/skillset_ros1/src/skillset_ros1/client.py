@@ -11,18 +11,22 @@ from skillset_interfaces.srv import Why as WhyService
 
 from skill_language.model import Skillset
 from skill_runtime.core.execution import ExecutionState
+from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
+from skill_runtime.messages import why_of
 from skill_runtime.plain import to_plain
-from skill_runtime.views import DataReading, Forget, PastTransition, SkillsetView, TransitionAnswer, Unmet, Why
+from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer
 from skill_runtime.waiting import Pending
 from skillset_ros1.convert import fields_of, fill
 from skillset_ros1.feed import TopicFeed
 from skillset_ros1.names import place
 from skillset_ros1.pursuit import Pursuit, outputs_of, result_of
+from skillset_ros1.questions import HOOK_PATIENCE_S
 from skillset_ros1.session import Session
 
 OnChange = Callable[[dict[str, str]], None]
 OnEvent = Callable[[Any], None]
+OnSkills = Callable[[dict[str, Any]], None]
 
 
 class SkillsetClient:
@@ -96,7 +100,7 @@ class SkillsetClient:
         if not self.ready:
             return self._stillborn(skill)
         session = self._session
-        pursuit = Pursuit(self.skillset, skill, session.links[skill], session.do, self._set_paused, session)
+        pursuit = Pursuit(self.skillset, skill, session.links[skill], session.do, self.set_paused, session)
         return pursuit.handle if session.pursue(pursuit, goal) else self._stillborn(skill)
 
     def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
@@ -112,6 +116,15 @@ class SkillsetClient:
         result = result_of(self._session.links[skill].types.result, skill, known[1])
         return Ended(skill, known[1].id, ExecutionState(result.outcome), result.result, result.message, outputs_of(result))
 
+    def on_skills(self, callback: OnSkills) -> Forget:
+        """Have ``callback(skills)`` called after changes, with a skillset_interfaces/SkillState by skill; the return value ends that."""
+        return self._subscribe(self._session.on_skills, callback)
+
+    @property
+    def skills(self) -> dict[str, Any]:
+        """Return the skillset_interfaces/SkillState of every skill: what runs, and what ended last; empty until they were heard."""
+        return dict(self._session.skills)
+
     def why(self, skill: str, inputs: Mapping[str, object] | None = None) -> Pending[Why]:
         """Ask whether the skill could start now, and if not, why not; with inputs, its ``validate`` is asked, too.
 
@@ -121,7 +134,12 @@ class SkillsetClient:
         self._check_skill(skill)
         inputs_json = "" if inputs is None else json.dumps(to_plain(self._goal(skill, inputs)))
         request = WhyRequest(skill=skill, inputs_json=inputs_json)
-        return self._questions.ask("why", WhyService, request, lambda response: _why(skill, response))
+        return self._questions.ask("why", WhyService, request, lambda response: why_of(skill, response), patience_s=HOOK_PATIENCE_S)
+
+    def set_paused(self, execution_id: str, paused: bool) -> Pending[str]:  # noqa: FBT001 - as the service has it
+        """Ask for a pause or a resumption; the answer is "", or why not."""
+        request, answer = SetPausedRequest(id=execution_id, paused=paused), lambda response: "" if response.accepted else response.reason
+        return self._questions.ask("pause", SetPaused, request, answer, patience_s=HOOK_PATIENCE_S)
 
     def transition(self, resource: str, to: str) -> Pending[TransitionAnswer]:
         """Ask for an extern transition, as the functional layer does."""
@@ -162,7 +180,7 @@ class SkillsetClient:
 
         def cancel() -> None:
             self._session.links[skill].cancel_all()
-            answer.resolve(self._session.running.get(skill, 0))
+            answer.resolve(len(self._session.skills[skill].open) if skill in self._session.skills else 0)
 
         self._session.do(cancel)
         return answer
@@ -190,10 +208,6 @@ class SkillsetClient:
 
         return forget
 
-    def _set_paused(self, identifier: str, paused: bool) -> Pending[str]:  # noqa: FBT001 - as the handle calls it
-        request = SetPausedRequest(id=identifier, paused=paused)
-        return self._questions.ask("pause", SetPaused, request, lambda response: "" if response.accepted else response.reason)
-
     def _check_skill(self, skill: str) -> None:
         known = [known.name for known in self.model.skills]
         if skill not in known:
@@ -214,9 +228,3 @@ class SkillsetClient:
         handle = SkillHandle(skill, "", host=self._session)
         handle.fail(f"the managers of {self.skillset} are not there")
         return handle
-
-
-def _why(skill: str, response: Any) -> Why:
-    unmet = tuple(Unmet(one.name, one.condition, one.reason) for one in response.unmet)
-    history = tuple(PastTransition(t.stamp_ns, t.resource, t.from_state, t.to_state, t.cause) for t in response.history)
-    return Why(skill, response.ready, response.reason, unmet, history)

@@ -59,6 +59,7 @@ class SkillsetManagers:
         data_bindings: DataBindings | None = None,
         namespace: str = "",
     ) -> None:
+        self.skillset = skillset
         self.place = place(namespace, skillset.name)
         life = uuid.uuid4().hex[:12]
         timeout_s = _interrupt_timeout_s()

@@ -10,6 +10,8 @@ from skill_runtime.waiting import Host, Pending
 from skillset_ros1.calls import call
 
 PATIENCE_S = 5.0
+HOOK_PATIENCE_S = 15.0
+"""For what a hook has to answer: longer than the managers wait for it."""
 
 
 class Questions:
@@ -20,10 +22,10 @@ class Questions:
         self._host = host
         self._open: WeakSet[Pending[Any]] = WeakSet()
 
-    def ask(self, service: str, kind: Any, request: Any, settle: Callable[[Any], Any]) -> Pending[Any]:
+    def ask(self, service: str, kind: Any, request: Any, settle: Callable[[Any], Any], *, patience_s: float = PATIENCE_S) -> Pending[Any]:
         """Ask; ``settle(response)`` makes the answer. Never waits."""
         pending = self.moment()
-        call(f"{self._place}/{service}", kind, request, lambda r: pending.resolve(settle(r)), pending.fail, timeout_s=PATIENCE_S)
+        call(f"{self._place}/{service}", kind, request, lambda r: pending.resolve(settle(r)), pending.fail, timeout_s=patience_s)
         return pending
 
     def moment(self) -> Pending[Any]:

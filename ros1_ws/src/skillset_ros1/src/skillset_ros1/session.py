@@ -49,9 +49,10 @@ class Session:
         self.lock = threading.Lock()
         self.resources: dict[str, str] = {}
         self.last: dict[str, tuple[int, Any]] = {}
-        self.running: dict[str, int] = {}
+        self.skills: dict[str, Any] = {}
         self.links: dict[str, SkillLink] = {}
         self.on_changes: list[Callable[[dict[str, str]], None]] = []
+        self.on_skills: list[Callable[[dict[str, Any]], None]] = []
         self.on_events: list[Callable[[Any], None]] = []
         self.questions = Questions(place, self)
         self._place = place
@@ -142,10 +143,14 @@ class Session:
     def _on_skills(self, message: Any) -> None:
         if not self._heard(message.header.frame_id):
             return
-        self.running = {skill.name: len(skill.open) for skill in message.skills}
         for skill in message.skills:
             for execution in skill.last:
                 self._keep_last(skill.name, execution.ended_ns, execution)
+        with self.lock:
+            self.skills = {skill.name: skill for skill in message.skills}
+            callbacks = list(self.on_skills)
+        for callback in callbacks:
+            callback(dict(self.skills))
 
     def _on_event(self, event: Any) -> None:
         life = event.header.frame_id

@@ -18,10 +18,10 @@ from skillset_interfaces.srv import GetData, SetPaused, Transition
 from skillset_interfaces.srv import Why as WhyService
 
 from skill_language.model import Skillset
-from skill_runtime.core.events import TransitionEvent
 from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.why import Unmet, Why
+from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
+from skill_runtime.messages import why_of
 from skill_runtime.plain import to_plain
 from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.feed import TopicFeed
@@ -350,19 +350,3 @@ class SkillsetClient:
                 worker.tick()
         if not self._presence.restless and not any(worker.restless for worker in workers):
             self._timer.cancel()
-
-
-def why_of(skill: str, response: Any) -> Why:
-    """Return the managers' answer to ``why`` as they have it themselves."""
-    found = tuple(
-        Unmet(
-            one.name,
-            one.condition,
-            one.reason,
-            {resource.name: resource.state for resource in one.resources},
-            {data.name: json.loads(data.value_json) if data.value_json else None for data in one.data},
-        )
-        for one in response.unmet
-    )
-    history = tuple(TransitionEvent(0, e.stamp_ns, e.resource, e.from_state, e.to_state, e.cause) for e in response.history)
-    return Why(skill, response.ready, response.reason, response.refusal, found, history)
