@@ -1,7 +1,8 @@
-"""``python -m skillset_ros1``, with the README's hooks."""
+"""``python -m skillset_ros1`` as the README has it, and what it says of wrong words."""
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -10,26 +11,25 @@ from pathlib import Path
 import pytest
 from skillset_ros1_bench import SOON_S
 
-from skillset_ros1 import SkillsetClient
 from skillset_ros1.__main__ import main
 
-HERE = Path(__file__).parent
+README = Path(__file__).parents[1] / "README.md"
 
 
-def test_a_skillset_is_served(ros_master):
-    words = ["perception", "--hooks", "skillset_ros1_readme_hooks:make_hooks", "__ns:=/robot1"]
-    process = subprocess.Popen([sys.executable, "-m", "skillset_ros1", *words], cwd=HERE)
-    client = SkillsetClient("perception", namespace="/robot1")
+def test_the_readme_serves_and_calls_a_skillset(ros_master, tmp_path):
+    text = README.read_text(encoding="utf-8")
+    hooks, caller = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    (tmp_path / "my_hooks.py").write_text(hooks, encoding="utf-8")
+    command = re.search(r"^    python (-m skillset_ros1 .*?)  +#", text, re.MULTILINE)[1]
+    process = subprocess.Popen([sys.executable, *command.split()], cwd=tmp_path)
     try:
-        assert client.wait_ready(2 * SOON_S)
-        assert client.transition("lidar_status", "OK").get(SOON_S).accepted
-        handle = client.start("lidar_depthmap")
-        assert handle.wait(SOON_S)
-        assert (handle.outcome, handle.result) == ("TERMINATED", client.model.skill("lidar_depthmap").results[0].name)
+        called = subprocess.run([sys.executable, "-c", caller], capture_output=True, text=True, timeout=120, check=False)
+        said = called.stdout.strip().splitlines()
+        assert said, called.stderr
+        assert all(f"    {line}\n" in text for line in said), said
         process.send_signal(signal.SIGINT)
         assert process.wait(SOON_S) == 0
     finally:
-        client.close()
         process.kill()
         process.wait()
 
