@@ -13,7 +13,7 @@ from navigation_managers.model import SKILLSET
 from skill_runtime.hooks import SkillHooks
 from skillset_ros1 import SkillsetClient, SkillsetManagers
 
-SOON_S = 15.0
+SOON_S = 30.0
 FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
 NUMBERS = itertools.count()
 

@@ -53,19 +53,19 @@ class SkillsetClient:
         Raises:
             CannotWaitError: this is the client's own thread.
         """
-        return self.ready or self._session.wait(self._session.ready, timeout_s)
+        return self.ready or self._session.wait(self._session.reach.ready, timeout_s)
 
     @property
     def ready(self) -> bool:
         """Tell whether the managers are alive, known and can be called."""
-        return self._session.ready.is_set()
+        return self._session.reach.ready.is_set()
 
     @property
     def model(self) -> Skillset:
         """Return the model that the managers execute; raise RuntimeError before ``wait_ready``."""
-        if self._session.model is None:
+        if self._session.reach.model is None:
             raise RuntimeError(f"the managers of {self.skillset} have not described themselves yet; call wait_ready first")
-        return self._session.model
+        return self._session.reach.model
 
     @property
     def view(self) -> SkillsetView:
@@ -94,13 +94,13 @@ class SkillsetClient:
         Raises:
             ValueError: there is no such skill, or the inputs do not fit; nothing was sent.
         """
-        if self._session.model is None:
+        if self._session.reach.model is None:
             return self._stillborn(skill)
         goal = self._goal(skill, inputs)
         if not self.ready:
             return self._stillborn(skill)
         session = self._session
-        pursuit = Pursuit(self.skillset, skill, session.links[skill], session.do, self.set_paused, session)
+        pursuit = Pursuit(self.skillset, skill, session.reach.links[skill], session.do, self.set_paused, session)
         return pursuit.handle if session.pursue(pursuit, goal) else self._stillborn(skill)
 
     def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
@@ -113,7 +113,7 @@ class SkillsetClient:
         known = self._session.last.get(skill)
         if known is None:
             return None
-        result = result_of(self._session.links[skill].types.result, skill, known[1])
+        result = result_of(self._session.reach.links[skill].types.result, skill, known[1])
         return Ended(skill, known[1].id, ExecutionState(result.outcome), result.result, result.message, outputs_of(result))
 
     def on_skills(self, callback: OnSkills) -> Forget:
@@ -171,7 +171,7 @@ class SkillsetClient:
     def input_types(self, skill: str) -> dict[str, str]:
         """Return a skill's inputs with their ROS 1 types, as ``{"height": "float64"}``; raise ValueError."""
         self._check_skill(skill)
-        return fields_of(self._session.links[skill].types.goal)
+        return fields_of(self._session.reach.links[skill].types.goal)
 
     def interrupt_all(self, skill: str) -> Pending[int]:
         """Ask for the end of all executions of a skill, whoever asked for them; the answer is how many there were."""
@@ -179,7 +179,7 @@ class SkillsetClient:
         answer: Pending[int] = self._questions.moment()
 
         def cancel() -> None:
-            self._session.links[skill].cancel_all()
+            self._session.reach.links[skill].cancel_all()
             answer.resolve(len(self._session.skills[skill].open) if skill in self._session.skills else 0)
 
         self._session.do(cancel)
@@ -216,7 +216,7 @@ class SkillsetClient:
     def _goal(self, skill: str, inputs: Mapping[str, object]) -> Any:
         """Make the goal message; raise ValueError when skill or inputs are wrong."""
         self._check_skill(skill)
-        goal = self._session.links[skill].types.goal()
+        goal = self._session.reach.links[skill].types.goal()
         where = f"inputs of {self.skillset}.{skill}"
         fill(goal, inputs, where)
         missing = [name for name in fields_of(goal) if name not in inputs]

@@ -14,24 +14,17 @@ from typing import Any
 
 import rospy
 from skillset_interfaces.msg import Event, ResourceStates, SkillStates
-from skillset_interfaces.srv import Describe, DescribeRequest
 from std_msgs.msg import Header
 
-from skill_language.json_form import from_json
-from skill_language.model import Skillset
 from skill_runtime.core.execution import ExecutionState
 from skill_runtime.handle import SkillHandle
 from skill_runtime.waiting import CannotWaitError
-from skillset_ros1.calls import call
-from skillset_ros1.link import SkillLink, is_connected
-from skillset_ros1.names import action_types, interfaces_of
-from skillset_ros1.presence import DOUBT_S, Presence, Verdict
 from skillset_ros1.pursuit import Pursuit
 from skillset_ros1.questions import Questions
+from skillset_ros1.reach import Reach
 
 TICK_S = 0.02
 IDLE_S = 0.25
-DESCRIBE_S = 5.0
 END_S = 1.0
 Job = Callable[[], None]
 
@@ -44,22 +37,16 @@ class Session:
 
     def __init__(self, place: str, skillset: str) -> None:
         self.skillset = skillset
-        self.model: Skillset | None = None
-        self.ready = threading.Event()
+        self.reach = Reach(place, skillset, self._on_thread, self._on_feedback, self._on_result)
         self.lock = threading.Lock()
         self.resources: dict[str, str] = {}
         self.last: dict[str, tuple[int, Any]] = {}
         self.skills: dict[str, Any] = {}
-        self.links: dict[str, SkillLink] = {}
         self.on_changes: list[Callable[[dict[str, str]], None]] = []
         self.on_skills: list[Callable[[dict[str, Any]], None]] = []
         self.on_events: list[Callable[[Any], None]] = []
         self.questions = Questions(place, self)
-        self._place = place
         self._open: dict[str, Pursuit] = {}
-        self._presence = Presence()
-        self._server = ""
-        self._asking = False
         self._over = ""
         self._last_event = self._last_transition = 0
         self._states_after = -1
@@ -118,15 +105,14 @@ class Session:
         self._inbox.put(None)
         if self._thread is not threading.current_thread():
             self._thread.join(END_S)
-        for topic in (*self._subscribers, *self.links.values()):
+        for topic in (*self._subscribers, *self.reach.links.values()):
             topic.unregister()
 
     # --- what is heard -----------------------------------------------------------------------------------------------
 
     def _on_alive(self, message: Any) -> None:
-        self._server = message._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell who sent it
-        if self._heard(message.frame_id) and self.model is None:
-            self._ask(DESCRIBE_S)
+        if self._heard(message.frame_id):
+            self.reach.on_alive(message)
 
     def _on_resources(self, message: Any) -> None:
         life, _, after = message.header.frame_id.partition(" ")
@@ -177,22 +163,22 @@ class Session:
     def _on_feedback(self, message: Any) -> None:
         pursuit = self._open.get(message.status.goal_id.id)
         if pursuit is not None:
-            pursuit.on_feedback(message.feedback, self._presence.life)
+            pursuit.on_feedback(message.feedback, self.reach.presence.life)
 
     def _on_result(self, message: Any) -> None:
         pursuit = self._open.get(message.status.goal_id.id)
         if pursuit is not None:
-            pursuit.on_result(message.result, self._presence.life)
+            pursuit.on_result(message.result, self.reach.presence.life)
 
     def _heard(self, life: str) -> bool:
         """Note a sign of life; forget what was known of earlier managers when these are others."""
-        before = self._presence.life
-        if not self._presence.heard(life, time.monotonic()):
+        before = self.reach.presence.life
+        if not self.reach.presence.heard(life, time.monotonic()):
             return False
         if life != before:
             self._last_event, self._last_transition, self._states_after = 0, 0, -1
             self.last.clear()
-            self.ready.clear()
+            self.reach.ready.clear()
             for pursuit in list(self._open.values()):
                 pursuit.outlived(life)
         return True
@@ -200,47 +186,14 @@ class Session:
     def _forget(self, handle: SkillHandle) -> None:
         self._open.pop(handle.id, None)
 
-    # --- presence ----------------------------------------------------------------------------------------------------
-
-    def _ask(self, timeout_s: float) -> None:
-        """Ask for the description, unless that is under way."""
-        if not self._asking:
-            self._asking = True
-            answered, silent = self._on_thread(self._on_description), self._on_thread(self._on_silence)
-            call(f"{self._place}/describe", Describe, DescribeRequest(), answered, silent, timeout_s=timeout_s)
-
-    def _on_description(self, answer: Any) -> None:
-        self._asking = False
-        self._presence.answered(time.monotonic())
-        if self.model is None:
-            model = from_json(answer.model_json)
-            interfaces = interfaces_of(self.skillset)
-            feedback, result = self._on_thread(self._on_feedback), self._on_thread(self._on_result)
-            for skill in model.skills:
-                types, where = action_types(interfaces, skill.name), f"{self._place}/skill/{skill.name}"
-                self.links[skill.name] = SkillLink(where, types, feedback, result)
-            self.model = model
-
-    def _on_silence(self, reason: str) -> None:
-        self._asking = False
-        rospy.logdebug("%s", reason)
-
     def _look(self) -> None:
-        """Take the next step towards being ready, or to certainty about a loss; end what can be ended."""
-        verdict = self._presence.check(time.monotonic(), connected=is_connected(self._subscribers[-1]))
-        if verdict is Verdict.ASK:
-            self._ask(DOUBT_S)
-        elif verdict is Verdict.GONE:
-            self.ready.clear()
+        """See who can be called, and end what can be ended."""
+        if self.reach.gone(self._subscribers[-1]):
             self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life")
-        if self._presence.alive and not self.ready.is_set() and self._can_be_called():
-            self.ready.set()
+        if self._states_after >= 0:
+            self.reach.look(self._subscribers)
         for pursuit in list(self._open.values()):
             pursuit.settle(self._states_after)
-
-    def _can_be_called(self) -> bool:
-        known = self.model is not None and self._states_after >= 0 and all(is_connected(s, self._server) for s in self._subscribers)
-        return known and all(link.connected(self._server) for link in self.links.values())
 
     def _abandon(self, reason: str) -> None:
         for pursuit in list(self._open.values()):
@@ -255,7 +208,7 @@ class Session:
 
     def _run(self) -> None:
         while True:
-            restless = not self.ready.is_set() or any(pursuit.restless for pursuit in self._open.values())
+            restless = not self.reach.ready.is_set() or any(pursuit.restless for pursuit in self._open.values())
             try:
                 job = self._inbox.get(timeout=TICK_S if restless else IDLE_S)
             except queue.Empty:
@@ -264,7 +217,7 @@ class Session:
                 break
             self._attempt(job)
             self._attempt(self._look)
-        self.ready.clear()
+        self.reach.ready.clear()
         with self.lock:
             self._over = self._over or "the node was shut down"
         while not self._inbox.empty():
