@@ -119,8 +119,13 @@ def test_refusals_with_their_reasons_to_the_one_who_asked(players):
     }
     assert trace["ends"]["high"][2] == "too high"
     assert trace["hooks"] == {"early": [], "high": [], "first": ["on_dispatch"], "second": [], "other": []}
-    assert trace["replies"][2]["axes_authority"] == "USED"
-    accepted = [reply[0] for reply in trace["replies"] if isinstance(reply, list)]
+    resources, last = trace["replies"][2]
+    assert resources["axes_authority"] == "USED"
+    assert last == {
+        "takeoff": ["second", "NOT_READY", "not_moving", trace["ends"]["second"][2]],
+        "goto_straight": ["other", "NOT_READY", "not_moving", trace["ends"]["other"][2]],
+    }
+    accepted = [reply[0] for reply in trace["replies"] if len(reply) == 3]
     assert accepted == [True, True, False, False]
 
 
@@ -154,6 +159,36 @@ def test_ends_of_every_kind(players):
         "goto_straight arrives take_control",
         "goto_straight arrives release_control",
     ]
+
+
+def test_pauses_and_questions(players):
+    script = Script(
+        (
+            Step("why", skill="hover"),
+            *FLYING,
+            Step("why", skill="hover", inputs={"duration": 1.0}),
+            Step("start", "rests", "hover", {"duration": 1}),
+            Step("pause", "rests"),
+            Step("pause", "rests"),
+            Step("why", skill="goto"),
+            Step("resume", "rests"),
+            Step("pause", "rests"),
+            Step("transition", resource="SDK_authority", state="UNAVAILABLE"),
+            Step("pause", "rests"),
+            Step("transition", resource="SDK_authority", state="AVAILABLE"),
+            Step("start", "restless", "hover", {"duration": 1}),
+            Step("pause", "restless"),
+        ),
+        {"hover": (Behaviour(), Behaviour(pauses=True))},
+    )
+    trace = compare(players, script)
+    assert trace["hooks"]["rests"] == ["on_dispatch", "on_pause", "on_resume", "on_pause", "on_violation"]
+    assert trace["hooks"]["restless"][:2] == ["on_dispatch", "on_pause"]
+    assert states(trace, "rests") == ["REQUESTED", "RUNNING", "PAUSED", "RUNNING", "PAUSED", "RESOURCE_INVARIANT_VIOLATED"]
+    answers = [reply for reply in trace["replies"] if isinstance(reply[-1], list)]
+    assert [reply[0] for reply in answers] == [False, True, False]
+    assert answers[2][2][-1] == "hover rests take_control"
+    assert [reply[0] for reply in trace["replies"] if len(reply) == 2] == [True, True, True, True, False, False]
 
 
 @pytest.mark.parametrize("hook", ["validate", "on_dispatch", "on_interrupt", "on_violation"])
@@ -195,6 +230,7 @@ STATES = {
 BEHAVIOURS = st.one_of(
     st.just(Behaviour()),
     st.builds(Behaviour, refuse=st.just("no")),
+    st.just(Behaviour(pauses=True)),
     st.builds(Behaviour, ends=st.sampled_from(ENDS), message=st.text("ab ", max_size=3), after_s=st.just(0.01)),
     st.builds(Behaviour, raises=st.sampled_from(["validate", "on_dispatch", "on_interrupt", "on_violation", "on_failure"])),
 )
@@ -207,15 +243,15 @@ def scripts(draw) -> Script:
     steps: list[Step] = list(draw(st.sampled_from([FLYING, READY, ()])))
     labels: list[str] = []
     for _ in range(draw(st.integers(3, 12))):
-        kind = draw(st.sampled_from(["start", "start", "start", "transition", "interrupt", "finish", "late"]))
+        kind = draw(st.sampled_from(["start", "start", "start", "transition", "interrupt", "finish", "pause", "resume", "why", "late"]))
         if kind == "start":
             labels.append(f"call{len(labels)}!")
             skill = draw(st.sampled_from(list(INPUTS)))
             steps.append(Step("start", labels[-1], skill, INPUTS[skill], client=draw(st.integers(0, 1))))
         elif kind == "transition":
             steps.append(draw(TRANSITIONS))
-        elif kind == "late":
-            steps.append(Step("late"))
+        elif kind in {"late", "why"}:
+            steps.append(Step(kind, skill=draw(st.sampled_from(list(INPUTS)))))
         elif labels:
             steps.append(Step(kind, draw(st.sampled_from(labels)), result=draw(st.sampled_from(ENDS)) if kind == "finish" else ""))
     return Script(tuple(steps), {skill: tuple(draw(st.lists(BEHAVIOURS, max_size=3))) for skill in INPUTS})

@@ -19,10 +19,11 @@ ROS1_PACKAGES = (
     "lidar_mapping",
     "uav_simulator",
 )
+ROS2_PACKAGES = ("skill_language", "skill_runtime", "skill_panel", "skill_missions", "uav_skills", "uav_missions")
 TYPED = [
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",
-    *(f"ros2_ws/src/{name}/{name}" for name in ("skill_language", "skill_runtime", "skill_missions", "uav_skills", "uav_missions")),
+    *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
 ]
 

@@ -4,6 +4,7 @@ setup(
     name="skill_panel",
     version="0.1.0",
     packages=find_packages(exclude=["test"]),
+    package_data={"skill_panel": ["panel.tcss"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/skill_panel"]),
         ("share/skill_panel", ["package.xml"]),

@@ -13,7 +13,7 @@ from navigation_managers.model import SKILLSET
 from skill_runtime.hooks import SkillHooks
 from skillset_ros1 import SkillsetClient, SkillsetManagers
 
-SOON_S = 15.0
+SOON_S = 30.0
 FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
 NUMBERS = itertools.count()
 
@@ -47,8 +47,17 @@ class Recorder(SkillHooks):
         value = self._note("progress", execution)
         return 0.5 if value is None else value
 
-    def on_interrupt(self, execution) -> None:
-        self._note("on_interrupt", execution)
+    def on_interrupt(self, execution) -> bool | None:
+        return self._note("on_interrupt", execution)
+
+    def on_emergency(self, execution) -> None:
+        self._note("on_emergency", execution)
+
+    def on_pause(self, execution) -> str | None:
+        return self.acts["on_pause"](execution) if "on_pause" in self.acts else super().on_pause(execution)
+
+    def on_resume(self, execution) -> str | None:
+        return self.acts["on_resume"](execution) if "on_resume" in self.acts else super().on_resume(execution)
 
     def on_violation(self, execution) -> None:
         self._note("on_violation", execution)

@@ -11,14 +11,16 @@ import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus
 from geometry_msgs.msg import Point
 from navigation_interfaces.msg import TakeoffAction, TakeoffActionGoal, TakeoffActionResult, TakeoffGoal
+from navigation_managers.client import NavigationClient
 from navigation_managers.inputs import GotoStraightInputs
 from skillset_interfaces.msg import Event
-from skillset_interfaces.srv import Describe, GetData, Transition
+from skillset_interfaces.srv import Describe, GetData, Transition, TriggerEvent, Why
 from skillset_ros1_bench import FLYING, SOON_S, Navigation, on_thread, until
 from uav_msgs.msg import GuidanceState
 
 from skill_language.json_form import from_json
 from skill_runtime.core import ExecutionState
+from skill_runtime.waiting import CannotWaitError
 
 S = ExecutionState
 
@@ -211,3 +213,110 @@ def test_a_closed_client_leaves_no_handle_open(navigation):
     assert (handle.state, handle.message) == (S.FAILED, "the client of navigation was closed")
     late = navigation.client.start("land")
     assert (late.state, late.message) == (S.FAILED, "the managers of navigation are not there")
+
+
+def test_questions_are_answered(navigation):
+    client = navigation.client
+    answer = client.why("hover").get(SOON_S)
+    assert (answer.ready, [one.name for one in answer.unmet]) == (False, ["sdk_authority", "in_air"])
+    navigation.bring(FLYING)
+    navigation.hooks["hover"].acts["validate"] = lambda inputs: "" if inputs.duration > 0 else "no time"
+    assert client.why("hover", {"duration": 1}).get(SOON_S).ready
+    refused = client.why("hover", {"duration": 0}).get(SOON_S)
+    assert (refused.ready, "no time" in refused.reason) == (False, True)
+    assert refused.history[0].cause == "extern"
+    with pytest.raises(ValueError, match="has no skill 'fly'"):
+        client.why("fly")
+    taken = client.transition("SDK_authority", "UNAVAILABLE").get(SOON_S)
+    assert (taken.accepted, taken.state) == (True, "UNAVAILABLE")
+    assert client.input_types("hover") == {"duration": "float64"}
+    answer = service(navigation, Why, "why", skill="hover", inputs_json="3")
+    assert (answer.known, answer.reason) == (False, "inputs of hover are a JSON object, not 3")
+    answer = service(navigation, TriggerEvent, "trigger", event="storm")
+    assert (answer.accepted, "storm" in answer.reason) == (False, True)
+
+
+def test_pause_and_resume(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly()
+    assert handle.pause().get(SOON_S) == "goto_straight can't be paused"
+    navigation.hooks["goto_straight"].acts |= {"on_pause": lambda _: "", "on_resume": lambda _: ""}
+    assert handle.pause().get(SOON_S) == ""
+    until(lambda: handle.state is S.PAUSED, "it rests")
+    assert handle.resume().get(SOON_S) == ""
+    until(lambda: handle.state is S.RUNNING, "it goes on")
+
+
+def test_who_comes_late_learns_the_last_results(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly()
+    navigation.execution(handle).terminate("ARRIVED", "there")
+    assert handle.wait(SOON_S)
+    navigation.client.close()
+    late = navigation.another_client()
+    until(lambda: late.last("goto_straight"), "the last result is told")
+    last = late.last("goto_straight")
+    assert (last.id, last.outcome, last.result, last.message) == (handle.id, "TERMINATED", "ARRIVED", "there")
+    assert late.last("hover") is None
+
+
+def test_all_executions_of_a_skill_are_interrupted(navigation):
+    navigation.bring(FLYING)
+    handle = navigation.fly()
+    stranger = navigation.another_client()
+    stranger.interrupt_all("goto_straight").get(SOON_S)
+    assert handle.wait(SOON_S)
+    assert handle.state is S.INTERRUPTED
+
+
+def test_a_stop_that_takes_too_long_becomes_an_emergency(ros_master):
+    rospy.set_param("~interrupt_timeout_s", 0.3)
+    try:
+        navigation = Navigation()
+    finally:
+        rospy.delete_param("~interrupt_timeout_s")
+    navigation.bring(FLYING)
+    navigation.hooks["goto_straight"].acts["on_interrupt"] = lambda _: False
+    handle = navigation.fly()
+    handle.interrupt()
+    until(lambda: handle.state is S.INTERRUPTING or handle.done, "the stop has begun")
+    assert handle.wait(SOON_S)
+    assert handle.state is S.INTERRUPTED
+    assert navigation.hooks["goto_straight"].calls.count("on_emergency") == 1
+    navigation.close()
+
+
+def test_data_are_followed_without_generated_code(navigation):
+    source = rospy.Publisher("/uav_guidance/state", GuidanceState, queue_size=1, latch=True)
+    source.publish(GuidanceState(armed=True))
+    feed = navigation.client.data_feed("guidance_state")
+    until(lambda: feed.sample is not None and feed.sample.stamp_ns is not None, "the value comes, and its stamp")
+    assert feed.sample.value.armed
+    until(lambda: feed.stale, "three periods later it is stale")
+    source.unregister()
+
+
+def test_the_generated_client_works_here_too(navigation):
+    navigation.bring(FLYING)
+    skills = NavigationClient(navigation.client)
+    handle = skills.hover(duration=1)
+    until(lambda: handle.state is S.RUNNING, "it runs")
+    assert skills.axes_authority.becomes("USED").get(SOON_S) == "USED"
+    handle.interrupt()
+    assert handle.get(SOON_S).state is S.INTERRUPTED
+
+
+def test_nobody_waits_on_the_thread_that_brings_the_news(navigation):
+    navigation.bring(FLYING)
+    caught = []
+
+    def wait_there(_):
+        try:
+            navigation.client.start("hover", duration=1).wait(SOON_S)
+        except CannotWaitError as error:
+            caught.append(str(error))
+
+    navigation.client.on_change(wait_there)
+    navigation.client.transition("homepoint_status", "INVALID")
+    until(lambda: caught, "it is refused")
+    assert "can't wait" in caught[0]

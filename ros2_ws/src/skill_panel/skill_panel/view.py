@@ -11,8 +11,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from skill_language.model import Skillset
-from skill_runtime.core.execution import ExecutionState
-from skill_runtime.readiness import readiness
+from skill_runtime.core.situation import Situation
+from skill_runtime.core.why import unmet
 
 NANOSECONDS = 1e9
 LOG_LINES = 1000
@@ -98,10 +98,19 @@ class SkillsetView:
 
     def heard_event(self, event: Any) -> None:
         """Take a skillset_interfaces/Event."""
+        self.say(f"{_stamp(event.header.stamp)}  {_told(event)}")
+
+    def heard_skills(self, skills: Mapping[str, Any]) -> None:
+        """Take a skillset_interfaces/SkillState by skill."""
         with self._lock:
-            if event.skill:
-                self._follow(event)
-            self.say(f"{_stamp(event.header.stamp)}  {_told(event)}")
+            open_ones = [(name, one) for name, skill in skills.items() for one in skill.open]
+            known = self._running
+            self._running = {
+                one.id: Running(one.id, name, one.state, known[one.id].progress if one.id in known else None) for name, one in open_ones
+            }
+            ends = {name: skill.last[0] for name, skill in skills.items() if skill.last}
+            self._last = {name: " ".join(word for word in (last.state, last.result) if word) for name, last in ends.items()}
+            self.version += 1
 
     def heard_progress(self, execution_id: str, progress: float) -> None:
         """Take the progress of an execution that this panel has started."""
@@ -132,14 +141,6 @@ class SkillsetView:
             self.log.append(line)
             self.logged += 1
             self.version += 1
-
-    def _follow(self, event: Any) -> None:
-        if ExecutionState(event.state).terminal:
-            self._running.pop(event.id, None)
-            self._last[event.skill] = " ".join(word for word in (event.state, event.result) if word)
-        else:
-            known = self._running.get(event.id)
-            self._running[event.id] = Running(event.id, event.skill, event.state, known.progress if known else None)
 
     # --- what is shown -----------------------------------------------------------------------------------------------
 
@@ -178,7 +179,7 @@ class SkillsetView:
         if not self._states:
             return ("nothing was heard of the resources yet",)
         fresh = {name: json.loads(r.value_json, object_hook=_named) for name, r in self._readings.items() if not r.stale}
-        return tuple(f"{one.name}: {one.reason}" for one in readiness(self.model, skill, self._states, fresh).unmet)
+        return tuple(one.reason for one in unmet(self.model, Situation(self._states, data=fresh), self.model.skill(skill)))
 
 
 def one_line(value_json: str, width: int = VALUE_WIDTH) -> str:

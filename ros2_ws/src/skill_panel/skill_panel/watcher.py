@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from skill_panel.view import SkillsetView
+from skill_runtime.core.why import Why
 from skill_runtime.handle import Report, SkillHandle
 from skill_runtime.ros2.client import SkillsetClient
 from skill_runtime.ros2.names import action_module
@@ -47,6 +49,7 @@ class Watched:
         self._asked: dict[str, Pending[DataReading]] = {}
         self.client.on_event(self._on_event)
         self.client.on_change(self._on_change)
+        self.client.on_skills(self._on_skills)
 
     def look(self) -> None:
         """See whether the managers are there."""
@@ -55,6 +58,7 @@ class Watched:
         elif self.client.ready:
             view = SkillsetView(self.root, self.client.model)
             view.heard_states(self.client.resources)
+            view.heard_skills(self.client.skills)
             for event in self._heard:
                 view.heard_event(event)
             self.view = view
@@ -68,7 +72,7 @@ class Watched:
             asked = self._asked.get(data.name)
             if asked is None or asked.done:
                 self._asked[data.name] = self.client.read_data(data.name)
-                self._asked[data.name].add_done_callback(lambda answer, name=data.name: self._on_reading(name, answer))
+                self._asked[data.name].add_done_callback(partial(self._on_reading, data.name))
 
     def start(self, skill: str, inputs: dict[str, object]) -> SkillHandle:
         """Start a skill; raise ValueError."""
@@ -81,6 +85,35 @@ class Watched:
     def interrupt(self, skill: str) -> None:
         """Ask for the end of all that runs of a skill, whoever started it."""
         self.client.interrupt_all(skill).add_done_callback(lambda answer: self._say_failure(f"interrupt {skill}", answer))
+
+    def set_paused(self, skill: str) -> None:
+        """Pause what runs of a skill, resume what is paused; a refusal is told in the log."""
+        rows = [] if self.view is None else [row for row in self.view.skill_rows() if row.name == skill]
+        for one in (one for row in rows for one in row.running):
+            self._set_paused(skill, one.id, paused=one.state != "PAUSED")
+
+    def _set_paused(self, skill: str, execution_id: str, *, paused: bool) -> None:
+        what = f"{'pause' if paused else 'resume'} {skill}"
+
+        def told(answer: Pending[str]) -> None:
+            self._say_failure(what, answer)
+            if not answer.failure and answer.value:
+                self.say(f"{what} refused: {answer.value}")
+
+        self.client.set_paused(execution_id, paused).add_done_callback(told)
+
+    def ask_why(self, skill: str) -> None:
+        """Have the managers say in the log whether a skill could start, and what its resources went through."""
+
+        def told(answer: Pending[Why]) -> None:
+            self._say_failure(f"why {skill}", answer)
+            if not answer.failure:
+                self.say(f"why {skill}: {'it could start now' if answer.value.ready else answer.value.reason}")
+                for past in answer.value.history:
+                    line = f"{past.resource} {past.from_state} -> {past.to_state} by {past.cause}"
+                    self.say(f"    {past.stamp_ns / 1e9:.2f}  {line}")
+
+        self.client.why(skill).add_done_callback(told)
 
     def transition(self, resource: str, to: str) -> None:
         """Take an extern transition; a refusal is told in the log."""
@@ -110,6 +143,10 @@ class Watched:
     def _on_change(self, states: dict[str, str]) -> None:
         if self.view is not None:
             self.view.heard_states(states)
+
+    def _on_skills(self, skills: dict[str, Any]) -> None:
+        if self.view is not None:
+            self.view.heard_skills(skills)
 
     def _on_reading(self, name: str, answer: Pending[DataReading]) -> None:
         if self.view is not None and not answer.failure and answer.value.received:

@@ -7,8 +7,9 @@ from typing import Any
 
 from skillset_interfaces.msg import DataValue, Event, ResourceState, ResourceTransition, SkillExecution, SkillState, Unmet
 
-from skill_runtime.core.events import EngineEvent, ExecutionEvent
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from skill_runtime.core.records import ExecutionRecord, SkillRecord
+from skill_runtime.core.why import Unmet as UnmetPrecondition
 from skill_runtime.core.why import Why
 from skill_runtime.plain import to_plain
 
@@ -77,3 +78,19 @@ def fill_why(response: Any, why: Why, resources: Any) -> Any:
 def data_message(name: str, value: object) -> Any:
     """Return a data's value as a message; None for no fresh value."""
     return DataValue(name=name, value_json="" if value is None else json.dumps(to_plain(value)))
+
+
+def why_of(skill: str, response: Any) -> Why:
+    """Return the managers' answer to ``why`` as they have it themselves."""
+    found = tuple(
+        UnmetPrecondition(
+            one.name,
+            one.condition,
+            one.reason,
+            {resource.name: resource.state for resource in one.resources},
+            {data.name: json.loads(data.value_json) if data.value_json else None for data in one.data},
+        )
+        for one in response.unmet
+    )
+    history = tuple(TransitionEvent(0, e.stamp_ns, e.resource, e.from_state, e.to_state, e.cause) for e in response.history)
+    return Why(skill, response.ready, response.reason, response.refusal, found, history)

@@ -17,9 +17,9 @@ def to_plain(value: Any) -> Any:
         return value if math.isfinite(value) else None
     if hasattr(value, "get_fields_and_field_types"):
         return {name: to_plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    if hasattr(value, "_slot_types"):
+    if hasattr(value, "_md5sum"):
         return _plain_ros1(value)
-    if hasattr(value, "nsecs"):
+    if hasattr(value, "to_nsec"):
         return {"sec": value.secs, "nanosec": value.nsecs}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}

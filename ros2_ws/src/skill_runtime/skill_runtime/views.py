@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from skill_language.model import Skillset
+from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, Handle, OutputsT, ResultT
 from skill_runtime.waiting import Pending
 
@@ -27,37 +28,6 @@ class TransitionAnswer:
     accepted: bool
     reason: str
     state: str
-
-
-@dataclass(frozen=True)
-class Unmet:
-    """A precondition that does not hold now, and what is the case instead."""
-
-    name: str
-    condition: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class PastTransition:
-    """A transition that a resource has taken; ``cause`` is ``extern`` or ``<skill> <id> <effect>``."""
-
-    stamp_ns: int
-    resource: str
-    from_state: str
-    to_state: str
-    cause: str
-
-
-@dataclass(frozen=True)
-class Why:
-    """Whether a skill could start now; if not, every reason, and what its resources went through, the oldest first."""
-
-    skill: str
-    ready: bool
-    reason: str
-    unmet: tuple[Unmet, ...] = ()
-    history: tuple[PastTransition, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,16 @@ class ScriptedHooks(SkillHooks):
             self._after(now.after_s, lambda: execution.terminate(now.ends, now.message))
         self.dispatched.add(execution.id)
 
+    def on_pause(self, execution: Execution) -> str | None:
+        """Have the function rest, where it can."""
+        self._do("on_pause", execution)
+        return "" if self._of[execution.id].pauses else super().on_pause(execution)
+
+    def on_resume(self, execution: Execution) -> str | None:
+        """Have the function go on."""
+        self._do("on_resume", execution)
+        return ""
+
     def on_interrupt(self, execution: Execution) -> None:
         """Stop the function."""
         self._do("on_interrupt", execution)

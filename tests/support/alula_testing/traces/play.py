@@ -38,6 +38,9 @@ class Player:
             "interrupt": self._interrupt,
             "finish": self._finish,
             "transition": self._transition,
+            "pause": lambda step: self._set_paused(step, paused=True),
+            "resume": lambda step: self._set_paused(step, paused=False),
+            "why": lambda step: self._replies.append(self._stage.why(step.skill, step.inputs)),
             "late": self._late,
         }
 
@@ -73,14 +76,25 @@ class Player:
 
     def _finish(self, step: Step) -> None:
         handle = self._handles[step.label]
-        self._replies.append(self._stage.engine.terminate(handle.id, step.result))
+        self._replies.append([self._stage.engine.terminate(handle.id, step.result)])
         self._stage.until(lambda: handle.done, f"{handle} ends")
 
     def _transition(self, step: Step) -> None:
         self._replies.append(list(self._stage.transition(step.resource, step.state)))
 
+    def _set_paused(self, step: Step, *, paused: bool) -> None:
+        self._replies.append(self._stage.set_paused(self._handles[step.label].id, paused=paused))
+
     def _late(self, step: Step) -> None:
-        self._replies.append(self._stage.client().resources)
+        client, skills = self._stage.client(), self._stage.engine.skills
+        ended = {skill: record.last.id for skill, record in skills.items() if record.last is not None}
+
+        def is_told() -> bool:
+            told = {skill: self._stage.last(client, skill) for skill in skills}
+            return {skill: last[0] for skill, last in told.items() if last is not None} == ended
+
+        self._stage.until(is_told, f"the last results are known to who comes {step.do}")
+        self._replies.append([client.resources, {skill: self._stage.last(client, skill) for skill in ended}])
 
     # --- what follows ------------------------------------------------------------------------------------------------
 
@@ -100,7 +114,8 @@ class Player:
         state = other[self._stage.engine.resources[resource].state]
         self._stage.transition(resource, state)
         self._stage.until(lambda: any(e.get("resource") == resource for e in self._stage.events()[-1:]), "all events are heard")
-        self._stage.until(lambda: self._client(0).resources.get(resource) == state, "all changes are known")
+        client = self._client(0)
+        self._stage.until(lambda: client.resources.get(resource) == state, "all changes are known")
 
     # --- parts -------------------------------------------------------------------------------------------------------
 

@@ -21,6 +21,8 @@ class Behaviour:
     after_s: float = 0.05
     message: str = ""
     """Goes with the result."""
+    pauses: bool = False
+    """Whether it can be paused."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Step:
     """One stimulus; the next comes when nothing more follows from it.
 
     ``start`` (label, skill, inputs, client), ``interrupt`` (label), ``finish`` (label, result), ``transition`` (resource, state),
-    ``late``: a client that comes now and tells what it sees.
+    ``pause`` and ``resume`` (label), ``why`` (skill, inputs), ``late``: a client that comes now and tells what it sees.
     """
 
     do: str

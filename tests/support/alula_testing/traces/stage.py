@@ -38,6 +38,18 @@ class Stage(Protocol):
         """Take an extern transition as the functional layer does; return accepted, reason, state."""
         ...
 
+    def set_paused(self, identifier: str, *, paused: bool) -> tuple[bool, str]:
+        """Pause or resume an execution; return accepted, reason."""
+        ...
+
+    def why(self, skill: str, inputs: dict[str, Any]) -> tuple[bool, str, list[str]]:
+        """Ask whether a skill could start now; return ready, reason, and the causes of the past transitions."""
+        ...
+
+    def last(self, client: Client, skill: str) -> tuple[str, str, str, str] | None:
+        """Return id, outcome, result and message of the skill's last execution, as this client knows it."""
+        ...
+
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Let time pass until the condition holds; raise when it does not within a generous time."""
         ...

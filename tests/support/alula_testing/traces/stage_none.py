@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 from navigation_managers.model import SKILLSET
@@ -37,6 +38,21 @@ class NoneStage:
         """Take an extern transition."""
         reply = self._managers.transition(resource, state)
         return reply.accepted, reply.reason, reply.state
+
+    def set_paused(self, identifier: str, *, paused: bool) -> tuple[bool, str]:
+        """Pause or resume."""
+        reply = self.engine.pause(identifier) if paused else self.engine.resume(identifier)
+        return reply.accepted, reply.reason
+
+    def why(self, skill: str, inputs: dict[str, Any]) -> tuple[bool, str, list[str]]:
+        """Ask the engine."""
+        answer = self.engine.why(skill, SimpleNamespace(**inputs) if inputs else None)
+        return answer.ready, answer.reason, [event.cause for event in answer.history]
+
+    def last(self, client: Client, skill: str) -> tuple[str, str, str, str] | None:
+        """Ask the engine."""
+        last = self.engine.skills[skill].last
+        return None if last is None else (last.id, last.state.value, last.result, last.message)
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Let virtual time pass."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,7 @@ import navigation_interfaces.msg
 import rospy
 from navigation_managers.model import SKILLSET
 from skillset_interfaces.msg import Event
-from skillset_interfaces.srv import Transition, TransitionRequest
+from skillset_interfaces.srv import SetPaused, SetPausedRequest, Transition, TransitionRequest, Why, WhyRequest
 
 from alula_testing.traces import live
 from alula_testing.traces.stage import Client, HooksFactory
@@ -42,6 +43,24 @@ class Ros1Stage:
         request = TransitionRequest(resource=resource, to=state)
         reply = call_and_wait(f"{self._managers.place}/transition", Transition, request, timeout_s=live.PATIENCE_S)
         return reply.accepted, reply.reason, reply.state
+
+    def set_paused(self, identifier: str, *, paused: bool) -> tuple[bool, str]:
+        """Call the service."""
+        request = SetPausedRequest(id=identifier, paused=paused)
+        reply = call_and_wait(f"{self._managers.place}/pause", SetPaused, request, timeout_s=live.PATIENCE_S)
+        return reply.accepted, reply.reason
+
+    def why(self, skill: str, inputs: dict[str, Any]) -> tuple[bool, str, list[str]]:
+        """Call the service."""
+        request = WhyRequest(skill=skill, inputs_json=json.dumps(inputs) if inputs else "")
+        reply = call_and_wait(f"{self._managers.place}/why", Why, request, timeout_s=live.PATIENCE_S)
+        return reply.ready, reply.reason, [transition.cause for transition in reply.history]
+
+    def last(self, client: Client, skill: str) -> tuple[str, str, str, str] | None:
+        """Ask the client."""
+        assert isinstance(client, SkillsetClient)
+        last = client.last(skill)
+        return None if last is None else (last.id, last.outcome, last.result, last.message)
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Wait."""

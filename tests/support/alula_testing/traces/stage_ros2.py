@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +13,7 @@ from navigation_managers.model import SKILLSET
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from skillset_interfaces.msg import Event
-from skillset_interfaces.srv import Transition
+from skillset_interfaces.srv import SetPaused, Transition, Why
 
 from alula_testing.traces import live
 from alula_testing.traces.stage import Client, HooksFactory
@@ -20,7 +21,6 @@ from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 from skill_runtime.ros2.names import EVENTS
 
 NUMBERS = itertools.count()
-CALL_S = 1.0
 
 
 class Ros2Stage:
@@ -35,7 +35,8 @@ class Ros2Stage:
         self._spin(self._managers)
         self._node = self._new_node()
         self._node.create_subscription(Event, f"{SKILLSET.name}/events", self._listener.hear, EVENTS)
-        self._service = self._node.create_client(Transition, f"{SKILLSET.name}/transition")
+        kinds = {"transition": Transition, "pause": SetPaused, "why": Why}
+        self._services = {name: self._node.create_client(kind, f"{SKILLSET.name}/{name}") for name, kind in kinds.items()}
         self._spin(self._node)
 
     def client(self) -> Client:
@@ -47,11 +48,25 @@ class Ros2Stage:
         return client
 
     def transition(self, resource: str, state: str) -> tuple[bool, str, str]:
-        """Call the service. DDS loses answers to clients that it has not discovered; what was taken is then refused as taken."""
-        assert self._service.wait_for_service(live.PATIENCE_S)
-        reply = self._service.call(Transition.Request(resource=resource, to=state), timeout_sec=live.PATIENCE_S)
-        assert reply is not None
+        """Call the service."""
+        reply = self._call("transition", Transition.Request(resource=resource, to=state))
         return reply.accepted, reply.reason, reply.state
+
+    def set_paused(self, identifier: str, *, paused: bool) -> tuple[bool, str]:
+        """Call the service."""
+        reply = self._call("pause", SetPaused.Request(id=identifier, paused=paused))
+        return reply.accepted, reply.reason
+
+    def why(self, skill: str, inputs: dict[str, Any]) -> tuple[bool, str, list[str]]:
+        """Call the service."""
+        reply = self._call("why", Why.Request(skill=skill, inputs_json=json.dumps(inputs) if inputs else ""))
+        return reply.ready, reply.reason, [transition.cause for transition in reply.history]
+
+    def last(self, client: Client, skill: str) -> tuple[str, str, str, str] | None:
+        """Ask the client."""
+        assert isinstance(client, SkillsetClient)
+        last = client.last(skill)
+        return None if last is None else (last.id, last.outcome, last.result, last.message)
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Wait."""
@@ -68,6 +83,15 @@ class Ros2Stage:
             executor.shutdown(timeout_sec=live.PATIENCE_S)
             thread.join(live.PATIENCE_S)
             node.destroy_node()
+
+    def _call(self, service: str, request: Any) -> Any:
+        client = self._services[service]
+        # Both ends must know one another, or DDS loses the answer: the managers, too, that this client is there.
+        assert client.wait_for_service(live.PATIENCE_S)
+        live.until(lambda: self._managers.count_clients(client.srv_name) > 0, f"the managers know the client of {service}")
+        reply = client.call(request, timeout_sec=live.PATIENCE_S)
+        assert reply is not None, f"{service} does not answer"
+        return reply
 
     def _new_node(self) -> Node:
         return Node(f"player_{next(NUMBERS)}", namespace=self._namespace)

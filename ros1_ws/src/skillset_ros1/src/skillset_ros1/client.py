@@ -1,106 +1,90 @@
-"""The skillset interface library (paper, section 4.2) over rospy, generic: all it needs it gets from ``describe``.
-
-Each topic of ROS 1 comes over a connection of its own, in no order with the others. So everything that is heard is dealt with by
-one thread a client, and whoever is told of an execution's end can see the resources as they are after it.
-"""
+"""The skillset interface library (paper, section 4.2) over rospy, generic: all it needs it gets from ``describe``."""
 
 from __future__ import annotations
 
-import queue
-import threading
-import time
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from typing import Any
 
-import rospy
-from skillset_interfaces.msg import Event, ResourceStates
-from skillset_interfaces.srv import Describe, DescribeRequest
-from std_msgs.msg import Header
+from skillset_interfaces.srv import GetData, GetDataRequest, SetPaused, SetPausedRequest, Transition, TransitionRequest, WhyRequest
+from skillset_interfaces.srv import Why as WhyService
 
-from skill_language.json_form import from_json
 from skill_language.model import Skillset
-from skill_runtime.handle import SkillHandle
-from skillset_ros1.calls import call
+from skill_runtime.core.execution import ExecutionState
+from skill_runtime.core.why import Why
+from skill_runtime.handle import Ended, SkillHandle
+from skill_runtime.messages import why_of
+from skill_runtime.plain import to_plain
+from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer
+from skill_runtime.waiting import Pending
 from skillset_ros1.convert import fields_of, fill
-from skillset_ros1.link import SkillLink, is_connected
-from skillset_ros1.names import action_types, interfaces_of, place
-from skillset_ros1.presence import DOUBT_S, Presence, Verdict
-from skillset_ros1.pursuit import Pursuit
+from skillset_ros1.feed import TopicFeed
+from skillset_ros1.names import place
+from skillset_ros1.pursuit import Pursuit, outputs_of, result_of
+from skillset_ros1.questions import HOOK_PATIENCE_S
+from skillset_ros1.session import Session
 
-TICK_S = 0.02
-IDLE_S = 0.25
-DESCRIBE_S = 5.0
-END_S = 1.0
 OnChange = Callable[[dict[str, str]], None]
-Job = Callable[[], None]
+OnEvent = Callable[[Any], None]
+OnSkills = Callable[[dict[str, Any]], None]
 
 
 class SkillsetClient:
-    """Starts, watches and interrupts the skills of one skillset, and follows its resources.
+    """Starts, watches and interrupts the skills of one skillset, and follows its resources, data and events.
 
-    As the client of the ROS 2 world; nothing here waits but ``wait_ready``. Callbacks come on the client's own thread.
+    What the client of the ROS 2 world does, and the typed clients that are generated work on either. Nothing here waits but
+    ``wait_ready``. Callbacks come on the client's own thread.
 
     Args:
         name: the skillset.
-        namespace: before the skillset's name; by default that of this process's node.
+        namespace: of the robot, as ``/robot1``; by default that of this process's node.
     """
 
     def __init__(self, name: str, *, namespace: str = "") -> None:
         self.skillset = name
-        self._place = place(namespace, name)
-        self._lock = threading.Lock()
-        self._resources: dict[str, str] = {}
-        self._callbacks: list[OnChange] = []
-        self._open: dict[str, Pursuit] = {}
-        self._links: dict[str, SkillLink] = {}
-        self._model: Skillset | None = None
-        self._ready = threading.Event()
-        self._presence = Presence()
-        self._server = ""
-        self._asking = False
-        self._over = False
-        self._last_event = 0
-        self._last_transition = 0
-        self._states_after = -1
-        self._inbox: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=f"client_{name}", daemon=True)
-        self._thread.start()
-        self._subscribers = [
-            rospy.Subscriber(f"{self._place}/{topic}", kind, self._inbox_of(handler), tcp_nodelay=True)
-            for topic, kind, handler in (
-                ("resource_states", ResourceStates, self._on_resources),
-                ("events", Event, self._on_event),
-                ("alive", Header, self._on_alive),
-            )
-        ]
-
-    # --- what others ask for -----------------------------------------------------------------------------------------
+        self.root = place(namespace, name)
+        self._session = Session(self.root, name)
+        self._questions = self._session.questions
+        self._feeds: dict[str, TopicFeed] = {}
 
     def wait_ready(self, timeout_s: float) -> bool:
-        """Wait (wall clock) until the managers can be called; False when they can't within the time."""
-        return self._ready.wait(timeout_s)
+        """Wait (wall clock) until the managers can be called; False when they can't within the time.
+
+        Raises:
+            CannotWaitError: this is the client's own thread.
+        """
+        return self.ready or self._session.wait(self._session.reach.ready, timeout_s)
 
     @property
     def ready(self) -> bool:
         """Tell whether the managers are alive, known and can be called."""
-        return self._ready.is_set()
+        return self._session.reach.ready.is_set()
 
     @property
     def model(self) -> Skillset:
         """Return the model that the managers execute; raise RuntimeError before ``wait_ready``."""
-        if self._model is None:
+        if self._session.reach.model is None:
             raise RuntimeError(f"the managers of {self.skillset} have not described themselves yet; call wait_ready first")
-        return self._model
+        return self._session.reach.model
+
+    @property
+    def view(self) -> SkillsetView:
+        """Return the skillset as attributes; raise RuntimeError before ``wait_ready``."""
+        return SkillsetView(self)
 
     @property
     def resources(self) -> dict[str, str]:
         """Return the state of every resource by name; empty until the managers were heard."""
-        with self._lock:
-            return dict(self._resources)
+        with self._session.lock:
+            return dict(self._session.resources)
 
-    def on_change(self, callback: OnChange) -> None:
-        """Have ``callback(resources)`` called after each step that changed a resource."""
-        self._callbacks.append(callback)
+    def on_change(self, callback: OnChange) -> Forget:
+        """Have ``callback(resources)`` called after each step that changed a resource; the return value ends that."""
+        return self._subscribe(self._session.on_changes, callback)
+
+    def on_event(self, callback: OnEvent) -> Forget:
+        """Have ``callback(event)`` called for each skillset_interfaces/Event from now on; the return value ends that."""
+        return self._subscribe(self._session.on_events, callback)
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
         """Ask for an execution; returns at once. When the managers can't be called, the handle has already FAILED.
@@ -110,173 +94,129 @@ class SkillsetClient:
         Raises:
             ValueError: there is no such skill, or the inputs do not fit; nothing was sent.
         """
-        if self._model is None:
+        if self._session.reach.model is None:
             return self._stillborn(skill)
         goal = self._goal(skill, inputs)
         if not self.ready:
             return self._stillborn(skill)
-        pursuit = Pursuit(self.skillset, skill, self._links[skill], self._inbox.put)
+        session = self._session
+        pursuit = Pursuit(self.skillset, skill, session.reach.links[skill], session.do, self.set_paused, session)
+        return pursuit.handle if session.pursue(pursuit, goal) else self._stillborn(skill)
 
-        def send() -> None:
-            self._open[pursuit.handle.id] = pursuit
-            pursuit.handle.add_done_callback(self._forget)
-            pursuit.send(goal)
+    def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
+        """Return how the skill's last execution ended, whoever asked for it and whenever; None when none has.
 
-        with self._lock:
-            if self._over:
-                return self._stillborn(skill)
-            self._inbox.put(send)
-        return pursuit.handle
+        Raises:
+            ValueError: there is no such skill.
+        """
+        self._check_skill(skill)
+        known = self._session.last.get(skill)
+        if known is None:
+            return None
+        result = result_of(self._session.reach.links[skill].types.result, skill, known[1])
+        return Ended(skill, known[1].id, ExecutionState(result.outcome), result.result, result.message, outputs_of(result))
 
-    def close(self) -> None:
-        """Fail what is open, end the client's thread and its connections."""
-        self._inbox.put(None)
-        if self._thread is not threading.current_thread():
-            self._thread.join(END_S)
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-        for link in self._links.values():
-            link.close()
+    def on_skills(self, callback: OnSkills) -> Forget:
+        """Have ``callback(skills)`` called after changes, with a skillset_interfaces/SkillState by skill; the return value ends that."""
+        return self._subscribe(self._session.on_skills, callback)
 
-    # --- what is heard, on the client's thread -----------------------------------------------------------------------
+    @property
+    def skills(self) -> dict[str, Any]:
+        """Return the skillset_interfaces/SkillState of every skill: what runs, and what ended last; empty until they were heard."""
+        return dict(self._session.skills)
 
-    def _on_alive(self, message: Any) -> None:
-        self._server = message._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell who sent it
-        if self._heard(message.frame_id):
-            self._describe()
+    def why(self, skill: str, inputs: Mapping[str, object] | None = None) -> Pending[Why]:
+        """Ask whether the skill could start now, and if not, why not; with inputs, its ``validate`` is asked, too.
 
-    def _on_resources(self, message: Any) -> None:
-        life, _, after = message.header.frame_id.partition(" ")
-        if not self._heard(life) or int(after) <= self._states_after:
-            return
-        self._states_after = int(after)
-        states = {resource.name: resource.state for resource in message.resources}
-        with self._lock:
-            self._resources = states
-        for callback in self._callbacks:
-            callback(dict(states))
+        Raises:
+            ValueError: there is no such skill, or the inputs do not fit.
+        """
+        self._check_skill(skill)
+        inputs_json = "" if inputs is None else json.dumps(to_plain(self._goal(skill, inputs)))
+        request = WhyRequest(skill=skill, inputs_json=inputs_json)
+        return self._questions.ask("why", WhyService, request, lambda response: why_of(skill, response), patience_s=HOOK_PATIENCE_S)
 
-    def _on_event(self, event: Any) -> None:
-        life = event.header.frame_id
-        # Twice comes what was published while the history of earlier events was on its way.
-        if not self._heard(life) or event.sequence <= self._last_event:
-            return
-        self._last_event = event.sequence
-        if event.kind == Event.TRANSITION:
-            self._last_transition = event.sequence
-        elif event.id in self._open:
-            self._open[event.id].on_event(event, life, self._last_transition)
+    def set_paused(self, execution_id: str, paused: bool) -> Pending[str]:  # noqa: FBT001 - as the service has it
+        """Ask for a pause or a resumption; the answer is "", or why not."""
+        request, answer = SetPausedRequest(id=execution_id, paused=paused), lambda response: "" if response.accepted else response.reason
+        return self._questions.ask("pause", SetPaused, request, answer, patience_s=HOOK_PATIENCE_S)
 
-    def _on_feedback(self, message: Any) -> None:
-        pursuit = self._open.get(message.status.goal_id.id)
-        if pursuit is not None:
-            pursuit.on_feedback(message.feedback, self._presence.life)
+    def transition(self, resource: str, to: str) -> Pending[TransitionAnswer]:
+        """Ask for an extern transition, as the functional layer does."""
+        request = TransitionRequest(resource=resource, to=to)
+        return self._questions.ask("transition", Transition, request, lambda r: TransitionAnswer(r.accepted, r.reason, r.state))
 
-    def _on_result(self, message: Any) -> None:
-        pursuit = self._open.get(message.status.goal_id.id)
-        if pursuit is not None:
-            pursuit.on_result(message.result, self._presence.life)
+    def data_feed(self, name: str) -> TopicFeed:
+        """Return the values of a data; it is subscribed to when it is first asked for.
 
-    def _heard(self, life: str) -> bool:
-        """Note a sign of life; forget what was known of earlier managers when these are others."""
-        before = self._presence.life
-        if not self._presence.heard(life, time.monotonic()):
-            return False
-        if life != before:
-            self._last_event, self._last_transition, self._states_after = 0, 0, -1
-            self._ready.clear()
-            for pursuit in list(self._open.values()):
-                pursuit.outlived(life)
-        return True
+        Raises:
+            ValueError: there is no such data.
+        """
+        known = {data.name: data for data in self.model.data}
+        if name not in known:
+            raise ValueError(f"skillset {self.skillset} has no data {name!r}; it has {', '.join(known) or 'none'}")
+        with self._session.lock:
+            if name not in self._feeds:
+                self._feeds[name] = TopicFeed(self.root, known[name], self._questions, self._session.do)
+            return self._feeds[name]
 
-    # --- presence, on the client's thread ----------------------------------------------------------------------------
+    def read_data(self, name: str) -> Pending[DataReading]:
+        """Ask the managers for a data's value as JSON: also of a type that is not known here."""
 
-    def _describe(self, timeout_s: float = DESCRIBE_S) -> None:
-        """Ask for the description, unless it is known or being asked for."""
-        if self._asking or (self._model is not None and timeout_s != DOUBT_S):
-            return
-        self._asking = True
-        name = f"{self._place}/describe"
-        call(name, Describe, DescribeRequest(), self._inbox_of(self._on_description), self._inbox_of(self._on_silence), timeout_s=timeout_s)
+        def answer(response: Any) -> DataReading:
+            return DataReading(response.known, response.received, response.stale, response.stamp_ns, response.value_json)
 
-    def _on_description(self, answer: Any) -> None:
-        self._asking = False
-        self._presence.answered(time.monotonic())
-        if self._model is None:
-            model = from_json(answer.model_json)
-            interfaces = interfaces_of(self.skillset)
-            for skill in model.skills:
-                types, where = action_types(interfaces, skill.name), f"{self._place}/skill/{skill.name}"
-                self._links[skill.name] = SkillLink(where, types, self._inbox_of(self._on_feedback), self._inbox_of(self._on_result))
-            self._model = model
+        return self._questions.ask("get_data", GetData, GetDataRequest(name=name), answer)
 
-    def _on_silence(self, reason: str) -> None:
-        self._asking = False
-        rospy.logdebug("%s", reason)
+    def input_types(self, skill: str) -> dict[str, str]:
+        """Return a skill's inputs with their ROS 1 types, as ``{"height": "float64"}``; raise ValueError."""
+        self._check_skill(skill)
+        return fields_of(self._session.reach.links[skill].types.goal)
 
-    def _look(self) -> None:
-        """Take the next step towards being ready, or to certainty about a loss; end what can be ended."""
-        verdict = self._presence.check(time.monotonic(), connected=is_connected(self._subscribers[-1]))
-        if verdict is Verdict.ASK:
-            self._describe(DOUBT_S)
-        elif verdict is Verdict.GONE:
-            self._ready.clear()
-            self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life")
-        if self._presence.alive and not self.ready and self._can_be_called():
-            self._ready.set()
-        for pursuit in list(self._open.values()):
-            pursuit.settle(self._states_after)
+    def interrupt_all(self, skill: str) -> Pending[int]:
+        """Ask for the end of all executions of a skill, whoever asked for them; the answer is how many there were."""
+        self._check_skill(skill)
+        answer: Pending[int] = self._questions.moment()
 
-    def _can_be_called(self) -> bool:
-        heard = self._model is not None and self._states_after >= 0 and all(is_connected(s, self._server) for s in self._subscribers)
-        return heard and all(link.connected(self._server) for link in self._links.values())
+        def cancel() -> None:
+            self._session.reach.links[skill].cancel_all()
+            answer.resolve(len(self._session.skills[skill].open) if skill in self._session.skills else 0)
 
-    def _abandon(self, reason: str) -> None:
-        for pursuit in list(self._open.values()):
-            pursuit.abandon(reason)
+        self._session.do(cancel)
+        return answer
 
-    # --- parts -------------------------------------------------------------------------------------------------------
+    def moment(self) -> Pending[Any]:
+        """Return an answer that nobody has given yet; it fails when the managers go."""
+        return self._questions.moment()
 
-    def _forget(self, handle: SkillHandle) -> None:
-        self._open.pop(handle.id, None)
+    def close(self, reason: str = "") -> None:
+        """End every wait for this reason, and this client's connections; what runs goes on running."""
+        self._session.close(reason or f"the client of {self.skillset} was closed")
+        for feed in self._feeds.values():
+            feed.close()
 
-    def _inbox_of(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return a callback that has ``handler`` called on the client's thread."""
-        return lambda message: self._inbox.put(lambda: handler(message))
+    # --- inside ------------------------------------------------------------------------------------------------------
 
-    def _run(self) -> None:
-        while True:
-            restless = not self.ready or any(pursuit.restless for pursuit in self._open.values())
-            try:
-                job = self._inbox.get(timeout=TICK_S if restless else IDLE_S)
-            except queue.Empty:
-                job = self._nothing
-            if job is None or rospy.is_shutdown():
-                break
-            self._do(job)
-            self._do(self._look)
-        self._ready.clear()
-        with self._lock:
-            self._over = True
-        while not self._inbox.empty():
-            self._do(self._inbox.get() or self._nothing)
-        self._abandon(f"the client of {self.skillset} was closed")
+    def _subscribe(self, callbacks: list[Callable[[Any], None]], callback: Callable[[Any], None]) -> Forget:
+        with self._session.lock:
+            callbacks.append(callback)
 
-    def _do(self, job: Job) -> None:
-        try:
-            job()
-        except Exception as error:  # noqa: BLE001 - a callback must not end the client
-            rospy.logerr("client of %s: %s: %s", self.skillset, type(error).__name__, error)
+        def forget() -> None:
+            with self._session.lock:
+                if callback in callbacks:
+                    callbacks.remove(callback)
 
-    @staticmethod
-    def _nothing() -> None:
-        """Have come to look at the time."""
+        return forget
 
-    def _goal(self, skill: str, inputs: dict[str, object]) -> Any:
+    def _check_skill(self, skill: str) -> None:
+        known = [known.name for known in self.model.skills]
+        if skill not in known:
+            raise ValueError(f"skillset {self.skillset} has no skill {skill!r}; it has {', '.join(known)}")
+
+    def _goal(self, skill: str, inputs: Mapping[str, object]) -> Any:
         """Make the goal message; raise ValueError when skill or inputs are wrong."""
-        if skill not in self._links:
-            raise ValueError(f"skillset {self.skillset} has no skill {skill!r}; it has {', '.join(self._links)}")
-        goal = self._links[skill].types.goal()
+        self._check_skill(skill)
+        goal = self._session.reach.links[skill].types.goal()
         where = f"inputs of {self.skillset}.{skill}"
         fill(goal, inputs, where)
         missing = [name for name in fields_of(goal) if name not in inputs]
@@ -285,6 +225,6 @@ class SkillsetClient:
         return goal
 
     def _stillborn(self, skill: str) -> SkillHandle:
-        handle = SkillHandle(skill, "")
+        handle = SkillHandle(skill, "", host=self._session)
         handle.fail(f"the managers of {self.skillset} are not there")
         return handle

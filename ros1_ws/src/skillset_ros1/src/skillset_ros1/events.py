@@ -7,7 +7,6 @@ and then once more within it: ``sequence`` tells.
 
 from __future__ import annotations
 
-import json
 import threading
 import time
 from collections import deque
@@ -17,9 +16,9 @@ from typing import Any
 import rospy
 from skillset_interfaces.msg import Event
 
-from skill_runtime.core.events import EngineEvent, ExecutionEvent
+from skill_runtime.core.events import EngineEvent
+from skill_runtime.messages import event_message
 from skillset_ros1.names import HISTORY, QUEUE, stamp_of
-from skillset_ros1.plain import to_plain
 
 FLUSH_STEP_S = 0.02
 QUIET_S = 0.1
@@ -39,7 +38,8 @@ class EventPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
     def publish(self, events: Sequence[EngineEvent]) -> None:
         """Publish in order."""
         for event in events:
-            message = event_message(self._skillset, self._life, event)
+            message = event_message(self._skillset, event)
+            message.header.stamp, message.header.frame_id = stamp_of(event.stamp_ns), self._life
             with self._lock:
                 self._history.append(message)
                 self._publisher.publish(message)
@@ -65,22 +65,3 @@ class EventPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
     def close(self) -> None:
         """Take the topic away."""
         self._publisher.unregister()
-
-
-def event_message(skillset: str, life: str, event: EngineEvent) -> Any:
-    """Return an engine's event as a message."""
-    message = Event(skillset=skillset, sequence=event.sequence)
-    message.header.stamp = stamp_of(event.stamp_ns)
-    message.header.frame_id = life
-    if isinstance(event, ExecutionEvent):
-        message.kind = Event.EXECUTION
-        message.skill, message.id, message.state = event.skill, event.id, event.state.value
-        message.result, message.message = event.result, event.message
-        message.inputs_json = json.dumps(to_plain(event.inputs))
-        if event.state.terminal:
-            message.outputs_json = json.dumps(to_plain(event.outputs))
-    else:
-        message.kind = Event.TRANSITION
-        message.resource, message.cause = event.resource, event.cause
-        message.from_state, message.to_state = event.from_state, event.to_state
-    return message

@@ -41,7 +41,11 @@ class SkillLink:
         """Cancel one goal."""
         self._cancels.publish(GoalID(id=identifier))
 
-    def close(self) -> None:
+    def cancel_all(self) -> None:
+        """Cancel all goals: that is what an id and a stamp of nothing mean."""
+        self._cancels.publish(GoalID())
+
+    def unregister(self) -> None:
         """Take the topics away."""
         for topic in (self._goals, self._cancels, *self._listening):
             topic.unregister()

@@ -10,6 +10,7 @@ from typing import Any
 
 from skill_runtime.core.execution import ExecutionState
 from skill_runtime.handle import SkillHandle
+from skill_runtime.waiting import Host, Pending
 from skillset_ros1.convert import fields_of, fill
 from skillset_ros1.link import SkillLink
 
@@ -19,14 +20,22 @@ GRACE_S = 0.5
 """An end waits so long for what belongs to it and comes over another connection: the resources after the step, the event."""
 ID_DIGITS = 12
 
+Do = Callable[[Callable[[], None]], None]
+Pause = Callable[[str, bool], Pending[str]]
+"""Pauses or resumes an execution; the answer is "", or why not."""
+
+_FEEDBACK_FIELDS = ("progress", "state")
 _RESULT_FIELDS = ("outcome", "result", "message")
 
 
 class Pursuit:
     """One goal; ``handle`` is what the caller gets, ``do`` runs a job on the client's thread."""
 
-    def __init__(self, skillset: str, skill: str, link: SkillLink, do: Callable[[Callable[[], None]], None]) -> None:
-        self.handle = SkillHandle(skill, uuid.uuid4().hex[:ID_DIGITS], lambda: do(self._interrupt))
+    def __init__(
+        self, skillset: str, skill: str, link: SkillLink, do: Callable[[Callable[[], None]], None], pause: Pause, host: Host
+    ) -> None:
+        identifier = uuid.uuid4().hex[:ID_DIGITS]
+        self.handle = SkillHandle(skill, identifier, lambda: do(self._interrupt), pause=lambda paused: pause(identifier, paused), host=host)
         self._skillset = skillset
         self._link = link
         self._sent_s = time.monotonic()
@@ -48,15 +57,15 @@ class Pursuit:
         """Take an event of this execution; its end is told when the resources are known as they were after event ``after``."""
         self._acknowledge(life)
         state = ExecutionState(event.state)
-        if state is ExecutionState.RUNNING:
-            self.handle.run()
-        elif state.terminal:
-            self._end = (time.monotonic(), after, self._result_of(event))
+        if state.terminal:
+            self._end = (time.monotonic(), after, result_of(self._link.types.result, self.handle.skill, event))
+        elif state.active:
+            self.handle.enter(state)
 
     def on_feedback(self, feedback: Any, life: str) -> None:
         """Take a feedback of this execution."""
         self._acknowledge(life)
-        self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name != "progress"})
+        self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name not in _FEEDBACK_FIELDS})
 
     def on_result(self, result: Any, life: str) -> None:
         """Take the result; the event of the same end, which says when it was, is waited for a little."""
@@ -95,11 +104,17 @@ class Pursuit:
         if self._life:
             self._link.cancel(self.handle.id)
 
-    def _result_of(self, event: Any) -> Any:
-        result = self._link.types.result(outcome=event.state, result=event.result, message=event.message)
-        outputs = {name: value for name, value in json.loads(event.outputs_json or "{}").items() if value is not None}
-        return fill(result, outputs, f"outputs of {self.handle.skill}")
-
     def _finish(self, result: Any) -> None:
-        outputs = {name: getattr(result, name) for name in fields_of(result) if name not in _RESULT_FIELDS}
-        self.handle.end(ExecutionState(result.outcome), result.result, result.message, outputs)
+        self.handle.end(ExecutionState(result.outcome), result.result, result.message, outputs_of(result))
+
+
+def result_of(kind: Any, skill: str, said: Any) -> Any:
+    """Return the action's result that belongs to an end as ``Event`` and ``SkillExecution`` tell it."""
+    result = kind(outcome=said.state, result=said.result, message=said.message)
+    outputs = {name: value for name, value in json.loads(said.outputs_json or "{}").items() if value is not None}
+    return fill(result, outputs, f"outputs of {skill}")
+
+
+def outputs_of(result: Any) -> dict[str, Any]:
+    """Return the outputs in an action's result."""
+    return {name: getattr(result, name) for name in fields_of(result) if name not in _RESULT_FIELDS}

@@ -6,7 +6,6 @@ the start a RECALLED one; every end carries a result that says why. No thread wa
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -65,30 +64,8 @@ class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # n
                 peer_publish(result)
 
 
-class _Goal:
-    """A goal that has not ended. Its interruption may be asked for before the engine knows it."""
-
-    def __init__(self, handle: ServerGoalHandle) -> None:
-        self.handle = handle
-        self._lock = threading.Lock()
-        self._known = False
-        self._interrupt = False
-
-    def known(self) -> bool:
-        """Note that the engine knows it; tell whether it is to be interrupted now."""
-        with self._lock:
-            self._known = True
-            return self._interrupt
-
-    def interrupt(self) -> bool:
-        """Note that it is to be interrupted; tell whether that can be done now."""
-        with self._lock:
-            self._interrupt = True
-            return self._known
-
-
 class SkillManager:
-    """Serves one skill; ``submit`` runs a job on a worker thread, because hooks may wait."""
+    """Serves one skill; ``submit`` runs a job on a thread of its own, because hooks may wait."""
 
     def __init__(
         self,
@@ -106,7 +83,7 @@ class SkillManager:
         self._hooks = hooks
         self._submit = submit
         self._alarms = alarms
-        self._goals: dict[str, _Goal] = {}
+        self._goals: dict[str, ServerGoalHandle] = {}
         self._server = _Server(f"{place}/skill/{skill.name}", types.spec, self._accepted, self._cancel)
 
     def start(self) -> None:
@@ -119,43 +96,34 @@ class SkillManager:
 
     def on_event(self, event: ExecutionEvent) -> None:
         """Follow an execution of this skill."""
-        goal = self._goals.get(event.id)
-        if goal is None:
+        handle = self._goals.get(event.id)
+        if handle is None:
             return
-        if event.state is ExecutionState.REQUESTED:
-            if goal.known():
-                self._submit_interrupt(event.id)
-        elif event.state is ExecutionState.RUNNING:
-            goal.handle.set_accepted()
-            self._feed_back(goal, 0.0, event.outputs)
-            self._report_later(event.id)
+        if event.state.active:
+            if handle.get_goal_status().status in _WAITING:
+                handle.set_accepted()
+                self._report_later(event.id)
+            execution = self._engine.execution(event.id)
+            self._feed_back(handle, 0.0 if execution is None else execution.progress, event.state, event.outputs)
         elif event.state.terminal:
             del self._goals[event.id]
-            self._finish(goal.handle, event)
+            self._finish(handle, event)
 
     def _accepted(self, handle: ServerGoalHandle) -> None:
         identifier = handle.get_goal_id().id
-        self._goals[identifier] = _Goal(handle)
-        self._submit(lambda: self._request(identifier, handle))
-
-    def _request(self, identifier: str, handle: ServerGoalHandle) -> None:
+        self._goals[identifier] = handle
+        # Registered here, with the server's lock held: no cancellation finds its execution unknown.
         try:
-            inputs = self._hooks.make_inputs(values_of(handle.get_goal()))
-            self._engine.request(self._skill.name, inputs, execution_id=identifier)
-        except Exception as error:
-            # The engine knows nothing of this goal; whoever asked must hear of it all the same.
-            if self._goals.pop(identifier, None) is not None:
-                reason = f"{type(error).__name__}: {error}"
-                handle.set_rejected(self._types.result(outcome=ExecutionState.FAILED.value, message=reason), reason)
-            raise
+            self._engine.register(self._skill.name, self._hooks.make_inputs(values_of(handle.get_goal())), execution_id=identifier)
+        except Exception as error:  # noqa: BLE001 - inputs are made by the developer's class
+            del self._goals[identifier]
+            reason = f"the request could not be taken down: {type(error).__name__}: {error}"
+            handle.set_rejected(self._types.result(outcome=ExecutionState.FAILED.value, message=reason), reason)
+            return
+        self._submit(lambda: self._engine.run(identifier))
 
     def _cancel(self, handle: ServerGoalHandle) -> None:
         identifier = handle.get_goal_id().id
-        goal = self._goals.get(identifier)
-        if goal is not None and goal.interrupt():
-            self._submit_interrupt(identifier)
-
-    def _submit_interrupt(self, identifier: str) -> None:
         self._submit(lambda: self._engine.interrupt(identifier))
 
     def _finish(self, handle: ServerGoalHandle, event: ExecutionEvent) -> None:
@@ -182,17 +150,17 @@ class SkillManager:
     def _report(self, identifier: str) -> None:
         """Send the progress of a goal, and again after a period; not before the hook has answered."""
         progress = self._engine.progress(identifier)
-        goal, execution = self._goals.get(identifier), self._engine.execution(identifier)
-        if goal is None or execution is None:
+        handle, execution = self._goals.get(identifier), self._engine.execution(identifier)
+        if handle is None or execution is None:
             return
         if progress is not None:
-            self._feed_back(goal, progress, dict(execution.outputs))
+            self._feed_back(handle, progress, execution.state, dict(execution.outputs))
         self._report_later(identifier)
 
-    def _feed_back(self, goal: _Goal, progress: float, outputs: Any) -> None:
-        feedback = self._types.feedback(progress=progress)
+    def _feed_back(self, handle: ServerGoalHandle, progress: float, state: ExecutionState, outputs: Any) -> None:
+        feedback = self._types.feedback(progress=progress, state=state.value)
         try:
             fill(feedback, outputs, f"outputs of {self._skill.name}")
         except ValueError as error:
             rospy.logerr("%s", error)
-        goal.handle.publish_feedback(feedback)
+        handle.publish_feedback(feedback)

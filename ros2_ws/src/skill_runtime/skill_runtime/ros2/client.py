@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -12,21 +13,24 @@ from action_msgs.srv import CancelGoal
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from skillset_interfaces.msg import Event
-from skillset_interfaces.srv import GetData, Transition
+from skillset_interfaces.msg import Event, SkillStates
+from skillset_interfaces.srv import GetData, SetPaused, Transition
+from skillset_interfaces.srv import Why as WhyService
 
 from skill_language.model import Skillset
 from skill_runtime.core.execution import ExecutionState
+from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
-from skill_runtime.readiness import readiness
+from skill_runtime.messages import why_of
+from skill_runtime.plain import to_plain
 from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.feed import TopicFeed
-from skill_runtime.ros2.names import EVENTS, LIVELINESS_LEASE_S
+from skill_runtime.ros2.names import EVENTS, LATCHED, LIVELINESS_LEASE_S
 from skill_runtime.ros2.presence import Presence
 from skill_runtime.ros2.pursuit import Pursuit, outputs_of
-from skill_runtime.ros2.questions import Questions
+from skill_runtime.ros2.questions import HOOK_PATIENCE_S, Questions
 from skill_runtime.ros2.spinning import SpunHost
-from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer, Why
+from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer
 from skill_runtime.waiting import Pending
 
 __all__ = ["SkillHandle", "SkillsetClient"]
@@ -34,6 +38,9 @@ __all__ = ["SkillHandle", "SkillsetClient"]
 TICK_S = 0.05
 OnChange = Callable[[dict[str, str]], None]
 OnEvent = Callable[[Any], None]
+OnSkills = Callable[[dict[str, Any]], None]
+HOOK_AGAIN_S = 5.0
+SERVICES = {"why": WhyService, "pause": SetPaused, "transition": Transition, "get_data": GetData}
 
 
 class SkillsetClient:
@@ -59,7 +66,8 @@ class SkillsetClient:
         self._on_events: list[OnEvent] = []
         self._open: dict[str, Pursuit] = {}
         self._feeds: dict[str, TopicFeed] = {}
-        self._last: dict[str, Any] = {}
+        self._skills: dict[str, Any] = {}
+        self._on_skills_told: list[OnSkills] = []
         self._moments: WeakSet[Pending[Any]] = WeakSet()
         group = MutuallyExclusiveCallbackGroup()
         self._group = group
@@ -75,6 +83,9 @@ class SkillsetClient:
             group=group,
         )
         node.create_subscription(Event, f"{self.root}/events", self._on_event, EVENTS, callback_group=group)
+        node.create_subscription(SkillStates, f"{self.root}/skill_states", self._on_skill_states, LATCHED, callback_group=group)
+        for service, kind in SERVICES.items():
+            self._questions.prepare(kind, f"{self.root}/{service}")
         # Runs only while there is something to wait for.
         self._timer = node.create_timer(TICK_S, self._tick, callback_group=group, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -144,7 +155,7 @@ class SkillsetClient:
         if not self.ready:
             return self._stillborn(skill)
         actions, clients = self._presence.actions, self._presence.clients
-        pursuit = Pursuit(self.skillset, skill, actions[skill], clients[skill], host=self._host)
+        pursuit = Pursuit(self.skillset, skill, actions[skill], clients[skill], pause=self.set_paused, host=self._host)
         with self._lock:
             self._open[pursuit.handle.id] = pursuit
         pursuit.handle.add_done_callback(self._forget)
@@ -159,18 +170,40 @@ class SkillsetClient:
             ValueError: there is no such skill.
         """
         self._check_skill(skill)
-        event = self._last.get(skill)
-        if event is None:
+        known = self._skills.get(skill)
+        if known is None or not known.last:
             return None
-        outputs = outputs_of(self._presence.actions[skill], json.loads(event.outputs_json or "{}"), skill)
-        return Ended(skill, event.id, ExecutionState(event.state), event.result, event.message, outputs)
+        last = known.last[0]
+        outputs = outputs_of(self._presence.actions[skill], json.loads(last.outputs_json), skill)
+        return Ended(skill, last.id, ExecutionState(last.state), last.result, last.message, outputs)
 
-    def why(self, skill: str, inputs: Mapping[str, object] | None = None) -> Pending[Why]:  # noqa: ARG002
-        """Tell whether the skill could start now, and if not, every reason."""
-        data = {name: feed.sample.value for name, feed in self._feeds.items() if feed.sample is not None and not feed.stale}
-        answer: Pending[Why] = Pending(self._host)
-        answer.resolve(readiness(self.model, skill, self.resources, data))
-        return answer
+    def on_skills(self, callback: OnSkills) -> Forget:
+        """Have ``callback(skills)`` called after changes, with a skillset_interfaces/SkillState by skill; the return value ends that."""
+        return self._subscribe(self._on_skills_told, callback)
+
+    @property
+    def skills(self) -> dict[str, Any]:
+        """Return the skillset_interfaces/SkillState of every skill: what runs, and what ended last; empty until they were heard."""
+        return dict(self._skills)
+
+    def why(self, skill: str, inputs: Mapping[str, object] | None = None) -> Pending[Why]:
+        """Ask the managers whether the skill could start now, and if not, why not; with inputs its ``validate`` is asked, too.
+
+        Raises:
+            ValueError: there is no such skill, or the inputs do not fit; nothing was sent.
+        """
+        inputs_json = "" if inputs is None else json.dumps(to_plain(self._goal(skill, inputs)))
+        self._check_skill(skill)
+        request = WhyService.Request(skill=skill, inputs_json=inputs_json)
+        answer = lambda response, _: why_of(skill, response)  # noqa: E731
+        return self._questions.ask(WhyService, f"{self.root}/why", request, answer, patience_s=HOOK_PATIENCE_S, again_s=HOOK_AGAIN_S)
+
+    def set_paused(self, execution_id: str, paused: bool) -> Pending[str]:  # noqa: FBT001 - as the service has it
+        """Ask for a pause or a resumption; the answer is "", or why not."""
+        request = SetPaused.Request(id=execution_id, paused=paused)
+        answer = lambda response, _: "" if response.accepted else response.reason  # noqa: E731
+        # Asked once only: a hook that takes its time would be asked again.
+        return self._questions.ask(SetPaused, f"{self.root}/pause", request, answer, patience_s=HOOK_PATIENCE_S, again_s=math.inf)
 
     def transition(self, resource: str, to: str) -> Pending[TransitionAnswer]:
         """Ask for an extern transition, as the functional layer does."""
@@ -272,8 +305,6 @@ class SkillsetClient:
 
     def _on_event(self, event: Any) -> None:
         if event.kind == Event.EXECUTION:
-            if ExecutionState(event.state).terminal:
-                self._last[event.skill] = event
             pursuit = self._open.get(event.id)
             if pursuit is not None:
                 pursuit.on_event(event)
@@ -283,6 +314,14 @@ class SkillsetClient:
             callbacks = list(self._on_events)
         for callback in callbacks:
             callback(event)
+
+    def _on_skill_states(self, message: Any) -> None:
+        skills = {skill.name: skill for skill in message.skills}
+        with self._lock:
+            self._skills = skills
+            callbacks = list(self._on_skills_told)
+        for callback in callbacks:
+            callback(dict(skills))
 
     def _wake(self) -> None:
         self._timer.reset()

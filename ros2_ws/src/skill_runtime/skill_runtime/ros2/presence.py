@@ -105,9 +105,10 @@ class Presence:
         answer = future.result()
         if answer is None:
             return
-        self._answered = True
         if self.model is None:
             self._use(answer.model_json)
+        # Last: with an executor of several threads, `tick` may run at the same time.
+        self._answered = True
         if self._doubt_ends_s is not None:
             self._doubt_ends_s = None
             self._on_answer()

@@ -15,19 +15,25 @@ from skill_runtime.waiting import Host, Pending
 AGAIN_S = 1.0
 """An answer that has not come for so long (wall clock) is taken for lost: DDS loses those to clients it has not discovered yet."""
 PATIENCE_S = 5.0
+HOOK_PATIENCE_S = 15.0
+"""For questions that a hook has to answer: the managers give it 10 s."""
 
 
 class Question:
     """One question under way; ``settle`` makes the answer of the response."""
 
-    def __init__(self, client: Any, request: Any, pending: Pending[Any], settle: Callable[[Any, int], object]) -> None:
+    def __init__(
+        self, client: Any, request: Any, pending: Pending[Any], settle: Callable[[Any, int], object], *, patience_s: float, again_s: float
+    ) -> None:
         self._client = client
         self._request = request
         self._pending = pending
         self._settle = settle
+        self._again_s = again_s
+        self._patience_s = patience_s
         self._tries = 0
-        self._asked_s = float("-inf")
-        self._ends_s = time.monotonic() + PATIENCE_S
+        self._due_s = time.monotonic()
+        self._ends_s = time.monotonic() + patience_s
 
     @property
     def open(self) -> bool:
@@ -39,9 +45,9 @@ class Question:
         now_s = time.monotonic()
         if now_s > self._ends_s:
             there = "did not answer" if self._client.service_is_ready() else "is not there"
-            self._pending.fail(f"service {self._client.srv_name} {there} within {PATIENCE_S:g} s")
-        elif now_s - self._asked_s > AGAIN_S and self._client.service_is_ready():
-            self._asked_s = now_s
+            self._pending.fail(f"service {self._client.srv_name} {there} within {self._patience_s:g} s")
+        elif now_s >= self._due_s and self._client.service_is_ready():
+            self._due_s = now_s + self._again_s
             self._tries += 1
             self._client.call_async(self._request).add_done_callback(self._take)
 
@@ -67,13 +73,27 @@ class Questions:
         self._open: list[Question] = []
         self._lock = threading.Lock()
 
-    def ask(self, kind: Any, service: str, request: Any, settle: Callable[[Any, int], Any]) -> Pending[Any]:
-        """Ask; ``settle(response, tries)`` makes the answer. Never waits."""
+    def prepare(self, kind: Any, service: str) -> None:
+        """Have DDS discover a service early: the first answer of one that was just met may get lost."""
         with self._lock:
             if service not in self._clients:
                 self._clients[service] = self._node.create_client(kind, service, callback_group=self._group)
-            pending: Pending[Any] = Pending(self._host)
-            question = Question(self._clients[service], request, pending, settle)
+
+    def ask(
+        self,
+        kind: Any,
+        service: str,
+        request: Any,
+        settle: Callable[[Any, int], Any],
+        *,
+        patience_s: float = PATIENCE_S,
+        again_s: float = AGAIN_S,
+    ) -> Pending[Any]:
+        """Ask; ``settle(response, tries)`` makes the answer. Never waits."""
+        self.prepare(kind, service)
+        pending: Pending[Any] = Pending(self._host)
+        question = Question(self._clients[service], request, pending, settle, patience_s=patience_s, again_s=again_s)
+        with self._lock:
             self._open.append(question)
         question.tick()
         self._wake()
