@@ -10,10 +10,10 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from skill_runtime_models import Recorder, flying_skill, flying_skillset
+from skill_runtime_models import SDK, Recorder, flying_skill, flying_skillset
 
 from skill_language.json_form import from_json
-from skill_language.model import Comparison, Data, DataIs, Parameter, Precondition
+from skill_language.model import Assignment, Comparison, Data, DataIs, Effect, Event, Invariant, Parameter, Precondition, Progress
 from skill_language.ros_types import parse_type
 from skill_runtime.core import ExecutionEvent, ExecutionState
 from skill_runtime.core.errors import SkillRuntimeError
@@ -356,6 +356,45 @@ def test_data_are_fresh_until_three_periods_have_passed():
     assert values == [0.5]
     with pytest.raises(KeyError, match="no data nosuch; it has battery"):
         world.managers["flying"].publish("nosuch", 1)
+
+
+def test_an_invariant_over_data_is_broken_by_a_value_or_by_silence():
+    full = Invariant("charged", DataIs("battery", (), Comparison.GT, 0.2))
+    skill = flying_skill("takeoff", invariants=(full,))
+    skillset = flying_skillset(skill, data=(Data("battery", "float64", period_s=1.0),))
+    for silence in (False, True):
+        world, client = make(skillset, lambda managers: {"takeoff": Timed(managers, 100.0)})
+        world.managers["flying"].publish("battery", 0.5)
+        handle = client.start("takeoff", height=3.0)
+        world.run_for(2.0)
+        if not silence:
+            world.managers["flying"].publish("battery", 0.1)
+        assert handle.wait(50.0)
+        assert (handle.outcome, handle.result) == ("RESOURCE_INVARIANT_VIOLATED", "charged")
+        assert world.now_s == pytest.approx(3.0 if silence else 2.0, abs=1e-6)
+
+
+def test_an_execution_that_stands_still_fails_at_its_deadline():
+    skill = flying_skill("takeoff", progress=Progress(0.1, deadline_s=2.5))
+    world, client = make(flying_skillset(skill), lambda _: {"takeoff": Recorder()})
+    handle = client.start("takeoff", height=3.0)
+    assert handle.wait(50.0)
+    assert handle.outcome == "FAILED"
+    assert world.now_s == pytest.approx(2.6)  # 0.5 at its first report is progress
+
+
+def test_an_event_of_the_model_is_taken_or_refused():
+    calm = Event("calm", guard=SDK, effect=Effect("free", (Assignment("axes", "AVAILABLE"),)))
+    world, client = make(flying_skillset(events=(calm,)))
+    handle = client.start("takeoff", height=3.0)
+    world.run_for(0.1)
+    assert client.trigger("calm").accepted
+    assert handle.wait(0.0)
+    assert (handle.outcome, handle.result) == ("RESOURCE_INVARIANT_VIOLATED", "in_control")
+    assert not client.trigger("nosuch").accepted
+    world.kill("flying")
+    world.run_for(0.0)
+    assert client.trigger("calm").reason == client.transition("sdk", "AVAILABLE").reason == "the managers of flying are not there"
 
 
 def test_missing_outputs_are_as_in_an_empty_message():

@@ -99,6 +99,12 @@ class LocalClient:
             return TransitionReply(accepted=False, reason=self._not_there(), state="")
         return self._managers.transition(resource, to)
 
+    def trigger(self, event: str) -> TransitionReply:
+        """Take an event of the model, or say why not."""
+        if self._managers is None:
+            return TransitionReply(accepted=False, reason=self._not_there(), state="")
+        return self._managers.engine.trigger(event)
+
     def start(self, skill: str, **inputs: object) -> LocalHandle:
         """Ask for an execution; returns at once. When the managers can't be called, the handle has already FAILED.
 

@@ -1,15 +1,12 @@
-"""The data manager without middleware: last value, stamp, staleness, and the fresh values for preconditions."""
+"""The data manager without middleware: last value, stamp, staleness."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from skill_language.model import Data, Skillset
 from skill_runtime.local.clock import VirtualClock
 from skill_runtime.staleness import is_stale
-
-OnData = Callable[[object], None]
 
 
 @dataclass(frozen=True)
@@ -23,8 +20,8 @@ class DataReading:
     value: object = None
 
 
-class LocalData(Mapping[str, object]):
-    """The fresh values by name (a mapping, for preconditions)."""
+class LocalData:
+    """The last values by name."""
 
     def __init__(self, clock: VirtualClock, skillset: Skillset) -> None:
         self._clock = clock
@@ -53,15 +50,3 @@ class LocalData(Mapping[str, object]):
 
     def _stale(self, data: Data, stamp_ns: int) -> bool:
         return is_stale(self._clock.now_ns - stamp_ns, data.period_s)
-
-    def __getitem__(self, name: str) -> object:
-        stamp_ns, value = self._received[name]
-        if self._stale(self._data[name], stamp_ns):
-            raise KeyError(name)
-        return value
-
-    def __iter__(self) -> Iterator[str]:
-        return (name for name, (stamp_ns, _) in self._received.items() if not self._stale(self._data[name], stamp_ns))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)

@@ -15,6 +15,7 @@ from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.local.clock import Job, Timer, VirtualClock
 from skill_runtime.local.data import LocalData
+from skill_runtime.staleness import STALE_PERIODS
 
 _LOG = logging.getLogger(__name__)
 HooksFactory = Callable[["LocalManagers"], Mapping[str, SkillHooks]]
@@ -56,6 +57,8 @@ class LocalManagers:
         self.errors: list[str] = []
         self.alive = True
         self._listeners: list[Listener] = []
+        self._on_step: list[Callable[[Sequence[EngineEvent]], None]] = []
+        self._set_for: int | None = None
         self._history: deque[EngineEvent] = deque(maxlen=EVENTS_KEPT)
         self._hooks = make_hooks(self) if callable(make_hooks) else make_hooks
         self.engine = SkillsetEngine(
@@ -63,7 +66,6 @@ class LocalManagers:
             lambda: clock.now_ns,
             self._hooks,
             self._on_events,
-            data=self.data,
             defer=self.soon,
             on_error=self.note,
         )
@@ -93,8 +95,17 @@ class LocalManagers:
     def publish(self, name: str, value: object) -> None:
         """Give a data a new value; raise KeyError when the model has no such data."""
         self.data.receive(name, value)
+        self.engine.update_data(name, value)
+        stamp_ns, period_s = self.clock.now_ns, next(data.period_s for data in self.skillset.data if data.name == name)
+        if period_s is not None:
+            self.after(STALE_PERIODS * period_s + 1e-9, lambda: self._stale(name, stamp_ns))
+        self._look()
         for listener in self._listeners:
             listener.hear_data(name, value)
+
+    def on_step(self, callback: Callable[[Sequence[EngineEvent]], None]) -> None:
+        """Have ``callback(events)`` called at each step, within it: clients hear of it later."""
+        self._on_step.append(callback)
 
     def describe(self) -> str:
         """Return the model as JSON."""
@@ -132,6 +143,23 @@ class LocalManagers:
 
     # --- parts -------------------------------------------------------------------------------------------------------
 
+    def _stale(self, name: str, stamp_ns: int) -> None:
+        if self.data.read(name).stamp_ns == stamp_ns:
+            self.engine.update_data(name, None)
+            self._look()
+
+    def _look(self) -> None:
+        """Have the engine ticked when something becomes due."""
+        due_ns = self.engine.due_ns
+        if due_ns is not None and due_ns != self._set_for:
+            self._set_for = due_ns
+            self.clock.at(due_ns, lambda: self._do(self._ring))
+
+    def _ring(self) -> None:
+        self._set_for = None
+        self.engine.tick()
+        self._look()
+
     def _request(self, skill: str, values: Mapping[str, object], execution_id: str) -> None:
         inputs = self._hooks[skill].make_inputs(values)
         if skill in self._reports:
@@ -154,11 +182,14 @@ class LocalManagers:
         self._history.extend(events)
         changes = {event.resource: event.to_state for event in events if isinstance(event, TransitionEvent)}
         self._states |= changes
+        for on_step in self._on_step:
+            on_step(events)
         for listener in self._listeners:
             listener.hear_step(dict(self._states) if changes else None, events)
         for event in events:
             if isinstance(event, ExecutionEvent) and event.state.terminal and event.skill in self._reports:
                 self._reports[event.skill].end(event.id)
+        self._look()
 
     def report(self, execution_id: str) -> None:
         """Ask a running execution for its progress, and pass it on."""
