@@ -93,6 +93,7 @@ def test_the_files(files):
         "rover_managers/package.xml",
         "rover_managers/resource/rover_managers",
         "rover_managers/rover_managers/__init__.py",
+        "rover_managers/rover_managers/__main__.py",
         "rover_managers/rover_managers/client.py",
         "rover_managers/rover_managers/hooks.py",
         "rover_managers/rover_managers/inputs.py",

@@ -22,3 +22,11 @@ def navigation(spinning):
     from skill_runtime_rig import Navigation
 
     return Navigation(spinning)
+
+
+@pytest.fixture(params=["single", "separate"])
+def anyhow(request, spinning):
+    """The navigation with its managers in one node, and in nodes that are linked as processes are."""
+    from skill_runtime_rig import Navigation
+
+    return Navigation(spinning, separate=request.param == "separate")

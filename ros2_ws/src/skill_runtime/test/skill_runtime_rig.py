@@ -18,6 +18,7 @@ from skillset_interfaces.srv import Transition
 from skill_runtime.core import ExecutionState
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 from skill_runtime.ros2.names import EVENTS
+from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode
 
 S = ExecutionState
 SOON_S = 10.0
@@ -69,7 +70,7 @@ class Spinning:
 
     def close(self) -> None:
         for node, executor, thread in reversed(self.running):
-            if isinstance(node, SkillsetNode):
+            if hasattr(node, "close"):
                 node.close("the test is over")
             executor.shutdown(timeout_sec=5.0)
             thread.join(5.0)
@@ -79,12 +80,17 @@ class Spinning:
 class Navigation:
     """The managers with recorders, a client, and the events as somebody else hears them."""
 
-    def __init__(self, spinning: Spinning, **node_options: object) -> None:
+    def __init__(self, spinning: Spinning, *, separate: bool = False, **node_options: object) -> None:
         self.hooks = {skill.name: NavigationRecorder() for skill in SKILLSET.skills}
         for name, hooks in self.hooks.items():
             hooks.make_inputs = lambda values, name=name: ABSTRACT_HOOKS[name].inputs_type(**values)
         namespace = str(node_options.get("namespace", ""))
-        self.managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, lambda _: self.hooks, **node_options))
+        if separate:
+            self.managers = spinning.spin(SeparateResourceNode(SKILLSET, navigation_actions, **node_options))
+            for name in self.hooks:
+                spinning.spin(SkillNode(SKILLSET, name, navigation_actions, lambda _: self.hooks, **node_options))
+        else:
+            self.managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, lambda _: self.hooks, **node_options))
         self.node = Node(f"skill_runtime_tester_{next(NUMBERS)}", namespace=namespace)
         self.client = SkillsetClient(self.node, "navigation")
         assert self.client.wait_ready(READY_S)

@@ -40,7 +40,8 @@ def latest(navigation) -> dict[str, SimpleNamespace]:
     return {skill.name: skill for skill in heard[-1].skills}
 
 
-def test_a_late_client_learns_the_last_result_of_every_skill(navigation):
+def test_a_late_client_learns_the_last_result_of_every_skill(anyhow):
+    navigation = anyhow
     navigation.bring(FLYING)
     handle = navigation.fly_straight()
     until(lambda: [e.state for e in latest(navigation)["goto_straight"].open] == ["RUNNING"], "open")
@@ -55,7 +56,8 @@ def test_a_late_client_learns_the_last_result_of_every_skill(navigation):
     assert (skills["land"].open, skills["land"].last) == ([], [])
 
 
-def test_why_answers_over_the_graph(navigation):
+def test_why_answers_over_the_graph(anyhow):
+    navigation = anyhow
     answer = navigation.service(Why, "why", skill="goto_straight")
     assert (answer.known, answer.ready) == (True, False)
     first = answer.unmet[0]
@@ -74,7 +76,8 @@ def test_why_answers_over_the_graph(navigation):
     assert navigation.managers.engine.executions == ()
 
 
-def test_a_stop_has_two_phases_and_a_pause_is_seen(navigation):
+def test_a_stop_has_two_phases_and_a_pause_is_seen(anyhow):
+    navigation = anyhow
     navigation.bring(FLYING)
     phases: list[str] = []
     client = ActionClient(navigation.node, navigation_actions.GotoStraight, "navigation/skill/goto_straight")
@@ -99,9 +102,10 @@ def test_a_stop_has_two_phases_and_a_pause_is_seen(navigation):
     client.destroy()
 
 
-def test_the_emergency_follows_the_mission_clock(spinning):
+@pytest.mark.parametrize("separate", [False, True])
+def test_the_emergency_follows_the_mission_clock(spinning, separate):
     parameters = [Parameter("use_sim_time", value=True), Parameter("interrupt_timeout_s", value=3.0)]
-    navigation = Navigation(spinning, parameter_overrides=parameters)
+    navigation = Navigation(spinning, separate=separate, parameter_overrides=parameters)
     publisher = navigation.node.create_publisher(Clock, "/clock", 10)
 
     def set_time(seconds: float) -> None:
@@ -130,7 +134,8 @@ def test_the_emergency_follows_the_mission_clock(spinning):
     release.set()
 
 
-def test_hooks_that_hang_hold_up_nobody(navigation):
+def test_hooks_that_hang_hold_up_nobody(anyhow):
+    navigation = anyhow
     navigation.bring(FLYING)
     release = threading.Event()
     navigation.hooks["goto_straight"].acts["validate"] = lambda _: str(release.wait(60.0))
@@ -144,7 +149,8 @@ def test_hooks_that_hang_hold_up_nobody(navigation):
     release.set()
 
 
-def test_inputs_that_cannot_be_made_end_their_request_only(navigation):
+def test_inputs_that_cannot_be_made_end_their_request_only(anyhow):
+    navigation = anyhow
     navigation.bring(FLYING)
 
     def burst(_):

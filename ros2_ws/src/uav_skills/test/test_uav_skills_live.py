@@ -73,6 +73,19 @@ def test_an_interrupted_flight_hovers(rig):
     rig.wait(lambda: rig.functional.vehicle.reference == "hover")
 
 
+def test_a_flight_that_rests_goes_on_to_its_target(rig):
+    rig.in_air()
+    handle = rig.start("navigation", "goto", target=(3.0, 0.0, 3.0), speed=1.0)
+    rig.wait(lambda: rig.functional.vehicle.reference == "position")
+    engine = rig.nodes[0].engine
+    rig.wait(lambda: engine.pause(handle.id).accepted)
+    rig.wait(lambda: rig.functional.vehicle.reference == "hover")
+    assert engine.execution(handle.id).state.value == "PAUSED"
+    assert engine.resume(handle.id).accepted
+    assert rig.ended(handle) == ("TERMINATED", "ARRIVED")
+    assert rig.functional.names() == ["set_position", "hover", "set_position"]
+
+
 def test_interrupting_at_once_still_stops_last(rig):
     rig.in_air()
     handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)

@@ -6,7 +6,7 @@ answer comes to a callback; reports are kept and passed on to listeners.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from geometry_msgs.msg import Point
@@ -67,10 +67,12 @@ class GuidanceApi(FunctionalPart):
     """The guidance: references for position and heading, and what it says about following them.
 
     A motion that is under way when this begins was started by managers that are gone: nobody watches it, so it is stopped.
+    ``orphans``: the references that this process may have started before; others are watched elsewhere.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, orphans: Collection[str] = MOTIONS) -> None:
         super().__init__(node)
+        self._orphans = orphans
         self.state: GuidanceState | None = None
         self._listeners: list[Callable[[GuidanceState], None]] = []
         self._takeoff = self._client(Takeoff, "/uav_guidance/takeoff")
@@ -112,7 +114,7 @@ class GuidanceApi(FunctionalPart):
         self._calls.submit(self._land, Command.Request(), reply)
 
     def _on_state(self, state: GuidanceState) -> None:
-        if self.state is None and state.reference in MOTIONS:
+        if self.state is None and state.reference in MOTIONS and state.reference in self._orphans:
             self.hover()
         self.state = state
         for listener in self._listeners:

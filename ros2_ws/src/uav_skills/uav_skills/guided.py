@@ -8,12 +8,13 @@ at all, ends the execution, too: the reference is lost.
 
 from __future__ import annotations
 
+import functools
 import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from skill_runtime.hooks import SkillHooks
-from uav_skills.calls import Answer
+from uav_skills.calls import Answer, Reply, ignore_answer
 from uav_skills.checks import DEFAULT_LIMITS, Limits
 from uav_skills.decisions import DEFAULT_THRESHOLDS, Thresholds, Verdict, remaining_part, speaks_of
 
@@ -86,9 +87,9 @@ class GuidedSkill(SkillHooks):
         instead = "nothing" if state is None else f"{state.reference or 'nothing'} {state.reference_id}"
         return Verdict("ABORTED", f"the guidance does not follow this reference for {silent_s:.1f} s; last it spoke of {instead}")
 
-    def stop(self) -> None:
-        """Stop the function."""
-        self.guidance.hover()
+    def stop(self, reply: Reply = ignore_answer) -> None:
+        """Stop the function; ``reply`` gets the guidance's answer."""
+        self.guidance.hover(reply)
 
     # --- hooks -------------------------------------------------------------------------------------------------------
 
@@ -106,8 +107,14 @@ class GuidedSkill(SkillHooks):
             return 0.0
         return remaining_part(motion.remaining, motion.initial)
 
-    def on_interrupt(self, execution: Execution) -> None:
-        """Stop the vehicle."""
+    def on_interrupt(self, execution: Execution) -> bool:
+        """Stop the vehicle; it is done when the guidance has taken the command."""
+        self._forget(execution)
+        self.stop(functools.partial(self._stopped, execution))
+        return False
+
+    def on_emergency(self, execution: Execution) -> None:
+        """Ask once more, for what is stopped by then is no worse off: the guidance has not answered."""
         self._forget(execution)
         self.stop()
 
@@ -128,6 +135,11 @@ class GuidedSkill(SkillHooks):
             return
         motion.heard_s = self.guidance.now_s
         motion.reference_id = answer.reference_id
+
+    @staticmethod
+    def _stopped(execution: Execution, answer: Answer) -> None:
+        """Take the answer to the stop of an interruption: refused on the ground or without the authority, when nothing of ours moves."""
+        execution.interrupted("" if answer.accepted else f"the stop was not taken: {answer.reason}")
 
     def _on_state(self, state: GuidanceState) -> None:
         motion = self._motion

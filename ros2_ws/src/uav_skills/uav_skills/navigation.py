@@ -17,6 +17,7 @@ from navigation_managers.hooks import (
 )
 
 from uav_skills import checks, decisions
+from uav_skills.calls import Reply, ignore_answer
 from uav_skills.decisions import Verdict
 from uav_skills.functional import GuidanceApi
 from uav_skills.guided import GuidedSkill, Motion
@@ -76,6 +77,23 @@ class _Flight(GuidedSkill):
         speed_m_s, reply = motion.inputs.speed, functools.partial(self.answer, motion)
         self.guidance.set_position(target_enu_m=target, speed_m_s=speed_m_s, along_travel=self.along_travel, reply=reply)
 
+    def on_pause(self, execution: Execution) -> str:
+        """Hover; the way to the target is kept."""
+        motion = self._motion
+        if motion is None or motion.execution is not execution or motion.reference_id is None:
+            return "the guidance has not taken the target yet"
+        motion.reference_id = None  # from now on the guidance speaks of something else
+        self.stop()
+        return ""
+
+    def on_resume(self, execution: Execution) -> str:
+        """Give the position reference again."""
+        motion = self._motion
+        if motion is None or motion.execution is not execution:
+            return "the way to the target is forgotten"
+        self.send(motion)
+        return ""
+
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
         """End on arrival, off the line, or blocked."""
         return decisions.decide_goto(state, self.thresholds)
@@ -127,9 +145,9 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
         heading_rad, reply = motion.inputs.heading, functools.partial(self.answer, motion)
         self.guidance.set_heading(heading_rad=heading_rad, rate_rad_s=LOCK_RATE_RAD_S, lock=True, reply=reply)
 
-    def stop(self) -> None:
+    def stop(self, reply: Reply = ignore_answer) -> None:
         """Release the heading; the motion goes on."""
-        self.guidance.release_heading()
+        self.guidance.release_heading(reply)
 
     def progress(self, execution: Execution) -> float:
         """Tell whether the heading is held."""
@@ -207,7 +225,9 @@ HOOKS: dict[str, type[GuidedSkill]] = {
 
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
     """Make the hooks of all skills of the skillset."""
-    guidance = GuidanceApi(node)
+    # With a process a skill, all hooks are made in each, but only those of the skill that it serves are called.
+    served = getattr(node, "served_skills", tuple(HOOKS))
+    guidance = GuidanceApi(node, orphans={HOOKS[skill].reference for skill in served})
     limits = checks.Limits(**{name: node.declare_parameter(name, value).value for name, value in vars(checks.DEFAULT_LIMITS).items()})
     return {skill: hooks(guidance, limits) for skill, hooks in HOOKS.items()}
 

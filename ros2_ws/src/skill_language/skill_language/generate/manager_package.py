@@ -88,6 +88,20 @@ $data
 """Topic and ROS 2 type of each data, by the name of the data."""
 '''
 
+MAIN = '''\
+"""Serves the skillset ``$skillset``: ``python -m $package --hooks MODULE:FACTORY [--processes separate] [--ros-args ...]``.
+
+$header.
+"""
+
+import $actions
+
+from skill_runtime.ros2.main import main
+from $package.model import DATA_TOPICS, SKILLSET
+
+main(SKILLSET, $actions, DATA_TOPICS)
+'''
+
 
 def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
     """Return the files of the managers' package."""
@@ -97,7 +111,8 @@ def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
     types = [robot.ros_type(p.type) for p in parameters] + [robot.message(data) for data in skillset.data]
     needed = [f"{skillset.name}_interfaces"] if skillset.skills else []
     depends = lines((f"<depend>{name}</depend>" for name in (*needed, *packages(types))), 2)
-    return {
+    main = {f"{package}/{package}/__main__.py": fill(MAIN, **common, actions=f"{skillset.name}_interfaces.action")}
+    return (main if skillset.skills else {}) | {
         f"{package}/package.xml": fill(PACKAGE_XML, **common, maintainer=MAINTAINER, depends=depends).replace("\n\n\n", "\n\n"),
         f"{package}/setup.py": fill(SETUP_PY, **common),
         f"{package}/setup.cfg": fill(SETUP_CFG, **common),

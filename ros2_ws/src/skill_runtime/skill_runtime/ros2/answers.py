@@ -15,7 +15,7 @@ from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.pauses import PauseReply
 from skill_runtime.core.why import Why
 from skill_runtime.plain import to_plain
-from skill_runtime.ros2.deferred import Answer
+from skill_runtime.ros2.deferred import Deferral
 from skill_runtime.ros2.workers import Workers
 
 HOOK_ANSWERS_S = 10.0
@@ -33,8 +33,9 @@ class Answers:
         self._engine = engine
         self._make_inputs = make_inputs
         name = engine.skillset.name
-        node.create_service(WhyService, f"{name}/why", self._why)
-        node.create_service(SetPaused, f"{name}/pause", self._pause)
+        self._deferral = Deferral(node)
+        node.create_service(WhyService, f"{name}/why", self._why, callback_group=self._deferral.group)
+        node.create_service(SetPaused, f"{name}/pause", self._pause, callback_group=self._deferral.group)
 
     async def _why(self, request: Any, response: Any) -> Any:
         names = [skill.name for skill in self._engine.skillset.skills]
@@ -52,15 +53,17 @@ class Answers:
         return why_message(response, self._engine.explain(request.skill, refusal), self._engine.resources)
 
     async def _validated(self, skill: str, inputs: object) -> str:
-        answer: Answer[str] = Answer()
-        self._workers.submit(lambda: self._engine.ask_validate(skill, inputs, answer.give))
-        return await answer.within(HOOK_ANSWERS_S, f"validate has not answered for {HOOK_ANSWERS_S:g} s")
+        def start(give: Callable[[str], None]) -> None:
+            self._workers.submit(lambda: self._engine.ask_validate(skill, inputs, give))
+
+        return await self._deferral.within(start, HOOK_ANSWERS_S, f"validate has not answered for {HOOK_ANSWERS_S:g} s")
 
     async def _pause(self, request: Any, response: Any) -> Any:
-        answer: Answer[PauseReply] = Answer()
-        self._workers.submit(lambda: self._engine.set_paused(request.id, answer.give, paused=request.paused))
+        def start(give: Callable[[PauseReply], None]) -> None:
+            self._workers.submit(lambda: self._engine.set_paused(request.id, give, paused=request.paused))
+
         silent = PauseReply(accepted=False, reason=f"the hook has not answered for {HOOK_ANSWERS_S:g} s")
-        reply = await answer.within(HOOK_ANSWERS_S, silent)
+        reply = await self._deferral.within(start, HOOK_ANSWERS_S, silent)
         response.accepted, response.reason = reply.accepted, reply.reason
         return response
 

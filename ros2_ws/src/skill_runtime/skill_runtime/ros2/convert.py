@@ -104,9 +104,15 @@ def _message(kind: str, value: Any, place: str) -> Any:
     raise ValueError(f"{place} takes a {kind}{' or three numbers' if vector else ''}, not {value!r}")
 
 
-def inputs_from_json(hooks: SkillHooks, action: Any, skill: str, inputs_json: str) -> object:
-    """Make a skill's inputs from a JSON object of them; raise ValueError where it is none or does not fit the goal."""
+def values_from_json(action: Any, skill: str, inputs_json: str) -> dict[str, object]:
+    """Return a skill's inputs as plain values; raise ValueError where the JSON is no object of inputs that fit the goal."""
     values = json.loads(inputs_json)
     if not isinstance(values, dict):
         raise ValueError(f"inputs of {skill} are a JSON object, not {inputs_json}")  # noqa: TRY004 - as for every other misfit
+    plain: dict[str, object] = to_plain(fill(action.Goal(), values, f"inputs of {skill}"))
+    return plain
+
+
+def inputs_from_values(hooks: SkillHooks, action: Any, skill: str, values: Mapping[str, object]) -> object:
+    """Make what hooks get from plain values of the inputs; raise ValueError where they don't fit."""
     return hooks.make_inputs(values_of(fill(action.Goal(), values, f"inputs of {skill}")))

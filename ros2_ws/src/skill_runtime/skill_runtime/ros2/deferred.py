@@ -4,37 +4,55 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Generator
-from typing import Generic, TypeVar
+from collections.abc import Callable, Generator
+from typing import Any, Generic, TypeVar
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
 
 T = TypeVar("T")
-TURN_S = 0.002
-"""rclpy resumes what awaits at every turn of the executor; this much of each turn is spent waiting, not burning."""
 
 
-class Answer(Generic[T]):
-    """A value that another thread gives, once."""
+class Deferral:
+    """Lets a node's services await what other threads give; ``group`` is for these services.
 
-    def __init__(self) -> None:
-        self._given = threading.Event()
+    A group of their own, for an awaiting callback holds up everything else in its group; and a guard condition, for the executor
+    (rclpy 7.1.6) resumes what awaits only after something has woken it.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.group = ReentrantCallbackGroup()
+        self._node = node
+        self._wake: Any = node.create_guard_condition(_nothing, callback_group=self.group)
+
+    async def within(self, start: Callable[[Callable[[T], None]], None], timeout_s: float, otherwise: T) -> T:
+        """Return what ``start(give)`` has given, or ``otherwise`` after a time of wall clock: a hook that hangs hangs nobody else."""
+        answer: _Answer[T] = _Answer(self._wake.trigger)
+        end_s = time.monotonic() + timeout_s
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        timer = self._node.create_timer(timeout_s, _nothing, clock=clock, callback_group=self.group)
+        try:
+            start(answer.give)
+            while not answer.given:
+                if time.monotonic() > end_s:
+                    return otherwise
+                await _Turn()
+            return answer.given[0]
+        finally:
+            self._node.destroy_timer(timer)
+
+
+class _Answer(Generic[T]):
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self.given: list[T] = []
+        self._wake = wake
         self._lock = threading.Lock()
-        self._value: T | None = None
 
     def give(self, value: T) -> None:
-        """Set the value, unless there is one."""
         with self._lock:
-            if not self._given.is_set():
-                self._value = value
-                self._given.set()
-
-    async def within(self, timeout_s: float, otherwise: T) -> T:
-        """Return the value, or ``otherwise`` after a time of wall clock: a hook that hangs must not hang who asks."""
-        end = time.monotonic() + timeout_s
-        while not self._given.wait(TURN_S):
-            if time.monotonic() > end:
-                self.give(otherwise)
-            await _Turn()
-        return self._value  # type: ignore[return-value]  # it is given
+            self.given.append(value)
+        self._wake()
 
 
 class _Turn:
@@ -42,3 +60,7 @@ class _Turn:
 
     def __await__(self) -> Generator[None]:
         yield
+
+
+def _nothing() -> None:
+    """Wake the executor."""

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from skill_language.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.hooks import SkillHooks
-from skill_runtime.ros2.convert import inputs_from_json
+from skill_runtime.ros2.convert import inputs_from_values, values_from_json
 from skill_runtime.ros2.data_manager import DataBindings
 from skill_runtime.ros2.names import action_type
 from skill_runtime.ros2.resource_node import ResourceNode
@@ -58,7 +58,8 @@ class SkillsetNode(ResourceNode):
 
     def make_inputs(self, skill: str, inputs_json: str) -> object:
         """Make what ``validate`` of a skill gets."""
-        return inputs_from_json(self._hooks[skill], self._actions[skill], skill, inputs_json)
+        action = self._actions[skill]
+        return inputs_from_values(self._hooks[skill], action, skill, values_from_json(action, skill, inputs_json))
 
     def on_step(self, events: Sequence[EngineEvent]) -> None:
         """Have the skill managers follow their executions."""

@@ -27,6 +27,16 @@ ALIVE = QoSProfile(
 )
 """``LATCHED`` with signs of life, for ``resource_states``."""
 
+LINK = QoSProfile(
+    depth=1000,
+    history=HistoryPolicy.KEEP_LAST,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+    liveliness=LivelinessPolicy.AUTOMATIC,
+    liveliness_lease_duration=Duration(seconds=LIVELINESS_LEASE_S),
+)
+"""Between the resource manager and the skill managers in other processes."""
+
 GOALS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 """Of the services of an action: with ROS's default, the eleventh request of a burst is lost."""
 

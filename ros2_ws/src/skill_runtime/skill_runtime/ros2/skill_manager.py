@@ -8,17 +8,16 @@ executor): the goal's handle is kept, and its result is set when the engine tell
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import GoalEvent, RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from skill_language.model import Skill
-from skill_runtime.core.engine import SkillsetEngine
+from skill_language.model import Skill, Skillset
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.core.execution import ExecutionState
+from skill_runtime.core.execution import Execution, ExecutionState
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2.convert import fill, values_of
 from skill_runtime.ros2.names import GOALS
@@ -32,13 +31,39 @@ def execution_id(goal_id: Any) -> str:
     return bytes(goal_id.uuid).hex()[:ID_DIGITS]
 
 
+class Engine(Protocol):
+    """What a skill manager needs of the engine, or of its image when that is in another process."""
+
+    skillset: Skillset
+
+    def register(self, skill: str, inputs: object, *, execution_id: str = "") -> Execution:
+        """Take down a request."""
+        ...
+
+    def run(self, execution_id: str) -> None:
+        """Have a registered request validated and started."""
+        ...
+
+    def interrupt(self, execution_id: str) -> bool:
+        """Ask for the end of an execution."""
+        ...
+
+    def execution(self, execution_id: str) -> Execution | None:
+        """Return one that has not ended."""
+        ...
+
+    def progress(self, execution_id: str) -> float | None:
+        """Ask how far an execution is; None when it is not running."""
+        ...
+
+
 class SkillManager:
     """Serves one skill; ``submit`` runs a job on a thread of its own, because ``validate`` and ``on_interrupt`` may wait."""
 
     def __init__(
         self,
         node: Node,
-        engine: SkillsetEngine,
+        engine: Engine,
         skill: Skill,
         action: Any,
         hooks: SkillHooks,

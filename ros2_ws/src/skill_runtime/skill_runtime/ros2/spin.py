@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import signal
 import sys
 import threading
@@ -16,8 +17,12 @@ from rclpy.signals import SignalHandlerOptions
 from skill_language.model import Skillset
 from skill_runtime.ros2.data_manager import DataBindings
 from skill_runtime.ros2.manager_node import HooksFactory, SkillsetNode
+from skill_runtime.ros2.processes import RESOURCES, end_with, supervise
+from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode
 
 END_S = 2.0
+ROS_ARGUMENTS = "--ros-args"
+ALL = "all"
 
 
 def ros2_arguments(arguments: Sequence[str]) -> list[str]:
@@ -32,14 +37,14 @@ def run_skillset(
     *,
     data_bindings: DataBindings | None = None,
     arguments: Sequence[str] | None = None,
+    again: Sequence[str] = (),
 ) -> None:
     """Serve a skillset until SIGINT or SIGTERM; then stop what runs, tell its callers, and return.
 
-    ``arguments`` (default: the command line) may set parameters: ``--ros-args -p use_sim_time:=true``.
+    ``arguments`` (default: the command line) are ``--processes single|separate``, ``--part NAME`` to serve a part only, and those of
+    ROS: ``--ros-args -p use_sim_time:=true``. Exits with 2 when they are wrong. ``again``: what else the command line of a part needs.
     """
-    words = ros2_arguments(sys.argv if arguments is None else arguments)
-    # Our own handlers: rclpy's would shut the context down before the callers were told.
-    rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+    options, words = _options(skillset, sys.argv[1:] if arguments is None else arguments)
     stop = threading.Event()
 
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
@@ -47,15 +52,47 @@ def run_skillset(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
+    if options.parent:
+        end_with(options.parent)
+    if options.processes == "separate" and options.part == ALL:
+        code = supervise(skillset.name, [skill.name for skill in skillset.skills], [*again, *words], stop)
+        if code:
+            sys.exit(code)
+        return
+    # Our own handlers: rclpy's would shut the context down before the callers were told.
+    rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = SkillsetNode(skillset, interfaces, hooks_factory, data_bindings=data_bindings)
+        node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings)
         spin_until(node, stop)
         node.destroy_node()
     finally:
         rclpy.try_shutdown()
 
 
-def spin_until(node: SkillsetNode, stop: threading.Event) -> None:
+def make_part(
+    part: str, skillset: Skillset, interfaces: ModuleType, hooks_factory: HooksFactory, data_bindings: DataBindings | None
+) -> SkillsetNode | SeparateResourceNode | SkillNode:
+    """Make the node of a part: ``all`` managers, the ``resources``' or that of a skill."""
+    if part == ALL:
+        return SkillsetNode(skillset, interfaces, hooks_factory, data_bindings=data_bindings)
+    if part == RESOURCES:
+        return SeparateResourceNode(skillset, interfaces, data_bindings=data_bindings)
+    return SkillNode(skillset, part, interfaces, hooks_factory)
+
+
+def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
+    """Return the options of this command and the words for ROS."""
+    words = ros2_arguments(arguments)
+    split = words.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in words else len(words)
+    skills = [skill.name for skill in skillset.skills]
+    parser = argparse.ArgumentParser(description=f"Serve the skillset {skillset.name}.", epilog="after these: --ros-args ...")
+    parser.add_argument("--processes", choices=["single", "separate"], default="single", help="separate: each skill manager in its own")
+    parser.add_argument("--part", choices=[ALL, RESOURCES, *skills], default=ALL, metavar="PART", help=f"serve {RESOURCES} or a skill only")
+    parser.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this process, the parent, ends")
+    return parser.parse_args(words[:split]), words[split:]
+
+
+def spin_until(node: SkillsetNode | SeparateResourceNode | SkillNode, stop: threading.Event) -> None:
     """Spin a node in a thread of its own until ``stop``; then end its executions while it still spins.
 
     A callback that raises (most are of hooks) fails what runs, for nobody knows whose function is without its watch now;
