@@ -8,6 +8,8 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from skill_runtime.plain import to_plain
+
 if TYPE_CHECKING:
     from skill_runtime.hooks import SkillHooks
 

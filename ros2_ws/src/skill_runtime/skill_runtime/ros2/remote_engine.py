@@ -19,7 +19,7 @@ from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.core.execution import Execution, ExecutionState
 from skill_runtime.core.hook_calls import HookAnswer, call_hook
 from skill_runtime.hooks import SkillHooks
-from skill_runtime.ros2.convert import to_plain
+from skill_runtime.plain import to_plain
 from skill_runtime.ros2.resource_link import ResourceLink
 from skill_runtime.ros2.workers import Workers
 

@@ -16,7 +16,7 @@ from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.core.execution import Execution
 from skill_runtime.core.hook_calls import HookAnswer, Then
-from skill_runtime.ros2.convert import to_plain
+from skill_runtime.plain import to_plain
 from skill_runtime.ros2.link import GONE, LinkEnd
 
 
