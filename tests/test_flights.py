@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from alula_testing.flights import Flight, start_flight
+from alula_testing.flights import Flight, start_flight, story
 
 pytestmark = [pytest.mark.flight, pytest.mark.timeout(1200)]
 Summary = dict[str, Any]
@@ -83,6 +83,12 @@ def test_losing_the_zed_reconfigures_the_mission(failing: Summary) -> None:
     starts = {s: next(e["start_s"] for e in failing["skills"] if e["skill"] == s and e["outcome"] != "NOT_READY") for s in order}
     assert sorted(order, key=lambda s: starts[s]) == order
     assert zed["end_s"] <= starts["lidar_depthmap"]
+
+
+def test_mocks_fly_what_the_simulator_flew(failing: Summary, tmp_path: Path) -> None:
+    flight = start_flight(tmp_path / "mocked", "--mock", "--fail", "zed@30")
+    assert flight.end() == 0, flight.words()
+    assert story(flight.summary) == story(failing)
 
 
 def test_recovery_takes_less_than_a_second(failing: Summary) -> None:

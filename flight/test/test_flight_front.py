@@ -17,6 +17,7 @@ from alula_flight.claims import NoFreeDomainError, claim_domain, free_port
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
+from alula_flight.mocked import command
 from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula_flight.spec import Fault, RequestError, RunSpec, parse_fault
 
@@ -83,6 +84,31 @@ def test_specification_survives_its_file(tmp_path):
 def test_real_autopilot_takes_the_place_of_the_simulator(tmp_path):
     spec = parse(["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--out", str(tmp_path / "run")])
     assert {"simulate:=false", "autopilot:=udpin:127.0.0.1:14550"} <= set(spec.launch_arguments())
+
+
+def test_mocks_need_no_ports_and_know_their_own_faults(tmp_path):
+    spec = parse(["mapping", "--mock", "--fail", "pilot@20", "--behaviour", "gust.yaml", "--out", str(tmp_path / "run")])
+    assert (spec.mock, spec.faults, spec.master_port, spec.mavlink_port) == (True, ("pilot@20",), 0, 0)
+    assert spec.behaviour == (str(Path.cwd() / "gust.yaml"),)
+    spec.save(tmp_path / "run.json")
+    assert RunSpec.load(tmp_path / "run.json") == spec
+    words = command(spec, Path("/alula"))
+    assert [words[n + 1] for n, word in enumerate(words) if word == "--behaviour"] == ["/alula/skillsets/uav/mock.yaml", *spec.behaviour]
+    assert words[words.index("--fail") + 1] == "pilot@20"
+
+
+@pytest.mark.parametrize(
+    ("more", "complaint"),
+    [
+        (["--behaviour", "x.yaml"], "add --mock"),
+        (["--mock", "--autopilot", "tcp:127.0.0.1:5760"], "leave out --autopilot"),
+        (["--mock", "--rate", "2"], "no --rate limits"),
+        (["--mock", "--fail", "zed@x"], "write WHAT@SECONDS"),
+    ],
+)
+def test_what_does_not_go_together_with_mocks(more, complaint, tmp_path):
+    with pytest.raises(RequestError, match=complaint):
+        parse(["mapping", "--out", str(tmp_path / "run"), *more])
 
 
 def test_parallel_runs_get_different_domains_and_give_them_back():

@@ -116,6 +116,18 @@ class Flight:
             end_run(self.run_id)
 
 
+# Two skillsets are asked in one tick: over a network either may be first.
+SIDE_BY_SIDE = {"zed_depthmap", "lidar_mapping"}
+
+
+def story(summary: Mapping[str, Any]) -> list[object]:
+    """Return skill, outcome and result of all executions in the order of their requests; those side by side as one set."""
+    entries = [(e["skill"], e["outcome"], e["result"]) for e in sorted(summary["skills"], key=lambda e: float(e["start_s"]))]
+    beside = frozenset(entry for entry in entries if entry[0] in SIDE_BY_SIDE)
+    rest: list[object] = [entry for entry in entries if entry[0] not in SIDE_BY_SIDE]
+    return [*rest[:1], beside, *rest[1:]]
+
+
 def start_flight(out: Path, *arguments: str) -> Flight:
     """Start ``./alula fly mapping ARGUMENTS`` as fast as the machine can, as a user's shell would."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_"))}

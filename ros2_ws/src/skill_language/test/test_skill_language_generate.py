@@ -97,6 +97,7 @@ def test_the_files(files):
         "rover_managers/rover_managers/client.py",
         "rover_managers/rover_managers/hooks.py",
         "rover_managers/rover_managers/inputs.py",
+        "rover_managers/rover_managers/mock.py",
         "rover_managers/rover_managers/model.py",
         "rover_managers/setup.cfg",
         "rover_managers/setup.py",

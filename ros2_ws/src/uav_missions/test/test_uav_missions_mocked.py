@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import json
+import os
 import random
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -13,6 +17,7 @@ from skill_missions.director import Outcome
 from skill_missions.mocked import FaultRequest, MockedMission
 from skill_runtime.core import ExecutionEvent
 from skill_runtime.mock import load_behaviour
+from uav_missions import mock_flight
 from uav_missions.plan import mapping_plan
 from uav_missions.route import Route, load_route
 
@@ -145,3 +150,37 @@ def test_a_campaign_always_comes_to_an_end_and_down():
         assert mission.play.stage.notes == [], seed
     assert set(outcomes) == {Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP}
     assert min(outcomes.values()) > 10
+
+
+def arguments(out: Path, *more: str) -> list[str]:
+    route, behaviour = ALULA_ROOT / "ros1_ws/src/uav_simulator/config/yard.yaml", ALULA_ROOT / "skillsets/uav/mock.yaml"
+    return ["--out", str(out), "--route", str(route), "--behaviour", str(behaviour), *more]
+
+
+def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
+    assert mock_flight.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
+    mission = json.loads((tmp_path / "run/mission.json").read_text())
+    assert (mission["outcome"], mission["waypoints_reached"]) == ("given_up", 1)
+    events = [json.loads(line) for line in (tmp_path / "run/events.jsonl").read_text().splitlines()]
+    for skillset in ("navigation", "perception", "mapping"):
+        numbers = [event["sequence"] for event in events if event["skillset"] == skillset]
+        assert numbers == list(range(1, len(numbers) + 1))
+    mock = json.loads((tmp_path / "run/mock.json").read_text())
+    assert [(fault["sensor"], round(fault["t_s"] - mock["lift_off_s"], 2)) for fault in mock["faults"]] == [("zed", 8.0), ("lidar", 8.0)]
+    assert mock["notes"] == []
+    assert (tmp_path / "run/tree.svg").read_text().startswith("<svg")
+    assert json.loads((tmp_path / "run/tree.json").read_text())["status"] == "FAILURE"
+
+
+def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):
+    assert mock_flight.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
+    assert capsys.readouterr().err == "--fail imu: the behaviour has no such fault; it has zed, lidar, pilot\n"
+    assert not (tmp_path / "run").exists()
+
+
+def test_no_ros_is_needed(tmp_path):
+    code = (
+        "import sys; from uav_missions.mock_flight import main; code = main(sys.argv[1:]);"
+        "assert not {m for m in sys.modules if m.startswith(('rclpy', 'rospy', 'geometry_msgs'))}; sys.exit(code)"
+    )
+    subprocess.run([sys.executable, "-c", code, *arguments(tmp_path / "run")], check=True, env=dict(os.environ), timeout=60)

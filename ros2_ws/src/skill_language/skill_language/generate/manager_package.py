@@ -6,6 +6,7 @@ import json
 
 from skill_language.generate.client_code import client_module
 from skill_language.generate.manager_code import hooks_module, inputs_module
+from skill_language.generate.mock_module import mock_module
 from skill_language.generate.text import MAINTAINER, fill, header, lines, packages
 from skill_language.json_form import to_json
 from skill_language.model import Skillset
@@ -49,6 +50,7 @@ setup(
     maintainer_email="alula@alula-robotics.org",
     description="The managers' side of the skillset $skillset.",
     license="Apache-2.0",
+    entry_points={"console_scripts": ["mock = $package.mock:main"]},
 )
 """
 
@@ -120,6 +122,7 @@ def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
         f"{package}/{package}/inputs.py": inputs_module(robot, skillset),
         f"{package}/{package}/hooks.py": hooks_module(robot, skillset),
         f"{package}/{package}/client.py": client_module(robot, skillset),
+        f"{package}/{package}/mock.py": mock_module(robot, skillset),
     }
 
 

@@ -57,6 +57,7 @@ class LocalManagers:
         self.errors: list[str] = []
         self.alive = True
         self._listeners: list[Listener] = []
+        self._on_step: list[Callable[[Sequence[EngineEvent]], None]] = []
         self._set_for: int | None = None
         self._history: deque[EngineEvent] = deque(maxlen=EVENTS_KEPT)
         self._hooks = make_hooks(self) if callable(make_hooks) else make_hooks
@@ -101,6 +102,10 @@ class LocalManagers:
         self._look()
         for listener in self._listeners:
             listener.hear_data(name, value)
+
+    def on_step(self, callback: Callable[[Sequence[EngineEvent]], None]) -> None:
+        """Have ``callback(events)`` called at each step, within it: clients hear of it later."""
+        self._on_step.append(callback)
 
     def describe(self) -> str:
         """Return the model as JSON."""
@@ -177,6 +182,8 @@ class LocalManagers:
         self._history.extend(events)
         changes = {event.resource: event.to_state for event in events if isinstance(event, TransitionEvent)}
         self._states |= changes
+        for on_step in self._on_step:
+            on_step(events)
         for listener in self._listeners:
             listener.hear_step(dict(self._states) if changes else None, events)
         for event in events:

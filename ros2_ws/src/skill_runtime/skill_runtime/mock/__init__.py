@@ -8,6 +8,7 @@ from skill_runtime.mock.play import Play
 from skill_runtime.mock.reading import load_behaviour
 from skill_runtime.mock.skill import MockSkill
 from skill_runtime.mock.stage import Stage
+from skill_runtime.mock.starter import starter
 
 __all__ = [
     "NEVER",
@@ -27,4 +28,5 @@ __all__ = [
     "Stage",
     "load_behaviour",
     "mock_world",
+    "starter",
 ]

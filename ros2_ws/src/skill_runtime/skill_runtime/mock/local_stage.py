@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 
 from skill_language.model import Skillset
@@ -60,15 +61,16 @@ def mock_world(
     for skillset in skillsets:
         for resource in skillset.resources:
             play.on_state(skillset.name, resource.name, resource.initial)
-        world.serve(skillset, play.hooks_of(skillset))
-
-    def follow(skillset: str, event: EngineEvent) -> None:
-        if isinstance(event, TransitionEvent):
-            play.on_state(skillset, event.resource, event.to_state)
-
-    world.on_event(follow)
+        # At once, whatever the world's latency: the functional layer is nearer than any client.
+        world.serve(skillset, play.hooks_of(skillset)).on_step(functools.partial(_follow, play, skillset.name))
     world.clock.soon(play.begin)
     return world, play
+
+
+def _follow(play: Play, skillset: str, events: Sequence[EngineEvent]) -> None:
+    for event in events:
+        if isinstance(event, TransitionEvent):
+            play.on_state(skillset, event.resource, event.to_state)
 
 
 def _namespaces(value: object) -> object:

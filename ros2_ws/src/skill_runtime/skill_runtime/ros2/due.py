@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from rclpy.node import Node
 
-from skill_runtime.core.engine import SkillsetEngine
+
+class Due(Protocol):
+    """Something that wants to be called at a moment of mission clock: an engine, a mock's agenda."""
+
+    @property
+    def due_ns(self) -> int | None:
+        """When, or None: not by time alone."""
+        ...
+
+    def tick(self) -> None:
+        """Do what has become due."""
+        ...
 
 
 class DueTimer:
     """Serves ``due_ns`` of an engine; ``look`` is to be called after every step that may have changed it."""
 
-    def __init__(self, node: Node, engine: SkillsetEngine) -> None:
+    def __init__(self, node: Node, engine: Due) -> None:
         self._engine = engine
         self._clock = node.get_clock()
         self._timer = node.create_timer(1.0, self._ring, autostart=False)
