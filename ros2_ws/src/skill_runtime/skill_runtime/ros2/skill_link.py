@@ -6,7 +6,6 @@ import itertools
 import json
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
@@ -20,11 +19,6 @@ from skill_runtime.plain import to_plain
 from skill_runtime.ros2.link import GONE, LinkEnd
 
 
-@dataclass(frozen=True)
-class _Call:
-    then: Then
-
-
 class SkillLink:
     """One skill's manager, wherever it is: calls its hooks, and does with the engine what it asks for."""
 
@@ -34,7 +28,9 @@ class SkillLink:
         self._manager = ""
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
-        self._pending: dict[str, _Call] = {}
+        self._pending: dict[str, Then] = {}
+        self._orphans: set[str] = set()
+        """Executions that have failed with their manager: nobody has their hooks any more."""
         place = f"{engine.skillset.name}/managers/{skill}"
         self._end = LinkEnd(node, to=f"{place}/calls", of=f"{place}/requests", on_message=self._hear, on_gone=lambda: self._lose(GONE))
         self._handlers: Mapping[str, Callable[[str, dict[str, Any]], None]] = {
@@ -59,11 +55,11 @@ class SkillLink:
         """Call a hook over there; who is not there answers with an error."""
         number = str(next(self._numbers))
         with self._lock:
-            manager = self._manager
-            if manager:
-                self._pending[number] = _Call(then)
-        if not manager:
-            then(HookAnswer(error=f"the manager of {self._skill} is not there"))
+            orphan, manager = execution.id in self._orphans, self._manager
+            if manager and not orphan:
+                self._pending[number] = then
+        if orphan or not manager:
+            then(HookAnswer() if orphan else HookAnswer(error=f"the manager of {self._skill} is not there"))
             return
         body = {"hook": hook, "execution": execution.id, "state": execution.state.value}
         body |= {"result": execution.result, "message": execution.message}
@@ -103,12 +99,13 @@ class SkillLink:
                 return
             self._manager = ""
             pending, self._pending = self._pending, {}
+            orphans = [execution.id for execution in self._engine.executions if execution.skill == self._skill]
+            self._orphans = set(orphans)
         text = f"the manager of {self._skill} has gone: {reason}"
-        for execution in self._engine.executions:
-            if execution.skill == self._skill:
-                self._engine.fail(execution.id, text)
-        for call in pending.values():
-            call.then(HookAnswer(error=text))
+        for identifier in orphans:
+            self._engine.fail(identifier, text)
+        for then in pending.values():
+            then(HookAnswer(error=text))
 
     # --- what it asks for --------------------------------------------------------------------------------------------
 
@@ -123,9 +120,9 @@ class SkillLink:
 
     def _answer(self, number: str, body: dict[str, Any]) -> None:
         with self._lock:
-            call = self._pending.pop(number, None)
-        if call is not None:
-            call.then(HookAnswer(body["value"], body["error"], body["trace"]))
+            then = self._pending.pop(number, None)
+        if then is not None:
+            then(HookAnswer(body["value"], body["error"], body["trace"]))
 
     def _reply(self, number: str, value: object) -> None:
         self._end.send(self._manager, "reply", number, {"value": value})

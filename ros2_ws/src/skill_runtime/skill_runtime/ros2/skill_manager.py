@@ -24,6 +24,8 @@ from skill_runtime.ros2.names import GOALS
 
 Job = Callable[[], object]
 ID_DIGITS = 12
+RESULT_KEPT_S = 3.0
+"""How long who asks late still gets a result. Each status message names every goal that is kept: many in a row cost by their number."""
 
 
 def execution_id(goal_id: Any) -> str:
@@ -88,6 +90,7 @@ class SkillManager:
             goal_service_qos_profile=GOALS,
             result_service_qos_profile=GOALS,
             cancel_service_qos_profile=GOALS,
+            result_timeout=RESULT_KEPT_S,
         )
         self._timer: Any = None
         if skill.progress is not None:
