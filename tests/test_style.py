@@ -10,10 +10,11 @@ import pytest
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 # Each room's Python packages, type-checked together; generated packages and the tests are left to ruff.
 ROS1_PACKAGES = ("uav_guidance", "resource_reporter", "perception_core", "zed_depth", "lidar_obstacles", "lidar_mapping", "uav_simulator")
+ROS2_PACKAGES = ("skill_language", "skill_runtime", "skill_panel", "skill_missions", "uav_skills", "uav_missions")
 TYPED = [
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",
-    *(f"ros2_ws/src/{name}/{name}" for name in ("skill_language", "skill_runtime", "skill_missions", "uav_skills", "uav_missions")),
+    *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
 ]
 

@@ -49,7 +49,7 @@ def claim_domain(domains: Iterable[int] = DOMAINS) -> DomainClaim:
     for domain in domains:
         lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            lock.bind(("127.0.0.1", RTPS_PORT + RTPS_PORTS_PER_DOMAIN * domain))
+            lock.bind(("127.0.0.1", _claim_port(domain)))
             lock.listen(1)
         except OSError:
             lock.close()
@@ -57,3 +57,17 @@ def claim_domain(domains: Iterable[int] = DOMAINS) -> DomainClaim:
         else:
             return DomainClaim(domain, lock)
     raise NoFreeDomainError(f"all {tried} DDS domains are in use by other runs on this machine; end some first")
+
+
+def is_claimed(domain: int) -> bool:
+    """Tell whether a run on this machine holds the domain."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", _claim_port(domain)))
+        except OSError:
+            return True
+    return False
+
+
+def _claim_port(domain: int) -> int:
+    return RTPS_PORT + RTPS_PORTS_PER_DOMAIN * domain

@@ -289,11 +289,15 @@ class Progress:
 
 @dataclass(frozen=True)
 class Interrupt:
-    """What an interruption does: whether it takes time, its effect, and what must hold after it."""
+    """What an interruption does: whether it takes time, its effect, and what must hold after it.
+
+    A stop that is not done after ``timeout_s`` seconds is an emergency; None leaves the limit to the managers.
+    """
 
     interrupting: bool = False
     effect: Effect = NO_EFFECT
     postcondition: Expression = TRUE
+    timeout_s: float | None = None
     span: Span = field(default=NOWHERE, compare=False)
 
 

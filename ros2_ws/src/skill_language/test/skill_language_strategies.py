@@ -128,7 +128,7 @@ def skills(draw):
         start=draw(used),
         invariants=tuple(draw(st.lists(st.builds(Invariant, names, any_condition, used, st.none() | holds), max_size=3))),
         progress=draw(st.none() | progresses),
-        interrupt=draw(st.builds(Interrupt, st.booleans(), used, postconditions)),
+        interrupt=draw(st.builds(Interrupt, st.booleans(), used, postconditions, st.none() | floats)),
         results=tuple(draw(st.lists(results(used), max_size=3))),
     )
 

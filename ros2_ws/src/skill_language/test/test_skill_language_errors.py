@@ -129,6 +129,7 @@ SEMANTICS = [
     ("ALU213", "data d: float64 property p: never ^d > 1", "only preconditions and invariants may", ""),
     ("ALU220", "skill f { ^progress = 1 deadline = 1 result { R } }", "deadline of `f` is 1 s, its period 1 s", ""),
     ("ALU221", "data d: float64 " + asks("invariant { i: data = (d > 1) ^for 0 s }"), "it must be positive", ""),
+    ("ALU221", asks("interrupt { ^timeout = 0 }"), "it must be positive", ""),
     ("ALU221", AXES + asks("invariant { i: resource = (axes == USED) ^recovers at 3 }"), "no single comparison", "fps >= 10"),
     ("ALU221", "data d: float64 " + asks("invariant { i: data = (d > 9) ^recovers at 8 }"), "not above its threshold", ""),
     ("ALU221", "data d: float64 " + asks("invariant { i: data = (d < 9 m) ^recovers at 0.1 km }"), "not below its threshold", ""),

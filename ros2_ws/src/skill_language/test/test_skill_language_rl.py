@@ -107,6 +107,8 @@ def test_members_in_all_their_forms(texts):
         ("interrupt { }", "interrupt", Interrupt()),
         ("interrupt interrupting false effect r -> B", "interrupt", Interrupt(effect=TO_B)),
         ("interrupt { effect { r -> B } postcondition r == B interrupting true }", "interrupt", Interrupt(True, TO_B, B)),
+        ("interrupt { timeout 500 ms effect r -> B }", "interrupt", Interrupt(effect=TO_B, timeout_s=0.5)),
+        ("interrupt timeout 2 s effect r -> B", "interrupt", Interrupt(effect=TO_B, timeout_s=2.0)),
         ("success ok", "results", (Result("ok", ResultKind.SUCCESS),)),
         ("success { a {} b }", "results", (Result("a", ResultKind.SUCCESS), Result("b", ResultKind.SUCCESS))),
         ("failure ko { effect r -> B postcondition r == B }", "results", (Result("ko", ResultKind.FAILURE, TO_B, B),)),

@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 class SkillHooks:
     """Base of all hooks; every method may be overridden, ``on_dispatch`` should be.
 
-    Order of calls for one execution: ``validate``, ``on_dispatch``, any number of ``progress``, then at most one of
-    ``on_interrupt``, ``on_violation``, ``on_failure``. The last never overtakes ``on_dispatch``, and none of them is called
-    after ``execution.terminate`` was accepted. Hooks of different executions may run at the same time in different threads.
+    Order of calls for one execution: ``validate``, ``on_dispatch``, any number of ``progress``, ``on_pause`` and ``on_resume``, then
+    at most one of ``on_interrupt``, ``on_violation``, ``on_failure``. The last never overtakes ``on_dispatch``, ``on_pause`` or
+    ``on_resume``, and none of them is called after ``execution.terminate`` was accepted. ``on_emergency`` may come while any of
+    them still waits. Hooks of different executions may run at the same time in different threads.
     A hook that raises ends its execution as FAILED.
     """
 
@@ -37,8 +38,23 @@ class SkillHooks:
         """Return how far the function is, 0 to 1. Called every period of the model while RUNNING; must not wait."""
         return execution.progress
 
-    def on_interrupt(self, execution: Execution) -> None:
-        """Stop the function. Called when an interruption is asked for, before the interrupt effect is applied."""
+    def on_interrupt(self, execution: Execution) -> bool | None:
+        """Stop the function. Called when an interruption is asked for, before the interrupt effect is applied.
+
+        Return False when the stop is only under way: then call ``execution.interrupted()`` when it is done. When that takes longer
+        than the model's ``timeout`` (or the managers' default), ``on_emergency`` is called.
+        """
+
+    def on_emergency(self, execution: Execution) -> None:
+        """Stop the function by the strongest means there are. Called when a stop was not done in time; the execution ends then."""
+
+    def on_pause(self, execution: Execution) -> str | None:
+        """Have the function rest, so that it can go on; return why it can't, or "". Called while RUNNING; what is held stays held."""
+        return f"{execution.skill} can't be paused"
+
+    def on_resume(self, execution: Execution) -> str | None:
+        """Have the function go on; return why it can't, or "". Called while PAUSED."""
+        return f"{execution.skill} can't be resumed"
 
     def on_violation(self, execution: Execution) -> None:
         """Stop the function. Called after a broken invariant has ended the execution; ``execution.result`` names it."""

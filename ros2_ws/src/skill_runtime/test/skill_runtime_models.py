@@ -87,8 +87,17 @@ class Recorder(SkillHooks):
         value = self._note("progress", execution)
         return 0.5 if value is None else value
 
-    def on_interrupt(self, execution) -> None:
-        self._note("on_interrupt", execution)
+    def on_interrupt(self, execution) -> bool | None:
+        return self._note("on_interrupt", execution)
+
+    def on_emergency(self, execution) -> None:
+        self._note("on_emergency", execution)
+
+    def on_pause(self, execution) -> str | None:
+        return self._note("on_pause", execution)
+
+    def on_resume(self, execution) -> str | None:
+        return self._note("on_resume", execution)
 
     def on_violation(self, execution) -> None:
         self._note("on_violation", execution)

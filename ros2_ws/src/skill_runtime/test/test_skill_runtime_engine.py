@@ -147,7 +147,7 @@ def test_interrupt_stops_the_function_then_applies_its_effect():
     seen = []
     bench.hooks["takeoff"].acts["on_interrupt"] = lambda e: seen.append((e.state, bench.states()["axes"]))
     assert bench.engine.interrupt(execution.id)
-    assert seen == [(S.RUNNING, "USED")]
+    assert seen == [(S.INTERRUPTING, "USED")]
     assert execution.state is S.INTERRUPTED
     assert bench.states()["axes"] == "AVAILABLE"
     assert not bench.engine.interrupt(execution.id)
@@ -285,7 +285,7 @@ def test_a_listener_that_raises_or_asks_back_does_no_harm():
         bench.engine.transition("sdk", "NOSUCH")
         raise ValueError("listener")
 
-    bench.engine._outbox._listener = listener
+    bench.engine._floor._outbox._listener = listener
     bench.run().terminate("DONE")
     assert told == [2, 3, 4, 5, 6]
     assert "listener" in bench.errors[0]

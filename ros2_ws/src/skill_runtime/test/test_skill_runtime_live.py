@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import signal
@@ -20,17 +19,23 @@ navigation_actions = pytest.importorskip("navigation_interfaces.action")
 
 from action_msgs.msg import GoalStatus  # noqa: E402
 from geometry_msgs.msg import Point  # noqa: E402
-from navigation_managers.hooks import ABSTRACT_HOOKS  # noqa: E402
 from navigation_managers.inputs import GotoStraightInputs  # noqa: E402
 from navigation_managers.model import SKILLSET  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.time import Time  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from skill_runtime_models import Recorder  # noqa: E402
-from skillset_interfaces.msg import Event  # noqa: E402
+from skill_runtime_rig import (  # noqa: E402
+    FLYING,
+    NUMBERS,
+    READY_S,
+    SOON_S,
+    Navigation,
+    take,
+    until,
+)
 from skillset_interfaces.srv import Describe, GetData, Transition  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from uav_msgs.msg import GuidanceState  # noqa: E402
@@ -46,103 +51,6 @@ from skill_runtime.ros2.pursuit import Pursuit  # noqa: E402
 from skill_runtime.ros2.spin import spin_until  # noqa: E402
 
 S = ExecutionState
-SOON_S = 10.0
-READY_S = 30.0
-NUMBERS = itertools.count()
-FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
-
-
-def until(condition, what: str, timeout_s: float = SOON_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, f"not within {timeout_s} s: {what}"
-        time.sleep(0.002)
-
-
-def ask(node, kind, service: str, **request: object):
-    """Call a service, again when the answer does not come: DDS loses those to clients that it has not discovered yet."""
-    client = node.create_client(kind, service)
-    assert client.wait_for_service(SOON_S)
-    answers: list = []
-    until(lambda: answers.append(client.call(kind.Request(**request), timeout_sec=1.0)) or answers[-1] is not None, f"{service} answers")
-    node.destroy_client(client)
-    return answers[-1]
-
-
-def take(node, resource: str, state: str) -> None:
-    """Take an extern transition, as the functional layer does."""
-    answer = ask(node, Transition, "navigation/transition", resource=resource, to=state)
-    assert answer.accepted or answer.state == state, answer.reason
-
-
-class NavigationRecorder(Recorder):
-    inputs_type = None
-
-
-class Spinning:
-    """Nodes, each spun by a thread of its own."""
-
-    def __init__(self) -> None:
-        self.running: list = []
-
-    def spin(self, node):
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        thread = threading.Thread(target=executor.spin, daemon=True)
-        thread.start()
-        self.running.append((node, executor, thread))
-        return node
-
-    def close(self) -> None:
-        for node, executor, thread in reversed(self.running):
-            if isinstance(node, SkillsetNode):
-                node.close("the test is over")
-            executor.shutdown(timeout_sec=5.0)
-            thread.join(5.0)
-            node.destroy_node()
-
-
-@pytest.fixture
-def spinning(ros2_domain):
-    nodes = Spinning()
-    yield nodes
-    nodes.close()
-
-
-class Navigation:
-    """The managers with recorders, a client, and the events as somebody else hears them."""
-
-    def __init__(self, spinning: Spinning, **node_options: object) -> None:
-        self.hooks = {skill.name: NavigationRecorder() for skill in SKILLSET.skills}
-        for name, hooks in self.hooks.items():
-            hooks.make_inputs = lambda values, name=name: ABSTRACT_HOOKS[name].inputs_type(**values)
-        namespace = str(node_options.get("namespace", ""))
-        self.managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, lambda _: self.hooks, **node_options))
-        self.node = Node(f"skill_runtime_tester_{next(NUMBERS)}", namespace=namespace)
-        self.client = SkillsetClient(self.node, "navigation")
-        assert self.client.wait_ready(READY_S)
-        self.events: list = []
-        self.node.create_subscription(Event, "navigation/events", self.events.append, EVENTS)
-        spinning.spin(self.node)
-
-    def service(self, kind, service: str, **request: object):
-        return ask(self.node, kind, f"navigation/{service}", **request)
-
-    def bring(self, states: dict[str, str]) -> None:
-        """Take extern transitions, as the functional layer does."""
-        for resource, state in states.items():
-            take(self.node, resource, state)
-
-    def fly_straight(self):
-        handle = self.client.start("goto_straight", target=(1, 2.5, 3), speed=1)
-        until(lambda: handle.state is S.RUNNING, f"goto_straight runs, it is {handle}")
-        assert self.hooks["goto_straight"].dispatched.wait(SOON_S)
-        return handle
-
-
-@pytest.fixture
-def navigation(spinning):
-    return Navigation(spinning)
 
 
 def test_an_execution_from_request_to_result(navigation):

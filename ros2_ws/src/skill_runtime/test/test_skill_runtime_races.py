@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections import Counter, defaultdict
 from itertools import pairwise, permutations
 
@@ -37,7 +38,9 @@ JOIN_S = 20.0
 RESOURCES = ("r0", "r1", "r2")
 SKILLS = ("s0", "s1", "s2")
 RESULTS = ("A", "B", "NOSUCH")
-HOOKS = ("validate", "on_dispatch", "progress", "on_interrupt", "on_violation", "on_failure")
+STOPS = ("on_interrupt", "on_violation", "on_failure")
+HOOKS = ("validate", "on_dispatch", "progress", *STOPS, "on_pause", "on_resume", "on_emergency")
+FOREVER_NS = 10**12
 
 
 @st.composite
@@ -89,14 +92,15 @@ def skillsets(draw):
     return Skillset("random", resources=resources, skills=tuple(draw(skills(name, resources)) for name in SKILLS))
 
 
-ACTS = st.sampled_from(["", "", "", "raise", "terminate", "interrupt", "fail", "refuse", "transition"])
+ACTS = st.sampled_from(["", "", "", "slow", "later", "raise", "terminate", "interrupt", "fail", "refuse", "transition"])
 BEHAVIOURS = st.fixed_dictionaries(dict.fromkeys(HOOKS, ACTS))
 OPERATIONS = st.one_of(
     st.tuples(st.just("request"), st.sampled_from(SKILLS)),
     st.tuples(st.just("request"), st.sampled_from(SKILLS)),
     st.tuples(st.just("transition"), st.sampled_from(RESOURCES), st.sampled_from(["X", "Y", "Z"])),
     st.tuples(st.sampled_from(["terminate"]), st.integers(0, 5), st.sampled_from(RESULTS)),
-    st.tuples(st.sampled_from(["interrupt", "fail", "progress"]), st.integers(0, 5)),
+    st.tuples(st.sampled_from(["interrupt", "fail", "progress", "pause", "resume", "interrupted"]), st.integers(0, 5)),
+    st.tuples(st.just("time"), st.sampled_from([10**9, 10**10])),
 )
 PROGRAMS = st.lists(st.lists(OPERATIONS, min_size=1, max_size=12), min_size=1, max_size=3)
 
@@ -113,7 +117,9 @@ def act(bench, what, execution):
         execution.fail("hook says so")
     elif what == "interrupt" and hasattr(execution, "id"):
         bench.engine.interrupt(execution.id)
-    return {"refuse": "no", "terminate": 0.5}.get(what)
+    elif what == "slow":
+        time.sleep(0.001)
+    return {"refuse": "no", "terminate": 0.5, "later": False}.get(what)
 
 
 def give_hooks(bench, behaviours, running):
@@ -128,7 +134,8 @@ def give_hooks(bench, behaviours, running):
                     answer = act(bench, what, execution)
                 finally:
                     running.append((identifier, hook, "end"))
-                return answer if hook == "validate" and isinstance(answer, str) else None
+                fits = {"validate": str, "on_pause": str, "on_resume": str, "on_interrupt": bool}.get(hook, type(None))
+                return answer if isinstance(answer, fits) else None
 
             recorder.acts[hook] = call
 
@@ -140,6 +147,9 @@ def perform(bench, ids, program):
                 ids.append(bench.run(skill).id)
             case ("transition", resource, to):
                 bench.engine.transition(resource, to)
+            case ("time", step_ns):
+                bench.now_ns += step_ns
+                bench.engine.tick()
             case ("terminate", index, result) if ids:
                 bench.engine.terminate(ids[index % len(ids)], result)
             case (what, index) if ids:
@@ -184,8 +194,13 @@ def check_executions(bench):
     for event in bench.events:
         if isinstance(event, ExecutionEvent):
             told[event.id].append(event.state)
-    ran = {S.RUNNING, *(state for state in S if state.terminal and state not in {S.NOT_VALIDATED, S.NOT_READY})}
-    follows = {S.REQUESTED: {S.RUNNING, S.NOT_VALIDATED, S.NOT_READY, S.INTERRUPTED, S.FAILED}, S.RUNNING: ran - {S.RUNNING}}
+    ends = {*(state for state in S if state.terminal and state not in {S.NOT_VALIDATED, S.NOT_READY})}
+    follows = {
+        S.REQUESTED: {S.RUNNING, S.NOT_VALIDATED, S.NOT_READY, S.INTERRUPTED, S.FAILED},
+        S.RUNNING: {S.PAUSED, S.INTERRUPTING, *ends} - {S.INTERRUPTED},
+        S.PAUSED: {S.RUNNING, S.INTERRUPTING, *ends} - {S.INTERRUPTED},
+        S.INTERRUPTING: ends,
+    }
     for states in told.values():
         assert states[0] is S.REQUESTED
         assert all(after in follows.get(before, ()) for before, after in pairwise(states))
@@ -201,8 +216,8 @@ def check_effects(bench, told):
         if isinstance(event, ExecutionEvent):
             skill = bench.skillset.skill(event.skill)
             prefix = f"{event.skill} {event.id} "
-            if event.state is S.RUNNING:
-                expected[prefix + "begin"] += len(skill.start.assignments)
+            if event.state is S.RUNNING:  # again after a pause
+                expected[prefix + "begin"] = len(skill.start.assignments)
             elif event.state is S.TERMINATED:
                 expected[f"{prefix}end{event.result}"] += len(skill.result(event.result).effect.assignments)
             elif event.state is S.INTERRUPTED and S.RUNNING in told[event.id]:
@@ -224,7 +239,7 @@ def check_invariants(bench):
         for event in step:
             if isinstance(event, TransitionEvent):
                 states[event.resource] = event.to_state
-            elif event.state is S.RUNNING:
+            elif event.state.active:
                 running[event.id] = event.skill
             else:
                 running.pop(event.id, None)
@@ -234,16 +249,28 @@ def check_invariants(bench):
 
 
 def check_hooks(running):
-    """At most one stop hook an execution, and not before its dispatch has returned."""
+    """At most one stop hook an execution; none of them, nor any pause, overtakes the hook that is being called."""
     by_id = defaultdict(list)
     for identifier, hook, what in list(running):
         by_id[identifier].append((hook, what))
     by_id.pop("", None)
     for calls in by_id.values():
-        stops = [index for index, (hook, what) in enumerate(calls) if what == "begin" and hook in HOOKS[3:]]
+        stops = [index for index, (hook, what) in enumerate(calls) if what == "begin" and hook in STOPS]
         assert len(stops) <= 1
         assert calls.count(("on_dispatch", "begin")) <= 1
+        assert calls.count(("on_emergency", "begin")) <= 1
+        one_by_one = [call for call in calls if call[0] in {"on_dispatch", "on_pause", "on_resume", *STOPS}]
+        for (hook, what), (after, then) in zip(one_by_one[::2], one_by_one[1::2], strict=False):
+            assert (what, hook, then) == ("begin", after, "end"), calls
         assert not stops or ("on_dispatch", "end") in calls[: stops[0]]
+
+
+def check_records(bench):
+    """What a late client is told is what has happened."""
+    last = {event.skill: event for event in bench.events if isinstance(event, ExecutionEvent) and event.state.terminal}
+    for name, record in bench.engine.skills.items():
+        assert record.open == ()
+        assert (record.last and (record.last.id, record.last.state)) == ((name in last and (last[name].id, last[name].state)) or None)
 
 
 @pytest.fixture(autouse=True)
@@ -267,6 +294,12 @@ def test_every_trace_obeys_the_model(skillset, behaviours, programs):
     check_effects(bench, check_executions(bench))
     check_invariants(bench)
     check_hooks(running)
+    bench.now_ns += FOREVER_NS
+    bench.engine.tick()
+    assert bench.engine.due_ns is None
+    assert not [execution for execution in bench.engine.executions if execution.state is S.INTERRUPTING]
     bench.engine.close("over")
+    check_executions(bench)
+    check_records(bench)
     assert bench.engine.executions == ()
     assert bench.engine._ledger.entries == {}

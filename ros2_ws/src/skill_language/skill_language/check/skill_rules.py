@@ -106,6 +106,12 @@ def _effects(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
             yield warning("ALU301", f"effect `{effect.name}` of `{skill.name}` is never used", effect.span)
 
 
+def _stops(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+    timeout_s = skill.interrupt.timeout_s
+    if timeout_s is not None and timeout_s <= 0:
+        yield error("ALU221", f"a stop of `{skill.name}` may take {timeout_s:g} s; it must be positive", skill.interrupt.span)
+
+
 def _ends(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     if not skill.results:
         hint = "add a result: `result { NAME }` in the paper's notation, `success NAME` in the Robot Language"
@@ -119,9 +125,10 @@ SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _patience,
     _effects,
     _ends,
+    _stops,
 )
 
-RESULT_FIELDS = frozenset({"outcome", "result", "message", "progress"})
+RESULT_FIELDS = frozenset({"outcome", "result", "message", "progress", "state"})
 """Fields of the generated action's result and feedback that every skill has."""
 
 INPUT_NAMES = frozenset({"self", "skill"})

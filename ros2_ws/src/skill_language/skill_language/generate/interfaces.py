@@ -63,6 +63,8 @@ $outputs
 ---
 # 0 to 1$period.
 float64 progress
+# RUNNING PAUSED INTERRUPTING
+string state
 $outputs
 """
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 
-from skill_language.generate.manager_code import client_module, hooks_module, inputs_module
+from skill_language.generate.client_code import client_module
+from skill_language.generate.manager_code import hooks_module, inputs_module
 from skill_language.generate.mock_module import mock_module
 from skill_language.generate.text import MAINTAINER, fill, header, lines, packages
 from skill_language.json_form import to_json

@@ -78,34 +78,3 @@ $definition
         """End the execution with the result $result$comment; False when it has ended already."""
         return execution.terminate("$result", message=message, outputs=$outputs)
 '''
-
-CLIENT = '''\
-"""Calls the skills of ``$skillset`` by name, with typed inputs.
-
-$header.
-"""
-
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from skill_runtime.ros2.client import SkillsetClient
-
-if TYPE_CHECKING:
-$imports    from rclpy.node import Node
-    from skill_runtime.ros2.client import SkillHandle
-
-
-class ${camel}Client(SkillsetClient):
-    """The skillset ``$skillset`` as seen from a mission."""
-
-    def __init__(self, node: Node) -> None:
-        super().__init__(node, "$skillset")
-$methods
-'''
-
-CLIENT_METHOD = '''
-$definition
-        """Start ``$skill``; results: $results."""
-$start
-'''

@@ -1,8 +1,9 @@
-"""All files of a robot: two packages a skillset, and the bridge's configuration."""
+"""All files of a robot: two packages a skillset, one for its clients, and the bridge's configuration."""
 
 from __future__ import annotations
 
 from skill_language.generate.bridge import bridge_configuration
+from skill_language.generate.client_package import client_package
 from skill_language.generate.interfaces import interface_package
 from skill_language.generate.manager_package import manager_package
 from skill_language.robot import Robot
@@ -17,5 +18,6 @@ def robot_files(robot: Robot) -> Files:
     for skillset in robot.skillsets:
         files |= interface_package(robot, skillset)
         files |= manager_package(robot, skillset)
+    files |= client_package(robot)
     files[f"{robot.name}_bridge.yaml"] = bridge_configuration(robot)
     return files

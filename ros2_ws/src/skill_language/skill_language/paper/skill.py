@@ -150,14 +150,20 @@ class _SkillReader:
         self.parts.invariants.append(Invariant(name.text, holds, effect, patience, span=self.cursor.span(name)))
 
     def _interrupt(self) -> None:
-        if not any(self.cursor.at_word(word) for word in ("apply", "post", "interrupting")):
-            raise self.cursor.fail("`interrupting`", "`apply`", "`post`", "`}`")
+        if not any(self.cursor.at_word(word) for word in ("apply", "post", "interrupting", "timeout")):
+            raise self.cursor.fail("`interrupting`", "`timeout`", "`apply`", "`post`", "`}`")
         word = self.cursor.here
         interrupt = self.parts.interrupt
         if self.cursor.accept("interrupting"):
             given = self.cursor.accept("true", "false")
             interrupting = given is None or given.text == "true"
             self.parts.interrupt = replace(interrupt, interrupting=interrupting, span=self.cursor.span(word))
+            return
+        if self.cursor.at("timeout"):
+            if interrupt.timeout_s is not None:
+                self.cursor.source.report("ALU106", "`timeout` is given twice in this block", self.cursor.span(word))
+            timeout_s = setting(self.cursor, "timeout")
+            self.parts.interrupt = replace(interrupt, timeout_s=timeout_s, span=self.cursor.span(word))
             return
         twice = interrupt.effect is not NO_EFFECT if word.text == "apply" else interrupt.postcondition is not TRUE
         if twice:
@@ -167,6 +173,7 @@ class _SkillReader:
             interrupting=interrupt.interrupting,
             effect=effect if effect is not NO_EFFECT else interrupt.effect,
             postcondition=postcondition if postcondition is not TRUE else interrupt.postcondition,
+            timeout_s=interrupt.timeout_s,
             span=self.cursor.span(word),
         )
 

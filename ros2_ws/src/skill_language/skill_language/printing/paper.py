@@ -111,8 +111,10 @@ def _violation(effect: Effect) -> str:
 
 
 def _interrupt(interrupt: Interrupt) -> str:
-    outcome = _outcome(interrupt.effect, interrupt.postcondition)
-    return f"interrupting {outcome}".strip() if interrupt.interrupting else outcome
+    parts = ["interrupting"] if interrupt.interrupting else []
+    parts += [f"timeout = {interrupt.timeout_s!r}"] if interrupt.timeout_s is not None else []
+    parts.append(_outcome(interrupt.effect, interrupt.postcondition))
+    return " ".join(parts).strip()
 
 
 def _outcome(effect: Effect, postcondition: Expression) -> str:

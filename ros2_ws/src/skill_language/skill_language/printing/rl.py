@@ -74,6 +74,8 @@ def _progress(progress: Progress) -> Iterator[str]:
 
 def _interrupt(interrupt: Interrupt) -> Iterator[str]:
     yield f"interrupting {'true' if interrupt.interrupting else 'false'}"
+    if interrupt.timeout_s is not None:
+        yield f"timeout {interrupt.timeout_s!r} s"
     yield from _outcome(interrupt.effect, interrupt.postcondition)
 
 

@@ -10,7 +10,7 @@ from skill_language.model import NO_EFFECT, TRUE, Assignment, Effect, Expression
 from skill_language.syntax.conditions import bare_condition
 from skill_language.syntax.cursor import Cursor, starts_member
 from skill_language.syntax.elements import read_changes
-from skill_language.syntax.quantities import hold
+from skill_language.syntax.quantities import duration, hold
 
 OUTSIDE = ("resource", "event", "skill", "property")
 """What can't begin inside of a skill."""
@@ -31,6 +31,7 @@ class Body:
     reference: Effect | None = None
     postcondition: Expression = TRUE
     interrupting: bool = False
+    timeout_s: float | None = None
     seen: set[str] = field(default_factory=set)
 
     def effect(self, cursor: Cursor, at: Token) -> Effect:
@@ -98,11 +99,17 @@ def _interrupting(cursor: Cursor, body: Body) -> None:
     body.interrupting = given is None or given.text == "true"
 
 
+def _timeout(cursor: Cursor, body: Body) -> None:
+    cursor.accept(":", "=")
+    body.timeout_s = duration(cursor)
+
+
 _MEMBERS: Mapping[str, Callable[[Cursor, Body], None]] = {
     "guard": _guard,
     "effect": _effect,
     "postcondition": _postcondition,
     "interrupting": _interrupting,
+    "timeout": _timeout,
 }
 
 

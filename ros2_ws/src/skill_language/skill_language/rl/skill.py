@@ -198,9 +198,9 @@ class _SkillReader:
 
     def _interrupt(self) -> None:
         word = self.cursor.advance()
-        body = read_body(self.cursor, ("interrupting", "effect", "postcondition"))
+        body = read_body(self.cursor, ("interrupting", "timeout", "effect", "postcondition"))
         effect = body.effect(self.cursor, word)
-        self.parts.interrupt = Interrupt(body.interrupting, effect, body.postcondition, span=self.cursor.span(word))
+        self.parts.interrupt = Interrupt(body.interrupting, effect, body.postcondition, body.timeout_s, span=self.cursor.span(word))
 
     def _result(self, kind: ResultKind) -> None:
         cursor = self.cursor

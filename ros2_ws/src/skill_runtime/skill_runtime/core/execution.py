@@ -8,10 +8,12 @@ from typing import Protocol
 
 
 class ExecutionState(Enum):
-    """Where an execution is; all but REQUESTED and RUNNING are terminal."""
+    """Where an execution is. PAUSED and INTERRUPTING are phases of running: invariants are watched and resources held."""
 
     REQUESTED = "REQUESTED"
     RUNNING = "RUNNING"
+    PAUSED = "PAUSED"
+    INTERRUPTING = "INTERRUPTING"
     NOT_VALIDATED = "NOT_VALIDATED"
     NOT_READY = "NOT_READY"
     RESOURCE_INVARIANT_VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
@@ -22,7 +24,15 @@ class ExecutionState(Enum):
     @property
     def terminal(self) -> bool:
         """Tell whether nothing follows."""
-        return self not in {ExecutionState.REQUESTED, ExecutionState.RUNNING}
+        return not (self is ExecutionState.REQUESTED or self.active)
+
+    @property
+    def active(self) -> bool:
+        """Tell whether the execution has started and not ended."""
+        return self in _ACTIVE
+
+
+_ACTIVE = frozenset({ExecutionState.RUNNING, ExecutionState.PAUSED, ExecutionState.INTERRUPTING})
 
 
 class Controller(Protocol):
@@ -34,6 +44,10 @@ class Controller(Protocol):
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED."""
+        ...
+
+    def interrupted(self, execution_id: str, message: str) -> bool:
+        """End an execution that is being interrupted."""
         ...
 
     def set_outputs(self, execution_id: str, outputs: Mapping[str, object]) -> None:
@@ -71,6 +85,10 @@ class Execution:
     def fail(self, message: str) -> bool:
         """End as FAILED: the function can't be started or watched any more. False when it has ended already."""
         return self._controller.fail(self.id, message)
+
+    def interrupted(self, message: str = "") -> bool:
+        """Say that the stop which ``on_interrupt`` has begun is done. False when no stop is under way (any more)."""
+        return self._controller.interrupted(self.id, message)
 
     def set_outputs(self, **outputs: object) -> None:
         """Keep outputs to be reported with the next progress; ignored after the end."""

@@ -27,13 +27,14 @@ class ResourceStatus:
 
 @dataclass(eq=False)
 class Entry:
-    """An execution that has not ended, or whose ``on_dispatch`` has not returned."""
+    """An execution that has not ended, or one of whose hooks that no stop overtakes has not returned."""
 
     execution: Execution
     key: Running
     dispatching: bool = False
+    """Whether ``on_dispatch``, ``on_pause`` or ``on_resume`` is being called."""
     stop_hook: str = ""
-    """The one hook that stops the function, once it is decided on; called at once, or after ``on_dispatch`` has returned."""
+    """The one hook that stops the function, once it is decided on; called at once, or after the hook that is being called."""
 
 
 class Ledger:
@@ -75,9 +76,14 @@ class Ledger:
         return entry
 
     def running(self, execution_id: str) -> Entry | None:
-        """Return a running execution's entry."""
+        """Return the entry of an execution that has started and not ended."""
         entry = self.entries.get(execution_id)
-        return entry if entry is not None and entry.execution.state is ExecutionState.RUNNING else None
+        return entry if entry is not None and entry.execution.state.active else None
+
+    def enter_phase(self, entry: Entry, phase: ExecutionState) -> None:
+        """Record that an execution runs on in another phase."""
+        entry.execution.state = phase
+        self._publish([self._entered(entry.execution)])
 
     def commit(self, step: Step, *, by_itself: Entry | None = None) -> list[Entry]:
         """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import json
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from skill_runtime.hooks import SkillHooks
 
 _FLOATS = {"double", "float"}
 _VECTOR_FIELDS = ["x", "y", "z"]
@@ -98,3 +102,11 @@ def _message(kind: str, value: Any, place: str) -> Any:
     if vector and not isinstance(value, str) and hasattr(value, "__len__") and len(value) == len(_VECTOR_FIELDS):
         return fill(wanted(), dict(zip(_VECTOR_FIELDS, value, strict=True)), place)
     raise ValueError(f"{place} takes a {kind}{' or three numbers' if vector else ''}, not {value!r}")
+
+
+def inputs_from_json(hooks: SkillHooks, action: Any, skill: str, inputs_json: str) -> object:
+    """Make a skill's inputs from a JSON object of them; raise ValueError where it is none or does not fit the goal."""
+    values = json.loads(inputs_json)
+    if not isinstance(values, dict):
+        raise ValueError(f"inputs of {skill} are a JSON object, not {inputs_json}")  # noqa: TRY004 - as for every other misfit
+    return hooks.make_inputs(values_of(fill(action.Goal(), values, f"inputs of {skill}")))

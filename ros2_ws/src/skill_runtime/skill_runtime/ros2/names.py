@@ -27,6 +27,9 @@ ALIVE = QoSProfile(
 )
 """``LATCHED`` with signs of life, for ``resource_states``."""
 
+GOALS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+"""Of the services of an action: with ROS's default, the eleventh request of a burst is lost."""
+
 
 def camel(skill: str) -> str:
     """Return the interface's name of a skill: ``goto_straight`` to ``GotoStraight``."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.action import ActionClient
+from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from skillset_interfaces.msg import ResourceStates
@@ -32,6 +33,8 @@ class Presence:
     Args:
         node: serves it.
         skillset: the skillset's name.
+        root: what its names begin with (default: the skillset's name, relative to the node's namespace).
+        group: of the callbacks; the node's default group by default.
         on_resources: gets each ``ResourceStates``.
         on_doubt: called when a loss was noticed; from then on ``tick`` must be called while ``restless``.
         on_answer: called when somebody has answered after a loss; perhaps managers that were started anew.
@@ -47,9 +50,13 @@ class Presence:
         on_doubt: Callable[[], None],
         on_answer: Callable[[], None],
         on_gone: Callable[[], None],
+        root: str = "",
+        group: CallbackGroup | None = None,
     ) -> None:
         self._node = node
         self._skillset = skillset
+        self._root = root or skillset
+        self._group = group
         self._on_resources = on_resources
         self._on_doubt = on_doubt
         self._on_answer = on_answer
@@ -62,12 +69,13 @@ class Presence:
         self._answered = False
         self._asked_s = float("-inf")
         self._doubt_ends_s: float | None = None
-        self._describe = node.create_client(Describe, f"{skillset}/describe")
+        self._describe = node.create_client(Describe, f"{self._root}/describe", callback_group=group)
         node.create_subscription(
             ResourceStates,
-            f"{skillset}/resource_states",
+            f"{self._root}/resource_states",
             self._hear,
             ALIVE,
+            callback_group=group,
             event_callbacks=SubscriptionEventCallbacks(liveliness=self._on_liveliness),
         )
 
@@ -97,9 +105,10 @@ class Presence:
         answer = future.result()
         if answer is None:
             return
-        self._answered = True
         if self.model is None:
             self._use(answer.model_json)
+        # Last: with an executor of several threads, `tick` may run at the same time.
+        self._answered = True
         if self._doubt_ends_s is not None:
             self._doubt_ends_s = None
             self._on_answer()
@@ -109,7 +118,8 @@ class Presence:
         actions = action_module(self._skillset)
         for skill in model.skills:
             self.actions[skill.name] = action_type(actions, skill.name)
-            self.clients[skill.name] = ActionClient(self._node, self.actions[skill.name], f"{self._skillset}/skill/{skill.name}")
+            name = f"{self._root}/skill/{skill.name}"
+            self.clients[skill.name] = ActionClient(self._node, self.actions[skill.name], name, callback_group=self._group)
         self.model = model
 
     def _hear(self, message: Any) -> None:

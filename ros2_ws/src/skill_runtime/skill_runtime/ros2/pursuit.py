@@ -11,6 +11,7 @@ import json
 import threading
 import time
 import uuid
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.action.client import ClientGoalHandle
@@ -20,21 +21,34 @@ from skill_runtime.core.execution import ExecutionState
 from skill_runtime.handle import SkillHandle
 from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.skill_manager import execution_id
+from skill_runtime.waiting import Host, Pending
 
 ACKNOWLEDGE_TIMEOUT_S = 5.0
 """Managers acknowledge any goal at once; no sign for so long (wall clock) means that there will be none."""
 RESULT_GRACE_S = 0.5
 """The event of an end waits so long for the result: who has it has seen the resources after the step, too."""
 
+_FEEDBACK_FIELDS = ("progress", "state")
 _RESULT_FIELDS = ("outcome", "result", "message")
 
 
 class Pursuit:
     """One goal of an action; ``handle`` is what the caller gets."""
 
-    def __init__(self, skillset: str, skill: str, action: Any, client: Any) -> None:
+    def __init__(
+        self,
+        skillset: str,
+        skill: str,
+        action: Any,
+        client: Any,
+        *,
+        pause: Callable[[str, bool], Pending[str]] | None = None,
+        host: Host | None = None,
+    ) -> None:
         identifier = UUID(uuid=list(uuid.uuid4().bytes))
-        self.handle = SkillHandle(skill, execution_id(identifier), self._interrupt)
+        name = execution_id(identifier)
+        pausing = None if pause is None else lambda paused: pause(name, paused)
+        self.handle = SkillHandle(skill, name, self._interrupt, pause=pausing, host=host)
         self._skillset = skillset
         self._action = action
         self._client = client
@@ -79,10 +93,10 @@ class Pursuit:
         """Take an event of this execution."""
         self._acknowledge()
         state = ExecutionState(event.state)
-        if state is ExecutionState.RUNNING:
-            self.handle.run()
-        elif state.terminal:
+        if state.terminal:
             self._last_event = (time.monotonic(), event)
+        elif state is not ExecutionState.REQUESTED:
+            self.handle.enter(state)
 
     def _on_answer(self, future: Any) -> None:
         answer = future.result()
@@ -112,7 +126,7 @@ class Pursuit:
     def _on_feedback(self, message: Any) -> None:
         feedback = message.feedback
         self._acknowledge()
-        self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name != "progress"})
+        self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name not in _FEEDBACK_FIELDS})
 
     def _on_result(self, future: Any) -> None:
         result = None if future.result() is None else future.result().result
@@ -122,10 +136,16 @@ class Pursuit:
             self._end_by_result(ExecutionState(result.outcome), result)
 
     def _end_by_event(self, event: Any) -> None:
-        result = self._action.Result(outcome=event.state, result=event.result, message=event.message)
-        outputs = {name: value for name, value in json.loads(event.outputs_json or "{}").items() if value is not None}
-        self._end_by_result(ExecutionState(event.state), fill(result, outputs, f"outputs of {self.handle.skill}"))
+        outputs = outputs_of(self._action, json.loads(event.outputs_json or "{}"), self.handle.skill)
+        self.handle.end(ExecutionState(event.state), event.result, event.message, outputs)
 
     def _end_by_result(self, state: ExecutionState, result: Any) -> None:
         outputs = {name: getattr(result, name) for name in fields_of(result) if name not in _RESULT_FIELDS}
         self.handle.end(state, result.result, result.message, outputs)
+
+
+def outputs_of(action: Any, plain: Mapping[str, object], skill: str) -> dict[str, Any]:
+    """Return outputs as the action's result carries them, from the plain values of an event."""
+    values = {name: value for name, value in plain.items() if value is not None}
+    result = fill(action.Result(), values, f"outputs of {skill}")
+    return {name: getattr(result, name) for name in fields_of(result) if name not in _RESULT_FIELDS}

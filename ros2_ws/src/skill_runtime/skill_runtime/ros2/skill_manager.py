@@ -21,6 +21,7 @@ from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.core.execution import ExecutionState
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2.convert import fill, values_of
+from skill_runtime.ros2.names import GOALS
 
 Job = Callable[[], object]
 ID_DIGITS = 12
@@ -32,7 +33,7 @@ def execution_id(goal_id: Any) -> str:
 
 
 class SkillManager:
-    """Serves one skill; ``submit`` runs a job on a worker thread, because ``validate`` and ``on_interrupt`` may wait."""
+    """Serves one skill; ``submit`` runs a job on a thread of its own, because ``validate`` and ``on_interrupt`` may wait."""
 
     def __init__(
         self,
@@ -59,6 +60,9 @@ class SkillManager:
             handle_accepted_callback=self._accepted,
             cancel_callback=self._cancel,
             callback_group=MutuallyExclusiveCallbackGroup(),
+            goal_service_qos_profile=GOALS,
+            result_service_qos_profile=GOALS,
+            cancel_service_qos_profile=GOALS,
         )
         self._timer: Any = None
         if skill.progress is not None:
@@ -69,8 +73,9 @@ class SkillManager:
         goal = self._goals.get(event.id)
         if goal is None:
             return
-        if event.state is ExecutionState.RUNNING:
-            self._feed_back(goal, 0.0, event.outputs)
+        if event.state.active:
+            execution = self._engine.execution(event.id)
+            self._feed_back(goal, 0.0 if execution is None else execution.progress, event.state, event.outputs)
         if event.state.terminal:
             del self._goals[event.id]
             # Goals change state in the executor's thread only, where also cancel requests are handled.
@@ -83,8 +88,19 @@ class SkillManager:
         self._goals[identifier] = goal
         if self._timer is not None and self._timer.is_canceled():
             self._timer.reset()
-        inputs = self._hooks.make_inputs(values_of(goal.request))
-        self._submit(lambda: self._engine.request(self._skill.name, inputs, execution_id=identifier))
+        # Registered here, in the thread that also gets cancel requests: none finds its execution unknown.
+        try:
+            self._engine.register(self._skill.name, self._hooks.make_inputs(values_of(goal.request)), execution_id=identifier)
+        except Exception as error:  # noqa: BLE001 - inputs are made by the developer's class
+            self._refuse(goal, identifier, f"the request could not be taken down: {type(error).__name__}: {error}")
+            return
+        self._submit(lambda: self._engine.run(identifier))
+
+    def _refuse(self, goal: Any, identifier: str, message: str) -> None:
+        """End a goal that never became an execution."""
+        del self._goals[identifier]
+        failed = ExecutionEvent(0, 0, self._skill.name, identifier, ExecutionState.FAILED, "", message, None, {})
+        self._server.notify_execute(goal, lambda goal: self._finish(goal, failed))
 
     def _cancel(self, goal: Any) -> Any:
         self._submit(lambda: self._engine.interrupt(execution_id(goal.goal_id)))
@@ -118,12 +134,12 @@ class SkillManager:
             progress = self._engine.progress(identifier)
             execution = self._engine.execution(identifier)
             if progress is not None and execution is not None:
-                self._feed_back(goal, progress, dict(execution.outputs))
+                self._feed_back(goal, progress, execution.state, dict(execution.outputs))
         if not self._goals:
             self._timer.cancel()
 
-    def _feed_back(self, goal: Any, progress: float, outputs: Any) -> None:
-        feedback = self._action.Feedback(progress=progress)
+    def _feed_back(self, goal: Any, progress: float, state: ExecutionState, outputs: Any) -> None:
+        feedback = self._action.Feedback(progress=progress, state=state.value)
         try:
             fill(feedback, outputs, f"outputs of {self._skill.name}")
         except ValueError as error:

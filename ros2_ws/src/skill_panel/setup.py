@@ -1,0 +1,19 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="skill_panel",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    package_data={"skill_panel": ["panel.tcss"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/skill_panel"]),
+        ("share/skill_panel", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="The Alula developers",
+    maintainer_email="alula@alula-robotics.org",
+    description="A panel in the terminal to look at running skillsets and to drive them by hand.",
+    license="Apache-2.0",
+    entry_points={"console_scripts": ["panel = skill_panel.__main__:main"]},
+)

@@ -1,0 +1,115 @@
+"""`./alula panel`: look at running skillsets and drive them by hand.
+
+Ends with 0, and with 2 when what was asked for can't be.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from alula_flight.running import NoRunError, Run, find_run, live_runs
+from skill_panel.memory import Memory
+from skill_panel.watcher import Watcher, skillsets_in, wait_for
+from skill_runtime.ros2.session import Session
+
+DOMAINS = range(233)
+LIST_S = 3.0
+"""How long (wall clock) `--list` looks into a domain that seems empty."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where to look: a DDS domain, and how it is called on the screen."""
+
+    domain: int
+    title: str
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(
+        prog="alula panel",
+        description="Look at running skillsets and drive them by hand.",
+        epilog="Without --run and --domain: the run that is under way (the newest), else the domain of ROS_DOMAIN_ID, else domain 0.",
+    )
+    parser.add_argument("skillsets", nargs="*", metavar="SKILLSET", help="show only these")
+    parser.add_argument("--namespace", default="", metavar="NS", help="show only the robot of this namespace, as /robot1")
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument("--run", metavar="DIR|latest", help="the flight of this run's folder, or the newest one under way")
+    place.add_argument("--domain", type=int, metavar="N", help="this DDS domain")
+    parser.add_argument("--list", action="store_true", help="say what runs on this machine, and end")
+    options = parser.parse_args(arguments)
+    if options.domain is not None and options.domain not in DOMAINS:
+        parser.error(f"--domain {options.domain}: a DDS domain is a number from 0 to {DOMAINS[-1]}")
+    return options
+
+
+def place_of(options: argparse.Namespace) -> Place:
+    """Return where to look; raise NoRunError."""
+    if options.run is not None:
+        return _of_run(find_run(options.run))
+    if options.domain is not None:
+        return Place(options.domain, f"in DDS domain {options.domain}")
+    own = os.environ.get("ROS_DOMAIN_ID", "")
+    runs = [] if own.isdigit() else live_runs()
+    if runs:
+        return _of_run(runs[0])
+    domain = int(own) if own.isdigit() else 0
+    return Place(domain, f"in DDS domain {domain}")
+
+
+def _of_run(run: Run) -> Place:
+    return Place(run.domain, f"in the run {run.folder.name} (DDS domain {run.domain})")
+
+
+def say_what_runs(options: argparse.Namespace) -> None:
+    """Print the skillsets of every run under way, and of the domain that would be looked into."""
+    for place in dict.fromkeys([place_of(options), *(_of_run(run) for run in live_runs())]):
+        session = Session("skill_panel", domain=place.domain)
+        try:
+            look = partial(skillsets_in, session.node, options.namespace, options.skillsets)
+            wait_for(lambda: bool(look()), LIST_S)  # noqa: B023 - called at once
+            found = [f"{space}/{name}" for space, name in look()]
+        finally:
+            session.close()
+        sys.stdout.write(f"{place.title}: {', '.join(found) or 'no skillset'}\n")
+
+
+def others_than(place: Place) -> list[str]:
+    """Return a line for each run under way elsewhere."""
+    return [f"A run is under way: ./alula panel --run {run.folder}" for run in live_runs() if run.domain != place.domain]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Show the panel until it is left; return the exit code."""
+    options = parse(arguments)
+    try:
+        place = place_of(options)
+    except NoRunError as error:
+        sys.stderr.write(f"alula panel: {error}\n")
+        return 2
+    if options.list:
+        say_what_runs(options)
+        return 0
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        sys.stderr.write("alula panel: this is no terminal; --list says what runs without one\n")
+        return 2
+    from skill_panel.app import Panel
+
+    watcher = Watcher(domain=place.domain, namespace=options.namespace, names=options.skillsets)
+    try:
+        memory = Memory(Path(os.environ["ALULA_STATE"]) / "panel.json" if "ALULA_STATE" in os.environ else None)
+        Panel(watcher, where=place.title, others=others_than(place), memory=memory).run()
+    finally:
+        watcher.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

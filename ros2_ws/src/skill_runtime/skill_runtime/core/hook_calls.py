@@ -1,0 +1,67 @@
+"""How the engine calls hooks: in this process (``LocalHooks``), or wherever else they are."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from skill_language.model import Skillset
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.core.execution import Execution
+from skill_runtime.hooks import SkillHooks
+
+
+@dataclass(frozen=True)
+class HookAnswer:
+    """What a hook returned, or the last line (``error``) and the whole (``trace``) of what it raised."""
+
+    value: object = None
+    error: str = ""
+    trace: str = ""
+
+
+Then = Callable[[HookAnswer], None]
+
+
+class HookCaller(Protocol):
+    """What the engine needs of whoever has the hooks."""
+
+    def call(self, execution: Execution, hook: str, then: Then) -> None:
+        """Call a hook of the execution's skill; ``then`` gets the answer, once, in this call or later, from any thread.
+
+        Never raises. Who can't reach the hook any more answers with an error.
+        """
+        ...
+
+
+class LocalHooks:
+    """Hooks in this process, called in the thread that asks; ``then`` is called before ``call`` returns."""
+
+    def __init__(self, skillset: Skillset, hooks: Mapping[str, SkillHooks]) -> None:
+        _check(skillset, hooks)
+        self._hooks = dict(hooks)
+
+    def call(self, execution: Execution, hook: str, then: Then) -> None:
+        """Call a hook; ``validate`` gets the inputs, every other the execution."""
+        then(call_hook(self._hooks[execution.skill], execution, hook))
+
+
+def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookAnswer:
+    """Call one hook and return what came of it."""
+    try:
+        return HookAnswer(getattr(hooks, hook)(execution.inputs if hook == "validate" else execution))
+    except Exception as error:  # noqa: BLE001 - whatever a hook raises ends its execution only
+        last_line = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
+        return HookAnswer(error=last_line, trace="".join(traceback.format_exception(error)))
+
+
+def _check(skillset: Skillset, hooks: Mapping[str, SkillHooks]) -> None:
+    skills = [skill.name for skill in skillset.skills]
+    missing = [name for name in skills if name not in hooks]
+    surplus = [name for name in hooks if name not in skills]
+    if missing:
+        raise SkillRuntimeError(f"skillset {skillset.name}: no hooks for {', '.join(missing)}; the hooks factory must return one a skill")
+    if surplus:
+        raise SkillRuntimeError(f"skillset {skillset.name} has no skill {', '.join(surplus)}; it has {', '.join(skills)}")
