@@ -8,9 +8,8 @@ from pathlib import Path
 from skill_missions.director import Director, End, Outcome
 from skill_missions.drawing import draw
 from skill_missions.files import EventLog, write_json, write_text
+from skill_runtime.core import ExecutionState
 from uav_missions.route import Route
-
-UNENDED_STATES = ("REQUESTED", "RUNNING")
 
 
 class MissionRecord:
@@ -41,8 +40,8 @@ class MissionRecord:
         """Write an event."""
         self._events.add(record)
         if record.get("skill"):
-            change = self._unended.add if record["state"] in UNENDED_STATES else self._unended.discard
-            change(str(record["id"]))
+            ended = ExecutionState(record["state"]).terminal
+            (self._unended.discard if ended else self._unended.add)(str(record["id"]))
         if record.get("resource") == "flight_status" and record["from_state"] == "ON_GROUND" and self._lift_off_s is None:
             self._lift_off_s = float(str(record["stamp_s"]))
 
