@@ -9,8 +9,7 @@ from skill_missions.director import Director, End, Outcome
 from skill_missions.drawing import draw
 from skill_missions.files import EventLog, write_json, write_text
 from skill_missions.plan import MissionPlan
-
-UNENDED_STATES = ("REQUESTED", "RUNNING")
+from skill_runtime.core import ExecutionState
 
 
 class MissionRecord:
@@ -39,8 +38,8 @@ class MissionRecord:
         """Write an event."""
         self._events.add(record)
         if record.get("skill"):
-            change = self._unended.add if record["state"] in UNENDED_STATES else self._unended.discard
-            change(str(record["id"]))
+            ended = ExecutionState(record["state"]).terminal
+            (self._unended.discard if ended else self._unended.add)(str(record["id"]))
         if self._departure_s is None and self._plan.departure == (record.get("resource"), record.get("from_state")):
             self._departure_s = float(str(record["stamp_s"]))
 

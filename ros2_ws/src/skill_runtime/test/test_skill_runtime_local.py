@@ -19,6 +19,7 @@ from skill_runtime.core import ExecutionEvent, ExecutionState
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.local import LocalWorld, VirtualClock, WorldError, event_record
+from skill_runtime.waiting import CannotWaitError, NoAnswerError
 
 S = ExecutionState
 
@@ -52,7 +53,7 @@ def make(skillset=None, hooks=timed, *, authority=True, **options):
     client = world.client("flying")
     assert client.wait_ready(1.0)
     if authority:
-        assert client.transition("sdk", "AVAILABLE").accepted
+        assert client.transition("sdk", "AVAILABLE").get(1.0).accepted
     return world, client
 
 
@@ -133,7 +134,7 @@ def test_an_extern_transition_breaks_an_invariant_at_once():
     world, client = make()
     handle = client.start("takeoff", height=3.0)
     world.run_for(0.3)
-    assert client.transition("sdk", "UNAVAILABLE").accepted
+    assert client.transition("sdk", "UNAVAILABLE").get(1.0).accepted
     assert handle.wait(1.0)
     assert (handle.outcome, handle.result, world.now_s) == ("RESOURCE_INVARIANT_VIOLATED", "keep_sdk", 0.3)
     world.run_for(0.0)
@@ -142,7 +143,7 @@ def test_an_extern_transition_breaks_an_invariant_at_once():
 
 def test_a_refused_transition_says_why():
     _, client = make()
-    reply = client.transition("sdk", "AVAILABLE")
+    reply = client.transition("sdk", "AVAILABLE").get(1.0)
     assert not reply.accepted
     assert reply.reason == "resource sdk is AVAILABLE and has no extern transition AVAILABLE -> AVAILABLE"
 
@@ -233,7 +234,7 @@ def test_managers_that_are_not_there_or_have_gone_leave_nobody_waiting():
         _ = client.model
     world.serve(flying_skillset(), timed)
     assert client.wait_ready(0.0)
-    assert client.transition("sdk", "AVAILABLE").accepted
+    assert client.transition("sdk", "AVAILABLE").get(1.0).accepted
     handle = client.start("takeoff", height=3.0)
     world.run_for(0.5)
     world.kill("flying")
@@ -315,7 +316,7 @@ def test_waiting_inside_a_job_is_an_error_and_no_deadlock():
     def wait_there(handle) -> None:
         try:
             client.start("takeoff", height=3.0).wait(1.0)
-        except WorldError as error:
+        except CannotWaitError as error:
             complaints.append(str(error))
 
     client.start("takeoff", height=3.0).add_done_callback(wait_there)
@@ -331,8 +332,7 @@ def test_progress_comes_every_period_of_the_model_and_ends_with_the_execution():
     handle.run = lambda progress, outputs=None: (reports.append((round(world.now_s, 3), round(progress, 3))), run(progress, outputs))
     assert handle.wait(5.0)
     world.run_for(5.0)
-    assert reports[0] == (0.0, 0.0)
-    assert reports[1:] == [(round(0.1 * n, 3), round(0.1 * n, 3)) for n in range(1, 10)]
+    assert reports == [(round(0.1 * n, 3), round(0.1 * n, 3)) for n in range(1, 10)]
 
 
 def test_data_are_fresh_until_three_periods_have_passed():
@@ -340,7 +340,7 @@ def test_data_are_fresh_until_three_periods_have_passed():
     skillset = flying_skillset(flying_skill("takeoff", preconditions=(charged,)), data=(Data("battery", "float64", period_s=1.0),))
     world, client = make(skillset)
     values: list = []
-    client.on_data("battery", values.append)
+    client.data_feed("battery").on_sample(lambda sample: values.append(sample.value))
     assert not client.get_data("nosuch").known
     assert not client.get_data("battery").received
     blind = client.start("takeoff", height=3.0)
@@ -388,13 +388,15 @@ def test_an_event_of_the_model_is_taken_or_refused():
     world, client = make(flying_skillset(events=(calm,)))
     handle = client.start("takeoff", height=3.0)
     world.run_for(0.1)
-    assert client.trigger("calm").accepted
+    assert client.trigger("calm").get(1.0).accepted
     assert handle.wait(0.0)
     assert (handle.outcome, handle.result) == ("RESOURCE_INVARIANT_VIOLATED", "in_control")
-    assert not client.trigger("nosuch").accepted
+    assert not client.trigger("nosuch").get(1.0).accepted
     world.kill("flying")
     world.run_for(0.0)
-    assert client.trigger("calm").reason == client.transition("sdk", "AVAILABLE").reason == "the managers of flying are not there"
+    for answer in (client.trigger("calm"), client.transition("sdk", "AVAILABLE"), client.why("takeoff")):
+        with pytest.raises(NoAnswerError, match="the managers of flying are not there"):
+            answer.get(1.0)
 
 
 def test_missing_outputs_are_as_in_an_empty_message():
@@ -426,7 +428,7 @@ def test_records_are_those_of_the_event_messages():
     records: list = []
     client.on_event(lambda skillset, event: records.append(event_record(skillset, event)))
     assert client.start("takeoff", height=3.0).wait(2.0)
-    requested, taken = records[1], records[2]
+    requested, taken = records[0], records[1]
     assert json.loads(json.dumps(requested)) == {
         "stamp_s": 0.0,
         "sequence": 2,
@@ -444,12 +446,119 @@ def test_records_are_those_of_the_event_messages():
     assert records[-1]["outputs"] == {"reached": 2.5}
 
 
+def test_executions_pause_where_hooks_can_and_answers_come_the_way_of_messages():
+    class Pausing(Timed):
+        def on_pause(self, execution) -> str:
+            return "" if execution.inputs.height < 5.0 else "too high to stop here"
+
+        def on_resume(self, execution) -> str:
+            return ""
+
+    world, client = make(hooks=lambda managers: {"takeoff": Pausing(managers, 5.0)}, latency_s=0.1)
+    handle = client.start("takeoff", height=3.0)
+    world.run_for(0.5)
+    begun_s = world.now_s
+    assert handle.pause().get(1.0) == ""
+    assert world.now_s - begun_s == pytest.approx(0.2)
+    assert handle.state is S.PAUSED
+    assert handle.resume().get(1.0) == ""
+    assert handle.wait(10.0)
+    assert handle.outcome == "TERMINATED"
+    high = client.start("takeoff", height=6.0)
+    world.run_for(0.5)
+    assert high.pause().get(1.0) == "too high to stop here"
+
+
+def test_a_stop_that_takes_too_long_is_an_emergency_at_its_deadline():
+    class Slow(Timed):
+        def on_interrupt(self, execution):
+            return False  # it goes on stopping
+
+        def on_emergency(self, execution) -> None:
+            self.stopped.append("emergency")
+
+    world, client = make(hooks=lambda managers: {"takeoff": Slow(managers, 100.0)})
+    handle = client.start("takeoff", height=3.0)
+    world.run_for(1.0)
+    handle.interrupt()
+    assert handle.wait(60.0)
+    assert handle.outcome == "INTERRUPTED"
+    assert world.now_s == pytest.approx(6.0)
+    assert world.managers["flying"]._hooks["takeoff"].stopped == ["emergency"]
+
+
+def test_why_and_the_last_end_are_known_to_a_late_client():
+    world, client = make()
+    assert client.last("takeoff") is None
+    first = client.start("takeoff", height=3.0)
+    assert first.wait(5.0)
+    running = client.start("takeoff", height=3.0)
+    late = world.client("flying")
+    assert late.wait_ready(0.0)
+    last = late.last("takeoff")
+    assert (last.id, last.outcome, last.result, last.outputs) == (first.id, "TERMINATED", "DONE", {"reached": 2.5})
+    answer = late.why("takeoff").get(1.0)
+    assert (answer.ready, [unmet.name for unmet in answer.unmet]) == (False, ["not_moving"])
+    running.interrupt()
+    assert running.wait(1.0)
+    assert late.why("takeoff", {"height": 1.0}).get(1.0).ready
+    assert late.last("takeoff").outcome == "INTERRUPTED"
+    with pytest.raises(ValueError, match="no skill 'fly'"):
+        late.why("fly")
+
+
+def test_coroutines_run_in_virtual_time():
+    world, client = make()
+
+    async def mission() -> list[object]:
+        first = await client.start("takeoff", height=3.0)
+        reports = [report async for report in client.start("takeoff", height=4.0)]
+        taken = await client.transition("sdk", "UNAVAILABLE")
+        return [first.result, reports[-2].progress, reports[-1].state, taken.accepted, world.now_s]
+
+    result, progress, state, accepted, now_s = world.run(mission())
+    assert (result, progress, state, accepted, now_s) == ("DONE", pytest.approx(0.9), S.TERMINATED, True, 2.0)
+
+    async def endless() -> None:
+        await client.moment()
+
+    with pytest.raises(WorldError, match="has not ended within 5 s"):
+        world.run(endless(), timeout_s=5.0)
+
+
+def test_the_views_of_the_typed_clients_fit():
+    skillset = flying_skillset(data=(Data("battery", "float64", period_s=1.0),))
+    world, client = make(skillset, authority=False)
+    flying = client.view
+    assert flying.sdk.transition("AVAILABLE").get(1.0).accepted
+    assert flying.sdk.state == "AVAILABLE"
+    used = flying.axes.becomes("USED")
+    handle = flying.takeoff(height=3.0)
+    assert used.get(1.0) == "USED"
+    assert [report.state for report in handle][-1] is S.TERMINATED
+    value = flying.data.battery.next()
+    world.clock.after(2.0, lambda: world.managers["flying"].publish("battery", 0.5))
+    assert value.get(5.0) == 0.5
+    assert (flying.data.battery.value, flying.data.battery.stamp, flying.data.battery.stale) == (0.5, 3.0, False)
+    gone = flying.axes.becomes("GONE")
+    world.kill("flying")
+    with pytest.raises(NoAnswerError, match="have gone"):
+        gone.get(1.0)
+
+
+def test_who_waits_for_what_can_not_come_is_told():
+    _, client = make(hooks=lambda _: {"takeoff": Recorder()}, skillset=flying_skillset(flying_skill("takeoff", progress=None)))
+    handle = client.start("takeoff", height=3.0)
+    with pytest.raises(CannotWaitError, match="nothing can happen in this world any more"):
+        list(handle)
+
+
 def test_several_skillsets_share_a_clock_and_nothing_else():
     first, second = flying_skillset(), replace(flying_skillset(), name="gliding")
     world = LocalWorld([first, second], timed)
     clients = [world.client(name) for name in ("flying", "gliding")]
     assert all(client.wait_ready(0.0) for client in clients)
-    assert clients[0].transition("sdk", "AVAILABLE").accepted
+    assert clients[0].transition("sdk", "AVAILABLE").get(1.0).accepted
     handles = [client.start("takeoff", height=3.0) for client in clients]
     assert all(handle.wait(2.0) for handle in handles)
     assert [handle.outcome for handle in handles] == ["TERMINATED", "NOT_READY"]

@@ -27,7 +27,7 @@ class Mocked:
         self.client = self.world.client(skillset.name)
         assert self.client.wait_ready(0.0)
         if authority:
-            assert self.client.transition("sdk", "AVAILABLE").accepted
+            assert self.client.transition("sdk", "AVAILABLE").get(0.0).accepted
 
     def call(self, height: float = 3.0, limit_s: float = 100.0):
         """Call the skill; return how it ended and after how many seconds."""
@@ -242,9 +242,11 @@ def test_data_follow_their_steps_and_their_formulas(read):
     )
     mocked = Mocked(behaviour)
     seen: list = []
-    mocked.client.on_data("battery", lambda value: seen.append((mocked.world.now_s, value)))
+    first = mocked.client.get_data("battery")
+    assert (first.value, first.stamp_ns) == (1.0, 0)
+    mocked.client.data_feed("battery").on_sample(lambda sample: seen.append((mocked.world.now_s, sample.value)))
     mocked.world.run_for(20.0)
-    assert [(moment, round(value, 9)) for moment, value in seen] == [(0, 1.0), (1, 1.0), (2, 1.0), (3, 0.7), (4, 0.6), (5, 0.5)]
+    assert [(moment, round(value, 9)) for moment, value in seen] == [(1, 1.0), (2, 1.0), (3, 0.7), (4, 0.6), (5, 0.5)]
     assert mocked.client.get_data("battery").stale
     pose = mocked.client.get_data("pose").value
     assert (pose.place.x, pose.place.y, pose.marks) == (7, 0.5, [1, 7])

@@ -1,6 +1,6 @@
 """The skillset interface without any middleware: managers and clients of many skillsets in one process, in virtual time."""
 
-from skill_runtime.local.client import LocalClient, LocalHandle
+from skill_runtime.local.client import LocalClient
 from skill_runtime.local.clock import Timer, VirtualClock, WorldError
 from skill_runtime.local.data import DataReading
 from skill_runtime.local.managers import LocalManagers
@@ -10,7 +10,6 @@ from skill_runtime.local.world import LocalWorld
 __all__ = [
     "DataReading",
     "LocalClient",
-    "LocalHandle",
     "LocalManagers",
     "LocalWorld",
     "Timer",

@@ -67,6 +67,11 @@ class VirtualClock:
         """Seconds of mission clock."""
         return self._now_ns / NANOSECONDS
 
+    @property
+    def idle(self) -> bool:
+        """Tell whether nothing is to come."""
+        return not any(timer.pending for _, _, timer in self._queue)
+
     def at(self, when_ns: int, job: Job) -> Timer:
         """Have a job done at a moment; at once, after what is due already, when the moment has passed."""
         timer = Timer(max(when_ns, self._now_ns), job)

@@ -12,10 +12,14 @@ from skill_language.json_form import to_json
 from skill_language.model import Skill, Skillset
 from skill_runtime.core.engine import SkillsetEngine, TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from skill_runtime.core.pauses import PauseReply
+from skill_runtime.core.records import ExecutionRecord
+from skill_runtime.core.why import Why
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.local.clock import Job, Timer, VirtualClock
 from skill_runtime.local.data import LocalData
 from skill_runtime.staleness import STALE_PERIODS
+from skill_runtime.views import Sample
 
 _LOG = logging.getLogger(__name__)
 HooksFactory = Callable[["LocalManagers"], Mapping[str, SkillHooks]]
@@ -34,8 +38,12 @@ class Listener(Protocol):
         """Get a report of a running execution."""
         ...
 
-    def hear_data(self, name: str, value: object) -> None:
+    def hear_data(self, name: str, sample: Sample) -> None:
         """Get a value."""
+        ...
+
+    def hear_last(self, records: Sequence[ExecutionRecord]) -> None:
+        """Learn how the last execution of each skill ended."""
         ...
 
     def hear_end(self, reason: str) -> None:
@@ -101,7 +109,7 @@ class LocalManagers:
             self.after(STALE_PERIODS * period_s + 1e-9, lambda: self._stale(name, stamp_ns))
         self._look()
         for listener in self._listeners:
-            listener.hear_data(name, value)
+            listener.hear_data(name, Sample(value, stamp_ns))
 
     def on_step(self, callback: Callable[[Sequence[EngineEvent]], None]) -> None:
         """Have ``callback(events)`` called at each step, within it: clients hear of it later."""
@@ -127,11 +135,12 @@ class LocalManagers:
     def listen(self, listener: Listener) -> None:
         """Tell a listener everything from now on, and before that what latched topics hold: states, events, last values."""
         self._listeners.append(listener)
+        listener.hear_last([skill.last for skill in self.engine.skills.values() if skill.last is not None])
         listener.hear_step(dict(self._states), tuple(self._history))
         for data in self.skillset.data:
             reading = self.data.read(data.name)
             if reading.received:
-                listener.hear_data(data.name, reading.value)
+                listener.hear_data(data.name, Sample(reading.value, reading.stamp_ns))
 
     def request(self, skill: str, values: Mapping[str, object], execution_id: str) -> None:
         """Take a request."""
@@ -140,6 +149,14 @@ class LocalManagers:
     def interrupt(self, execution_id: str) -> None:
         """Take an interruption."""
         self._do(lambda: self.engine.interrupt(execution_id))
+
+    def set_paused(self, execution_id: str, reply: Callable[[PauseReply], None], *, paused: bool) -> None:
+        """Take a pause or a resumption; ``reply`` gets the answer."""
+        self._do(lambda: self.engine.set_paused(execution_id, reply, paused=paused))
+
+    def why(self, skill: str, values: Mapping[str, object] | None) -> Why:
+        """Tell whether a skill could start now; with inputs, its ``validate`` is asked, too."""
+        return self.engine.why(skill, None if values is None else self._hooks[skill].make_inputs(values))
 
     # --- parts -------------------------------------------------------------------------------------------------------
 

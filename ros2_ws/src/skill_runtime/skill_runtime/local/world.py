@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from typing import TypeVar
 
 from skill_language.model import Skillset
 from skill_runtime.hooks import SkillHooks
@@ -11,6 +12,8 @@ from skill_runtime.local.client import LocalClient, OnEvent
 from skill_runtime.local.clock import NANOSECONDS, Job, VirtualClock, WorldError
 from skill_runtime.local.managers import HooksFactory, LocalManagers
 from skill_runtime.local.values import Types
+
+T = TypeVar("T")
 
 
 class LocalWorld:
@@ -122,6 +125,29 @@ class LocalWorld:
     def run_for(self, duration_s: float) -> None:
         """Let time pass."""
         self.run_until(lambda: False, timeout_s=duration_s)
+
+    def run(self, coroutine: Coroutine[object, object, T], *, timeout_s: float = 3600.0) -> T:
+        """Run a coroutine that awaits handles and answers of this world, in virtual time; return what it returns.
+
+        Raises:
+            WorldError: it does not end within ``timeout_s`` of mission clock, or this is called from inside a job.
+        """
+        returned: list[T] = []
+
+        def step() -> bool:
+            try:
+                coroutine.send(None)
+            except StopIteration as stop:
+                returned.append(stop.value)
+            return bool(returned)
+
+        try:
+            over = self.run_until(step, timeout_s=timeout_s)
+        finally:
+            coroutine.close()
+        if not over:
+            raise WorldError(f"the coroutine has not ended within {timeout_s:g} s")
+        return returned[0]
 
     # --- for clients -------------------------------------------------------------------------------------------------
 

@@ -108,12 +108,16 @@ class Play:
         """Return what a value is now; ``names`` go before the memory."""
         if isinstance(value, bool | int | float | str):
             return value
+        if isinstance(value, Formula):
+            return value(names if value.names <= names.keys() else self._known(names), chance or self._chance)
+        return value(self._known(names))
+
+    def _known(self, names: Mapping[str, object]) -> Mapping[str, object]:
+        """Return the names with the memory as it is now behind them."""
         with self.lock:
             for skill in self._skills:
                 skill.move()
-            known = {**self.memory, **names}
-        source = chance or self._chance
-        return value(known, source) if isinstance(value, Formula) else value(known)
+            return {**self.memory, **names}
 
     # --- the clock's part --------------------------------------------------------------------------------------------
 

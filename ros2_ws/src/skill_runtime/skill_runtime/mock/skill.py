@@ -46,6 +46,7 @@ class Run:
 
     execution: Execution
     choice: Choice
+    names: Mapping[str, object]
     started_s: float
     delay_s: float
     moves: dict[str, tuple[object, object]]
@@ -86,9 +87,8 @@ class MockSkill(SkillHooks):
         choice = execution.inputs.choice if isinstance(execution.inputs, MockInputs) else self._unattached
         run = self._begin(execution, choice)
         after = self._play.stage.after
-        names = {**self._names(execution.inputs), "delay": run.delay_s}
         for change in choice.script.changes:
-            when_s = max(0.0, self._play.number(change.after_s, names, self._chance))
+            when_s = max(0.0, self._play.number(change.after_s, run.names, self._chance))
             run.appointments.append(after(when_s, lambda states=change.states: self._play.take(states)))  # type: ignore[misc]
         if choice.script.ending.crash and not run.delay_s:
             raise MockCrashError(choice.script.ending.crash)
@@ -105,8 +105,9 @@ class MockSkill(SkillHooks):
         said = run.choice.script.progress
         if isinstance(said, tuple):
             return _between(said, part)
-        names = {**self._names(execution.inputs), "t": elapsed_s, "f": part, "delay": run.delay_s}
-        return self._play.number(said, names, self._chance)
+        if isinstance(said, bool | int | float):
+            return said
+        return self._play.number(said, {**run.names, "t": elapsed_s, "f": part}, self._chance)
 
     def on_interrupt(self, execution: Execution) -> None:
         """Stop: what it moves stays where it is, what was still to come does not come."""
@@ -146,7 +147,7 @@ class MockSkill(SkillHooks):
         with play.lock:
             targets = {name: play.value(value, names, self._chance) for name, value in choice.script.moves.items()}
             moves = {name: (play.memory.get(name), _plain(target)) for name, target in targets.items()}
-            run = self._runs[execution.id] = Run(execution, choice, play.stage.now_s, delay_s, moves)
+            run = self._runs[execution.id] = Run(execution, choice, {**names, "delay": delay_s}, play.stage.now_s, delay_s, moves)
         return run
 
     def _finish(self, run: Run) -> None:
@@ -158,10 +159,9 @@ class MockSkill(SkillHooks):
         if run.choice.script.ending.crash:
             run.execution.fail(f"the mock crashed: {run.choice.script.ending.crash}")
             return
-        names = {**self._names(run.execution.inputs), "delay": run.delay_s}
         said = run.choice.script.outputs
         try:
-            outputs = {name: self._play.value(value, names, self._chance) for name, value in said.items()}
+            outputs = {name: self._play.value(value, run.names, self._chance) for name, value in said.items()}
         except FormulaError as error:
             run.execution.fail(str(error))
             return
