@@ -93,7 +93,9 @@ def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> I
     seen: set[str] = set()
     for change in effect.assignments:
         if change.resource in seen:
-            yield error("ALU212", f"effect `{effect.name}` sets `{change.resource}` twice", change.span)
+            yield warning(
+                "ALU212", f"effect `{effect.name}` sets `{change.resource}` twice", change.span, hint="one change follows the other"
+            )
         seen.add(change.resource)
         resource = resources.get(change.resource)
         if resource is None:
