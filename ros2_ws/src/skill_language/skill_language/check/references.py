@@ -144,6 +144,13 @@ def duplicates(what: str, elements: Sequence[Named]) -> Iterator[Diagnostic]:
         first.setdefault(element.name, element)
 
 
+def names_of_types(skillset: Skillset, elements: Sequence[Named]) -> Iterator[Diagnostic]:
+    """Yield a finding for every element that has the name of a type."""
+    for element in elements:
+        if element.name in skillset.types:
+            yield error("ALU201", f"`{element.name}` is the name of a type", element.span, hint="name one of them otherwise")
+
+
 def one_in_code(what: str, elements: Sequence[Named], code_name: Callable[[str], str]) -> Iterator[Diagnostic]:
     """Yield a finding for every element whose name becomes another one's in generated code."""
     first: dict[str, str] = {}

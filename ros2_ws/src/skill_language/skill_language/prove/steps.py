@@ -21,7 +21,7 @@ from skill_runtime.core.conditions import holds
 from skill_runtime.core.effects import effect_changes
 from skill_runtime.core.errors import EffectError
 from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
+from skill_runtime.core.situation import Entered, Running, Situation, Step
 
 Key = tuple[str, ...]
 """What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""
