@@ -10,6 +10,8 @@ import pytest
 from skill_language.codes import PROOF_CODES
 from skill_language.errors import Severity, has_errors
 from skill_language.models import check_files
+from skill_language.notation import Notation, read
+from skill_language.printer import print_file
 from skill_language.prove import prove
 
 PAGE = next(p / "skillsets" / "PROOFS.md" for p in Path(__file__).resolve().parents if (p / "skillsets" / "PROOFS.md").exists())
@@ -45,6 +47,19 @@ def test_example_and_mended_twin(code, most, tmp_path):
     assert shown
     assert all(finding.span.line for finding in shown)
     assert proved(tmp_path, mended, most=most) == []
+
+
+@pytest.mark.parametrize("code", WITH_EXAMPLE)
+def test_the_same_is_found_in_the_papers_notation(code, tmp_path):
+    (_, broken), _, (_, mended) = SECTIONS[code][1]
+    for text in (broken, mended):
+        document, source = read(text, "example.rl")
+        assert source.diagnostics == []
+        path = tmp_path / "example.skill"
+        path.write_text(print_file(document.skillsets, Notation.PAPER, []))
+        (file,) = check_files([path])
+        assert not has_errors(file.findings), file.findings
+        assert {f.code for f in prove(file.skillsets[0])} == {f.code for f in proved(tmp_path, text)}
 
 
 def test_time_is_bounded_and_said(tmp_path):
