@@ -108,7 +108,7 @@ SEMANTICS = [
     ("ALU208", "resource ^r { initial AVAILABEL AVAILABLE -> USED USED -> AVAILABLE }", "`AVAILABEL`", "did you mean `AVAILABLE`?"),
     (
         "ALU209",
-        "resource r { initial A A -> B } " + uses("e: ^r -> A"),
+        "resource r { state { A B C } initial A A -> B B -> A } " + uses("e: ^r -> C"),
         "no arrow leads",
         "to `B`",
     ),
@@ -192,6 +192,11 @@ def test_semantics(code, marked, message, hint):
     assert message in finding.message
     assert hint in finding.hint
     assert finding.severity is (Severity.WARNING if code.startswith("ALU3") or code in {"ALU212", *FOR_GENERATOR} else Severity.ERROR)
+
+
+def test_an_effect_that_only_ever_stays_in_the_initial_state_is_a_warning():
+    findings = check(parse("skillset s { resource r { initial A A -> B } " + uses("e: r -> A") + " }", "x.skill"))
+    assert [(f.code, f.severity) for f in findings if f.code == "ALU209"] == [("ALU209", Severity.WARNING)]
 
 
 def test_an_execution_is_asked_by_properties_only(tmp_path):

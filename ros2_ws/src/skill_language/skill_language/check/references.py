@@ -110,7 +110,7 @@ def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_a
     arrows = [arrow for arrow in resource.transitions if arrow.target == target]
     if any(any_arrow or not arrow.extern for arrow in arrows):
         return
-    name = f"effect `{effect.name}`" if effect.name else "the effect"
+    name = _called(effect)
     if arrows:
         message = f"{name} would take `{resource.name}` to `{target}`, but only the functional layer may (every arrow there is extern)"
         hint = f"add an arrow without `extern` to resource `{resource.name}` if skills are to take it"
@@ -118,7 +118,13 @@ def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_a
         return
     targets = dict.fromkeys(arrow.target for arrow in resource.transitions if not arrow.extern)
     hint = f"skills can take it to {quoted(list(targets))}" if targets else f"add `STATE -> {target}` to resource `{resource.name}`"
-    yield error("ALU209", f"{name} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
+    # Who is in the initial state may stay there, though it is an effect that never does anything.
+    tell = warning if target == resource.initial else error
+    yield tell("ALU209", f"{_called(effect)} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
+
+
+def _called(effect: Effect) -> str:
+    return f"effect `{effect.name}`" if effect.name else "the effect"
 
 
 def _unknown_resource(skillset: Skillset, name: str, span: Span) -> Diagnostic:
