@@ -43,6 +43,9 @@ class TopicBridge(Route, Protocol):
     def target_peers(self) -> int:
         """Return how many subscribers are connected to the end that messages go out of."""
 
+    def source_peers(self) -> int:
+        """Return how many publishers are connected to the end that messages come from; 0 before ``start``."""
+
 
 @dataclass(frozen=True)
 class Context:
