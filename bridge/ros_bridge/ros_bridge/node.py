@@ -15,6 +15,7 @@ from ros_bridge.config import ActionRoute, Direction, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Master, MasterWatch
+from ros_bridge.plane import open_plane
 from ros_bridge.routes import Context, Maker, RouteTable
 from ros_bridge.stats import write_json
 
@@ -61,7 +62,8 @@ class Bridge:
         self._config = config
         state_type = types.message(STATE_TYPE)
         self._node = rclpy.create_node("ros_bridge")
-        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, rospy.get_caller_id()))
+        self._plane = open_plane(rospy.get_caller_id(), master.uri, lambda: {rospy.get_node_uri()})
+        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, rospy.get_caller_id(), self._plane))
         self._state_type = state_type
         state_route = TopicRoute(STATE_TOPIC, STATE_TOPIC, Direction.ROS1_TO_ROS2, STATE_TYPE, latched=True, depth=1)
         self._state_ros2 = self._node.create_publisher(String, STATE_TOPIC, topics.qos_profile(state_route))
@@ -70,7 +72,12 @@ class Bridge:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
-        self._watch = MasterWatch(master, rospy.get_caller_id(), register_again)
+        self._watch = MasterWatch(master, rospy.get_caller_id(), self._register_again)
+
+    def _register_again(self) -> None:
+        register_again()
+        if self._plane is not None:
+            self._plane.register_again()
 
     def _open_configured(self) -> None:
         """Open what the configuration names.
@@ -139,6 +146,8 @@ class Bridge:
         """End the routes, first the callers' side, then the executor."""
         self._watch.close()
         self.table.close()
+        if self._plane is not None:
+            self._plane.close()
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)
