@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, cast
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from ros_bridge import ros1_definition
+from ros_bridge import layout, ros1_definition
 from ros_bridge.definitions import DefinitionFiles, ament_prefixes
 from ros_bridge.errors import TypeUnknownError
 from ros_bridge.mapping import TypeRules
@@ -43,7 +43,7 @@ class TypePair:
     """A message type of ROS 1 and the one of ROS 2 that it becomes, both ``package/Name``.
 
     ``same_layout``: both have the same kinds of fields in the same order, but for ``Header.seq``; then the definition of either world
-    tells the bytes of both. ``notes``: fields without a counterpart.
+    tells the bytes of both, and ``program`` is what converts them natively. ``notes``: fields without a counterpart.
     """
 
     ros1_name: str
@@ -53,6 +53,7 @@ class TypePair:
     begins_with_header: bool
     same_layout: bool
     notes: tuple[str, ...]
+    program: tuple[int, ...]
     _ros1_to_ros2: BytesConverter
     _ros2_to_ros1: BytesConverter
 
@@ -161,6 +162,7 @@ class Types:
             begins_with_header=bool(definition.fields) and definition.fields[0].base + definition.fields[0].array == "std_msgs/Header",
             same_layout=same_layout,
             notes=notes,
+            program=layout.compile_program(self._ros2.fielddefs, msg_name(ros2_name)) if same_layout else (),
             _ros1_to_ros2=to_ros2,
             _ros2_to_ros1=to_ros1,
         )

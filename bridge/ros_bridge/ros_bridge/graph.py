@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-BRIDGE_NODE = "ros_bridge"
+BRIDGE_NODES = frozenset({"ros_bridge", "ros_bridge_topics", "ros1_parameters"})
 ANY_TYPE = "*"  # what the ROS master has for a topic that only subscribers of any type have named
 ACTION_PARTS = ("goal", "cancel", "status", "feedback", "result")
 
 
 def is_bridge(node: str) -> bool:
     """Tell whether a node (its full name) is a bridge: two of them must not take each other's publications for foreign ones."""
-    return node.rpartition("/")[2] in {BRIDGE_NODE, "ros1_parameters"}
+    return node.rpartition("/")[2] in BRIDGE_NODES
 
 
 @dataclass(frozen=True)

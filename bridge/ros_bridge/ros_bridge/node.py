@@ -16,6 +16,7 @@ from ros_bridge.conversion import Types
 from ros_bridge.discovery import Discovery, GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Master, MasterWatch
+from ros_bridge.plane import open_plane
 from ros_bridge.routes import Context, Maker, RouteTable
 from ros_bridge.stats import write_json
 
@@ -63,7 +64,8 @@ class Bridge:
         state_type = types.message(STATE_TYPE)
         self._node = rclpy.create_node("ros_bridge")
         caller_id = rospy.get_caller_id()
-        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, caller_id))
+        self._plane = open_plane(caller_id, master.uri, lambda: {rospy.get_node_uri()})
+        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, caller_id, self._plane))
         self._discovery: Discovery | None = None
         if config.selection.include:
             reader = GraphReader(self._node, types, master.uri, caller_id)
@@ -76,7 +78,12 @@ class Bridge:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
-        self._watch = MasterWatch(master, caller_id, register_again)
+        self._watch = MasterWatch(master, caller_id, self._register_again)
+
+    def _register_again(self) -> None:
+        register_again()
+        if self._plane is not None:
+            self._plane.register_again()
 
     def _open_configured(self) -> None:
         """Open what the configuration names.
@@ -149,6 +156,8 @@ class Bridge:
         if self._discovery is not None:
             self._discovery.close()
         self.table.close()
+        if self._plane is not None:
+            self._plane.close()
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)

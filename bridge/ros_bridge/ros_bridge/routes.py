@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from ros_bridge.config import Spec
     from ros_bridge.conversion import Types
+    from ros_bridge.plane import Plane
 
 logger = logging.getLogger("ros_bridge")
 
@@ -56,6 +57,7 @@ class Context:
     types: Types
     master_uri: str
     caller_id: str
+    plane: Plane | None = None
 
 
 class Maker(Protocol):

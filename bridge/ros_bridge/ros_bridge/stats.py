@@ -6,7 +6,7 @@ import json
 import math
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +23,14 @@ class Durations:
     def __init__(self) -> None:
         self._bins = [0] * BINS
         self.count = 0
+
+    @classmethod
+    def of(cls, bins: Iterable[int]) -> Durations:
+        """Return the histogram that somebody else has counted, in the same bins."""
+        durations = cls()
+        durations._bins = list(bins)
+        durations.count = sum(durations._bins)
+        return durations
 
     def add(self, duration_ns: int) -> None:
         """Count one duration."""

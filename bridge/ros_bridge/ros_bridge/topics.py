@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ros_bridge import raw
 from ros_bridge.config import Direction, Reliability, TopicRoute
 from ros_bridge.errors import TypeUnknownError
+from ros_bridge.fast_topics import FastTopic
 from ros_bridge.stats import RouteStats
 
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
@@ -196,5 +197,8 @@ KINDS: dict[Direction, type[Ros1ToRos2 | Ros2ToRos1]] = {
 
 
 def make(spec: TopicRoute, context: Context) -> TopicBridge:
-    """Make a topic's route; raises BridgeError when its type can't cross."""
-    return KINDS[spec.direction](spec, context.types.message(spec.type_name, spec.ros2_type), context.node)
+    """Make a topic's route, by the native data plane where the layouts agree; raises BridgeError when its type can't cross."""
+    pair = context.types.message(spec.type_name, spec.ros2_type)
+    if context.plane is not None and pair.same_layout:
+        return FastTopic(spec, pair, interface_class(pair.ros2_name, "msg"), context.node, context.plane)
+    return KINDS[spec.direction](spec, pair, context.node)
