@@ -22,7 +22,7 @@ from pathlib import Path
 from ros_bridge import raw
 from ros_bridge.cli import set_up_ros1_environment
 from ros_bridge.config import Direction, TopicRoute
-from ros_bridge.conversion import MessageType, Types, ament_prefixes
+from ros_bridge.conversion import TypePair, Types, ament_prefixes
 from ros_bridge.stats import Durations
 from ros_bridge.topics import interface_class, qos_profile
 
@@ -121,7 +121,7 @@ def send(case: Case, publish: Callable[[], None]) -> None:
         publish()
 
 
-def measure(case: Case, direction: Direction, message: MessageType, node: rclpy.node.Node) -> Meter:
+def measure(case: Case, direction: Direction, message: TypePair, node: rclpy.node.Node) -> Meter:
     """Send one case one way and return what arrived."""
     name = topic_name(case, direction)
     ros2_class = interface_class(case.type_name, "msg")

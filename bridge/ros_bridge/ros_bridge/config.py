@@ -41,7 +41,10 @@ class Reliability(Enum):
 
 @dataclass(frozen=True)
 class TopicRoute:
-    """A topic that crosses. ``latched`` is ROS 1's latch and ROS 2's transient local; ``depth`` bounds every queue on the way."""
+    """A topic that crosses. ``latched`` is ROS 1's latch and ROS 2's transient local; ``depth`` bounds every queue on the way.
+
+    ``type_name`` is ROS 1's type, ``ros2_type`` ROS 2's (both ``package/Name``), empty where the mapping rules tell it.
+    """
 
     ros1_name: str
     ros2_name: str
@@ -50,6 +53,12 @@ class TopicRoute:
     latched: bool = False
     depth: int = 10
     reliability: Reliability = Reliability.RELIABLE
+    ros2_type: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name the route for people."""
+        return f"topic {_both_names(self)}"
 
     @property
     def target_name(self) -> str:
@@ -66,6 +75,12 @@ class ServiceRoute:
     server: World
     type_name: str
     timeout_s: float = 5.0
+    ros2_type: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name the route for people."""
+        return f"service {_both_names(self)}"
 
     @property
     def target_name(self) -> str:
@@ -74,16 +89,55 @@ class ServiceRoute:
 
 
 @dataclass(frozen=True)
+class ActionRoute:
+    """An action that crosses: actionlib in ROS 1, an action in ROS 2.
+
+    ``type_name`` is ``package/Name``, as ROS 2 has it: ROS 1's messages are ``package/NameAction``, ``package/NameGoal`` and so on.
+    ``timeout_s`` (wall clock) bounds each waiting for the server's acknowledgement, not the goal's execution.
+    """
+
+    ros1_name: str
+    ros2_name: str
+    server: World
+    type_name: str
+    timeout_s: float = 5.0
+    ros2_type: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name the route for people."""
+        return f"action {_both_names(self)}"
+
+    @property
+    def target_name(self) -> str:
+        """The name in the world that the clients are in."""
+        return self.ros2_name if self.server is World.ROS1 else self.ros1_name
+
+
+Spec = TopicRoute | ServiceRoute | ActionRoute
+
+
+def _both_names(spec: Spec) -> str:
+    return spec.ros1_name if spec.ros1_name == spec.ros2_name else f"{spec.ros1_name} (ROS 2: {spec.ros2_name})"
+
+
+@dataclass(frozen=True)
 class BridgeConfig:
     """All routes."""
 
     topics: tuple[TopicRoute, ...] = ()
     services: tuple[ServiceRoute, ...] = ()
+    actions: tuple[ActionRoute, ...] = ()
+
+    @property
+    def routes(self) -> tuple[Spec, ...]:
+        """All of them."""
+        return (*self.topics, *self.services, *self.actions)
 
 
 # A value's reader returns it typed, or raises ValueError with what it should have been.
 Reader = Callable[[object], object]
-Route = TypeVar("Route", TopicRoute, ServiceRoute)
+Route = TypeVar("Route", TopicRoute, ServiceRoute, ActionRoute)
 
 
 def _name(value: object) -> str:
@@ -131,11 +185,13 @@ TOPIC_KEYS: Mapping[str, Reader] = {
     **NAMES,
     "direction": _choice(Direction),
     "type": _type,
+    "ros2_type": _type,
     "latched": _flag,
     "depth": _depth,
     "reliability": _choice(Reliability),
 }
-SERVICE_KEYS: Mapping[str, Reader] = {**NAMES, "server": _choice(World), "type": _type, "timeout_s": _timeout}
+SERVICE_KEYS: Mapping[str, Reader] = {**NAMES, "server": _choice(World), "type": _type, "ros2_type": _type, "timeout_s": _timeout}
+SECTIONS: Mapping[str, Mapping[str, Reader]] = {"topics": TOPIC_KEYS, "services": SERVICE_KEYS, "actions": SERVICE_KEYS}
 
 
 def load_config(paths: Iterable[Path]) -> BridgeConfig:
@@ -148,6 +204,7 @@ def load_config(paths: Iterable[Path]) -> BridgeConfig:
     merged = BridgeConfig(
         tuple(route for config in configs for route in config.topics),
         tuple(route for config in configs for route in config.services),
+        tuple(route for config in configs for route in config.actions),
     )
     _require_apart(merged)
     return merged
@@ -167,17 +224,17 @@ def parse_config(text: str, file: str) -> BridgeConfig:
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise ConfigError(f"{file}:{line}: no YAML: {error.problem}") from error
-    sections = {"topics": TOPIC_KEYS, "services": SERVICE_KEYS}
-    entries: dict[str, list[tuple[int, dict[str, Any]]]] = {"topics": [], "services": []}
+    entries: dict[str, list[tuple[int, dict[str, Any]]]] = {section: [] for section in SECTIONS}
     for section, node, line in _pairs(root, file) if root is not None else ():
-        if section not in sections:
-            raise ConfigError(f"{file}:{line}: unknown key '{section}'; known are topics, services")
+        if section not in SECTIONS:
+            raise ConfigError(f"{file}:{line}: unknown key '{section}'; known are {', '.join(SECTIONS)}")
         if not isinstance(node, yaml.SequenceNode):
             raise ConfigError(f"{file}:{line}: '{section}' has to be a list of entries, each with a name")
-        entries[section] = [(item.start_mark.line + 1, _entry(item, sections[section], file)) for item in node.value]
+        entries[section] = [(item.start_mark.line + 1, _entry(item, SECTIONS[section], file)) for item in node.value]
     return BridgeConfig(
         tuple(_route(TopicRoute, values, ("direction", "type"), f"{file}:{line}") for line, values in entries["topics"]),
         tuple(_route(ServiceRoute, values, ("server", "type"), f"{file}:{line}") for line, values in entries["services"]),
+        tuple(_route(ActionRoute, values, ("server", "type"), f"{file}:{line}") for line, values in entries["actions"]),
     )
 
 
@@ -222,8 +279,7 @@ def _route(kind: type[Route], values: dict[str, Any], required: tuple[str, ...],
 def _require_apart(config: BridgeConfig) -> None:
     """Refuse two routes into one name, and routes that lead a message back to where it came from."""
     targets: set[tuple[str, Enum, str]] = set()
-    routes: list[TopicRoute | ServiceRoute] = [*config.topics, *config.services]
-    for route in routes:
+    for route in config.routes:
         way = route.direction if isinstance(route, TopicRoute) else route.server
         target = (type(route).__name__, way, route.target_name)
         if target in targets:

@@ -30,23 +30,29 @@ HEADER = "std_msgs/msg/Header"
 
 
 @dataclass(frozen=True)
-class MessageType:
-    """One message type in both worlds. ``ros1_name`` is ``package/Name``."""
+class TypePair:
+    """A message type of ROS 1 and the one of ROS 2 that it becomes, both ``package/Name``.
+
+    ``same_layout``: both have the same kinds of fields in the same order, but for ``Header.seq``; then the definition of either world
+    tells the bytes of both.
+    """
 
     ros1_name: str
+    ros2_name: str
     md5sum: str
     full_text: str
     begins_with_header: bool
-    _ros1_to_cdr: Callable[[bytes], memoryview]
-    _cdr_to_ros1: Callable[[bytes], memoryview]
+    same_layout: bool
+    _ros1_to_ros2: Callable[[bytes], memoryview]
+    _ros2_to_ros1: Callable[[bytes], memoryview]
 
-    def to_cdr(self, ros1: bytes) -> bytes:
+    def to_ros2(self, ros1: bytes) -> bytes:
         """Convert a ROS 1 message to little-endian CDR with its 4 bytes of encapsulation; ``Header.seq`` falls away."""
-        return bytes(self._ros1_to_cdr(ros1))
+        return bytes(self._ros1_to_ros2(ros1))
 
     def to_ros1(self, cdr: bytes, *, seq: int = 0) -> memoryview:
         """Convert CDR to a ROS 1 message; ``seq`` becomes ``header.seq`` when the message begins with a header."""
-        ros1 = self._cdr_to_ros1(cdr)
+        ros1 = self._ros2_to_ros1(cdr)
         if self.begins_with_header and seq:
             # The view is read-only, what it views is not: no second copy of an image for four bytes.
             struct.pack_into("<I", cast("bytearray", ros1.obj), 0, seq & 0xFFFFFFFF)
@@ -59,8 +65,8 @@ class ServiceType:
 
     ros1_name: str
     md5sum: str
-    request: MessageType
-    response: MessageType
+    request: TypePair
+    response: TypePair
 
 
 class Types:
@@ -74,15 +80,17 @@ class Types:
         self._definitions: dict[str, Definition] = {}
         self._sums: dict[str, str] = {}
 
-    def message(self, ros1_name: str) -> MessageType:
-        """Return a message type by its name ``package/Name``.
+    def message(self, ros1_name: str, ros2_name: str = "") -> TypePair:
+        """Return the pair of a ROS 1 type and a ROS 2 type, both ``package/Name``; without the second, the mapping rules tell it.
 
         Raises:
             TypeUnknownError: No definition is found.
             TypeDiffersError: The worlds lay it out differently.
         """
-        self._load(ros1_name)
-        return self._message(ros1_name)
+        ros2_name = ros2_name or ros1_name
+        self._load_ros2(ros2_name)
+        self._load_ros1(ros1_name)
+        return self._message(ros1_name, ros2_name)
 
     def service(self, ros1_name: str) -> ServiceType:
         """Return a service type by its name ``package/Name``; raises as ``message`` does."""
@@ -94,32 +102,29 @@ class Types:
             self._adopt_ros2(half, text)
             self._adopt_ros1(half, text)
             sums.append(ros1_definition.sum_text(self._definitions[half], self._md5))
-        request, response = (self._message(f"{ros1_name}_{suffix}") for suffix in ("Request", "Response"))
+        request, response = (self._message(f"{ros1_name}_{suffix}", f"{ros1_name}_{suffix}") for suffix in ("Request", "Response"))
         return ServiceType(ros1_name, ros1_definition.md5("".join(sums)), request, response)
 
-    def _message(self, ros1_name: str) -> MessageType:
+    def _message(self, ros1_name: str, ros2_name: str) -> TypePair:
         definition = self._definitions[ros1_name]
-        name = _ros2_name(ros1_name)
-        require_same_layout(name, self._ros1, self._ros2)
+        name = _ros2_name(ros2_name)
+        require_same_layout(_ros2_name(ros1_name), name, self._ros1, self._ros2)
         self._ros2.get_msgdef(name)  # writes the converters now, not when the first message waits for them
-        return MessageType(
+        return TypePair(
             ros1_name,
+            ros2_name,
             self._md5(ros1_name),
             ros1_definition.full_text(definition, self._definitions.__getitem__),
-            bool(definition.fields) and definition.fields[0].base + definition.fields[0].array == "std_msgs/Header",
-            lambda raw: self._ros2.ros1_to_cdr(raw, name),
-            lambda raw: self._ros2.cdr_to_ros1(raw, name),
+            begins_with_header=bool(definition.fields) and definition.fields[0].base + definition.fields[0].array == "std_msgs/Header",
+            same_layout=True,
+            _ros1_to_ros2=lambda raw: self._ros2.ros1_to_cdr(raw, name),
+            _ros2_to_ros1=lambda raw: self._ros2.cdr_to_ros1(raw, name),
         )
 
     def _md5(self, ros1_name: str) -> str:
         if ros1_name not in self._sums:
             self._sums[ros1_name] = ros1_definition.md5(ros1_definition.sum_text(self._definitions[ros1_name], self._md5))
         return self._sums[ros1_name]
-
-    def _load(self, ros1_name: str) -> None:
-        """Read a message's definitions in both worlds, and those of its parts, once."""
-        self._load_ros2(ros1_name)
-        self._load_ros1(ros1_name)
 
     def _load_ros1(self, ros1_name: str) -> None:
         if ros1_name in self._definitions:
@@ -200,15 +205,16 @@ def _fielddefs(ros1_name: str, text: str) -> Typesdict:
     return {name: (constants, fields or [(PADDING, (Nodetype.BASE, ("uint8", 0)))])}
 
 
-def require_same_layout(name: str, ros1: Typestore, ros2: Typestore) -> None:
+def require_same_layout(ros1_name: str, ros2_name: str, ros1: Typestore, ros2: Typestore) -> None:
     """Check that both worlds put the same kinds of fields in the same order; names may differ, and ``Header.seq`` is known.
 
     Raises:
         TypeDiffersError: They don't; the message names the first field that differs.
     """
-    if name == HEADER:
+    if ros1_name == ros2_name == HEADER:
         return
-    left, right = ros1.fielddefs[name][1], ros2.fielddefs[name][1]
+    name = ros1_name if ros1_name == ros2_name else f"{ros1_name} to {ros2_name}"
+    left, right = ros1.fielddefs[ros1_name][1], ros2.fielddefs[ros2_name][1]
     for (left_field, left_type), (right_field, right_type) in zip(left, right, strict=False):
         left_part, right_part = _shape(left_type), _shape(right_type)
         if left_part != right_part:
@@ -217,7 +223,7 @@ def require_same_layout(name: str, ros1: Typestore, ros2: Typestore) -> None:
             )
         part = left_part.split("[")[0]
         if "/msg/" in part and not part.startswith("builtin_interfaces"):
-            require_same_layout(part, ros1, ros2)
+            require_same_layout(part, part, ros1, ros2)
     if len(left) != len(right):
         longer, world = (left, "ROS 1") if len(left) > len(right) else (right, "ROS 2")
         raise TypeDiffersError(f"message type {name} differs: only {world} has field '{longer[min(len(left), len(right))][0]}'")

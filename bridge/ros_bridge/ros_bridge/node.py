@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import logging
 import os
@@ -10,10 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ros_bridge import raw, services, topics
-from ros_bridge.config import Direction, TopicRoute
+from ros_bridge.config import ActionRoute, Direction, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
+from ros_bridge.errors import BridgeError
 from ros_bridge.master import Master, MasterWatch
-from ros_bridge.stats import Stats
+from ros_bridge.routes import Context, Maker, RouteTable
+from ros_bridge.stats import write_json
 
 import rclpy  # isort: skip
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
@@ -30,6 +33,7 @@ logger = logging.getLogger("ros_bridge")
 STATE_TOPIC = "/bridge/state"
 STATE_TYPE = "std_msgs/String"
 HEARTBEAT_S = 0.5
+SECTION_OF: dict[type, str] = {TopicRoute: "topics", ServiceRoute: "services", ActionRoute: "actions"}
 HEARTBEATS_A_STATS_FILE = 4  # every 2 s
 SPIN_END_S = 1.0
 
@@ -45,40 +49,19 @@ def register_again() -> None:
         listeners.notify_added(name, uri, Registration.SRV)
 
 
-def require_types(config: BridgeConfig, types: Types) -> None:
-    """Check that every route's type can cross, before anything is opened.
-
-    Raises:
-        TypeUnknownError: A world does not have a type.
-        TypeDiffersError: The worlds lay a type out differently.
-    """
-    for topic in config.topics:
-        types.message(topic.type_name)
-        topics.interface_class(topic.type_name, "msg")
-    for service in config.services:
-        types.service(service.type_name)
-        topics.interface_class(service.type_name, "srv")
+MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.make}
 
 
 class Bridge:
     """All routes, running. rospy and rclpy have to be initialised, and the types checked."""
 
     def __init__(self, config: BridgeConfig, types: Types, master: Master) -> None:
-        """Open all routes."""
-        self.stats = Stats()
+        """Start both nodes' ends of the heartbeat; no route yet."""
         self._sequence = 0
-        topic_types = [types.message(route.type_name) for route in config.topics]
-        service_types = [types.service(route.type_name) for route in config.services]
+        self._config = config
         state_type = types.message(STATE_TYPE)
         self._node = rclpy.create_node("ros_bridge")
-        self._topics = [
-            topics.KINDS[route.direction](route, kind, self._node, self.stats.topic(route.ros1_name))
-            for route, kind in zip(config.topics, topic_types, strict=True)
-        ]
-        self._services: list[services.ServiceBridge] = [
-            services.KINDS[route.server](route, kind, self._node, self.stats.service(route.ros1_name))
-            for route, kind in zip(config.services, service_types, strict=True)
-        ]
+        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, rospy.get_caller_id()))
         self._state_type = state_type
         state_route = TopicRoute(STATE_TOPIC, STATE_TOPIC, Direction.ROS1_TO_ROS2, STATE_TYPE, latched=True, depth=1)
         self._state_ros2 = self._node.create_publisher(String, STATE_TOPIC, topics.qos_profile(state_route))
@@ -89,6 +72,18 @@ class Bridge:
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
         self._watch = MasterWatch(master, rospy.get_caller_id(), register_again)
 
+    def _open_configured(self) -> None:
+        """Open what the configuration names.
+
+        Raises:
+            BridgeError: Something of it can't cross.
+        """
+        self.table.reconcile(self._config.routes)
+        if self.table.failed:
+            raise BridgeError("\n".join(self.table.failed.values()))
+        for route in self.table.running().values():
+            route.start()
+
     def _spin(self) -> None:
         try:
             self._executor.spin()
@@ -98,7 +93,8 @@ class Bridge:
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
         """Bridge until asked to stop; heartbeats and figures are this thread's."""
         self._spinner.start()
-        logger.info("bridging %d topics and %d services", len(self._topics), len(self._services))
+        self._open_configured()
+        logger.info("bridging %d topics and %d services", len(self._config.topics), len(self._config.services))
         while not stop.is_set():
             self._beat("running")
             if stats_file is not None and self._sequence % HEARTBEATS_A_STATS_FILE == 0:
@@ -108,23 +104,32 @@ class Bridge:
         if stats_file is not None:
             self._write(stats_file)
 
+    def _summary(self) -> dict[str, dict[str, dict[str, object]]]:
+        """Return ``{"topics": {name: figures}, "services": ..., "actions": ...}``."""
+        summary: dict[str, dict[str, dict[str, object]]] = {section: {} for section in SECTION_OF.values()}
+        for spec, route in self.table.running().items():
+            figures = route.figures()
+            row = dataclasses.asdict(figures) | {"dropped": sum(figures.dropped.values()), "dropped_why": dict(figures.dropped)}
+            summary[SECTION_OF[type(spec)]][spec.ros1_name] = row
+        return summary
+
     def _write(self, stats_file: Path) -> None:
         try:
-            self.stats.write(stats_file)
+            write_json(stats_file, self._summary())
         except OSError as error:
             logger.warning("the figures can't be written to %s: %s", stats_file, error)
 
     def _beat(self, state: str) -> None:
         """Publish the bridge's state in both worlds."""
         self._sequence += 1
+        routes = self.table.running()
         text = {
             "state": state,
             "sequence": self._sequence,
             "pid": os.getpid(),
             "ros1_master": self._watch.reachable,
-            "topics": len(self._topics),
-            "services": len(self._services),
-            "errors": sum(stats.errors for stats in (*self.stats.topics.values(), *self.stats.services.values())),
+            **{section: sum(SECTION_OF[type(spec)] == section for spec in routes) for section in SECTION_OF.values()},
+            "errors": sum(route.figures().errors for route in routes.values()),
         }
         cdr = serialize_message(String(data=json.dumps(text)))
         self._state_ros2.publish(cdr)
@@ -133,8 +138,7 @@ class Bridge:
     def close(self) -> None:
         """End the routes, first the callers' side, then the executor."""
         self._watch.close()
-        for bridge in (*self._services, *self._topics):
-            bridge.close()
+        self.table.close()
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)

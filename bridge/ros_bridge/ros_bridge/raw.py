@@ -12,7 +12,7 @@ two_worlds.import_ros1()
 import genpy  # noqa: E402 - only after rospy is there
 
 if TYPE_CHECKING:
-    from ros_bridge.conversion import MessageType, ServiceType
+    from ros_bridge.conversion import ServiceType, TypePair
 
 
 class RawMessage(genpy.Message):  # type: ignore[misc]  # rospy has no types
@@ -58,17 +58,17 @@ class ArrivingMessage(RawMessage):
         return int(self.waiting.number)
 
 
-def message_class(message: MessageType) -> type[RawMessage]:
+def message_class(message: TypePair) -> type[RawMessage]:
     """Return the class for ``rospy.Publisher`` and for services of a type."""
     return type(_class_name(message.ros1_name), (RawMessage,), _message_fields(message))
 
 
-def arriving_class(message: MessageType) -> type[ArrivingMessage]:
+def arriving_class(message: TypePair) -> type[ArrivingMessage]:
     """Return the class for one ``rospy.Subscriber`` of a type."""
     return type(_class_name(message.ros1_name), (ArrivingMessage,), _message_fields(message) | {"waiting": threading.local()})
 
 
-def _message_fields(message: MessageType) -> dict[str, object]:
+def _message_fields(message: TypePair) -> dict[str, object]:
     return {"__slots__": (), "_type": message.ros1_name, "_md5sum": message.md5sum, "_full_text": message.full_text}
 
 

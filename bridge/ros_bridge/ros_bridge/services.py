@@ -11,7 +11,7 @@ import logging
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
@@ -19,6 +19,7 @@ from ros_bridge import raw
 from ros_bridge.config import ServiceRoute, World
 from ros_bridge.errors import CallError, CallTimeoutError
 from ros_bridge.ros1_call import POLL_S, Deadline, Ros1Service
+from ros_bridge.stats import RouteStats
 from ros_bridge.topics import interface_class
 
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
     from ros_bridge.conversion import ServiceType
     from ros_bridge.raw import RawMessage
-    from ros_bridge.stats import RouteStats
+    from ros_bridge.routes import Context, Route
+    from ros_bridge.stats import Figures
 
 logger = logging.getLogger("ros_bridge")
 
@@ -39,21 +41,15 @@ FLAGS = ("accepted", "success")
 TEXTS = ("reason", "message")
 
 
-class ServiceBridge(Protocol):
-    """What the node needs of a bridged service."""
-
-    def close(self) -> None:
-        """End the service and the calls under way."""
-
-
 class Ros2Server:
     """A service whose server lives in ROS 2, offered in ROS 1. rospy gives each caller a thread; it waits here for the answer."""
 
-    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node, stats: RouteStats) -> None:
+    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node) -> None:
         """Offer the service; calls are answered as soon as the node is spun."""
         self._route = route
+        self._node = node
         self._type = service
-        self._stats = stats
+        self._stats = RouteStats()
         self._ros2_class = interface_class(route.type_name, "srv")
         self._closed = threading.Event()
         self._client = node.create_client(self._ros2_class, route.ros2_name)
@@ -74,7 +70,7 @@ class Ros2Server:
     def _call(self, ros1_request: bytes) -> memoryview:
         """Call the server in ROS 2 with a serialized request; return the serialized response."""
         deadline = Deadline.after(self._route.timeout_s)
-        request = deserialize_message(self._type.request.to_cdr(ros1_request), self._ros2_class.Request)
+        request = deserialize_message(self._type.request.to_ros2(ros1_request), self._ros2_class.Request)
         self._wait_for_server(deadline)
         answered = threading.Event()
         future = self._client.call_async(request)
@@ -97,10 +93,18 @@ class Ros2Server:
         if not self._client.service_is_ready():
             raise CallError("the server in ROS 2 ended in the call")
 
+    def start(self) -> None:
+        """Do nothing: a call reaches for the server when it comes."""
+
+    def figures(self) -> Figures:
+        """Return what was called."""
+        return self._stats.figures()
+
     def close(self) -> None:
         """Withdraw the service; callers get an error."""
         self._closed.set()
         self._service.shutdown()
+        self._node.destroy_client(self._client)
 
 
 class _LaterResponse:
@@ -113,11 +117,12 @@ class _LaterResponse:
 class Ros1Server:
     """A service whose server lives in ROS 1, offered in ROS 2. The executor only takes the request; threads wait for the answer."""
 
-    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node, stats: RouteStats) -> None:
+    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node) -> None:
         """Offer the service; calls are taken as soon as the node is spun."""
         self._route = route
+        self._node = node
         self._type = service
-        self._stats = stats
+        self._stats = RouteStats()
         self._ros2_class = interface_class(route.type_name, "srv")
         self._link = Ros1Service(route.ros1_name, service.md5sum, master_uri=rosgraph.get_master_uri(), caller_id=rospy.get_caller_id())
         self._threads = ThreadPoolExecutor(CONCURRENT_CALLS, thread_name_prefix=route.ros2_name)
@@ -144,7 +149,7 @@ class Ros1Server:
         try:
             ros1_request = self._type.request.to_ros1(serialize_message(request))
             ros1_response = self._link.call(ros1_request, deadline)
-            response = deserialize_message(self._type.response.to_cdr(ros1_response), self._ros2_class.Response)
+            response = deserialize_message(self._type.response.to_ros2(ros1_response), self._ros2_class.Response)
             self._send(response, header)
             self._stats.crossed(time.perf_counter_ns() - start_ns)
         except CallError as error:
@@ -163,10 +168,18 @@ class Ros1Server:
         if response is not None:
             self._send(response, header)
 
+    def start(self) -> None:
+        """Do nothing: a call reaches for the server when it comes."""
+
+    def figures(self) -> Figures:
+        """Return what was called."""
+        return self._stats.figures()
+
     def close(self) -> None:
         """End the calls under way; their callers get refusals."""
         self._link.close()
         self._threads.shutdown(wait=False, cancel_futures=True)
+        self._node.destroy_service(self._service)
 
 
 def refusal(response_class: Any, reason: str) -> Any | None:
@@ -184,3 +197,8 @@ def refusal(response_class: Any, reason: str) -> Any | None:
 
 
 KINDS: dict[World, type[Ros2Server | Ros1Server]] = {World.ROS1: Ros1Server, World.ROS2: Ros2Server}
+
+
+def make(spec: ServiceRoute, context: Context) -> Route:
+    """Make a service's route; raises BridgeError when its type can't cross."""
+    return KINDS[spec.server](spec, context.types.service(spec.type_name), context.node)

@@ -19,7 +19,7 @@ import rclpy  # noqa: E402 - ROS 1 goes first
 import rospy  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
-from ros_bridge.node import Bridge, require_types  # noqa: E402
+from ros_bridge.node import Bridge  # noqa: E402
 
 if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig
@@ -38,7 +38,6 @@ def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.E
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     types = Types(ament_prefixes())
-    require_types(config, types)
     master = Master(master_uri, f"/{NODE_NAME}")
     if not master.wait(stop):
         return

@@ -38,7 +38,7 @@ def test_empty_file_is_an_empty_configuration():
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("topcis: []", 1, ["unknown key 'topcis'", "topics, services"]),
+        ("topcis: []", 1, ["unknown key 'topcis'", "topics, services, actions"]),
         ("topics: 3", 1, ["'topics' has to be a list"]),
         ("topics:\n  - /clock", 2, ["expected keys and values"]),
         ("topics:\n  - name: /a\n    directoin: x", 3, ["unknown key 'directoin'", "direction"]),

@@ -79,7 +79,7 @@ def test_random_messages_return_byte_for_byte(types, name):
     @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), database=None)
     @given(ros1_bytes(types, name.replace("/", "/msg/")))
     def round_trip(ros1):
-        assert bytes(message.to_ros1(message.to_cdr(ros1))) == ros1
+        assert bytes(message.to_ros1(message.to_ros2(ros1))) == ros1
 
     round_trip()
 
@@ -106,20 +106,20 @@ def test_cdr_is_what_the_layout_says(types):
         + struct.pack("<dd", 10.0, 0.25)
     )
     health = types.message("uav_msgs/SensorHealth")
-    assert health.to_cdr(ros1).hex() == cdr.hex()
+    assert health.to_ros2(ros1).hex() == cdr.hex()
     assert bytes(health.to_ros1(cdr)) == bytes(4) + ros1[4:]
 
 
 def test_sequence_number_is_set_in_a_leading_header_only(types):
     header = types.message("std_msgs/Header")
     pose = types.message("geometry_msgs/PoseStamped")
-    pose_cdr = pose.to_cdr(bytes(4 + 8 + 4 + 56))
+    pose_cdr = pose.to_ros2(bytes(4 + 8 + 4 + 56))
     assert not header.begins_with_header
     assert pose.begins_with_header
     assert bytes(pose.to_ros1(pose_cdr, seq=258))[:4] == b"\x02\x01\x00\x00"
     string = types.message("std_msgs/String")
     text = struct.pack("<I2s", 2, b"hi")
-    assert bytes(string.to_ros1(string.to_cdr(text), seq=258)) == text
+    assert bytes(string.to_ros1(string.to_ros2(text), seq=258)) == text
 
 
 MESSAGES = sorted({*ROUND_TRIPS, "uav_msgs/MappingState", "skillset_interfaces/ResourceState"} - {"diagnostic_msgs/DiagnosticArray"})
@@ -224,7 +224,7 @@ def test_recorded_messages_return_byte_for_byte(types, name):
             for number, (_, _, ros1) in enumerate(reader.messages([connection])):
                 if number == PER_CONNECTION:
                     break
-                returned = bytes(message.to_ros1(message.to_cdr(ros1)))
+                returned = bytes(message.to_ros1(message.to_ros2(ros1)))
                 start = 4 if message.begins_with_header else 0
                 assert len(returned) == len(ros1)
                 if "Header" not in message.full_text or message.begins_with_header:
