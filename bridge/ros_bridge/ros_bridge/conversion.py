@@ -105,6 +105,13 @@ class Types:
         request, response = (self._message(f"{ros1_name}_{suffix}", f"{ros1_name}_{suffix}") for suffix in ("Request", "Response"))
         return ServiceType(ros1_name, ros1_definition.md5("".join(sums)), request, response)
 
+    def defined(self, ros1_name: str, ros2_name: str, text: str) -> TypePair:
+        """Return the pair of types whose definition is no file of its own, such as an action's goal; raises as ``message`` does."""
+        self._adopt_ros2(ros2_name, text)
+        if ros1_name not in self._definitions:
+            self._adopt_ros1(ros1_name, text)
+        return self._message(ros1_name, ros2_name)
+
     def _message(self, ros1_name: str, ros2_name: str) -> TypePair:
         definition = self._definitions[ros1_name]
         name = _ros2_name(ros2_name)
