@@ -10,7 +10,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_bridge import raw, services, topics
+from ros_bridge import actions, raw, services, topics
 from ros_bridge.config import ActionRoute, Direction, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
 from ros_bridge.discovery import Discovery, GraphReader
@@ -51,7 +51,7 @@ def register_again() -> None:
         listeners.notify_added(name, uri, Registration.SRV)
 
 
-MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.make}
+MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.make, ActionRoute: actions.make}
 
 
 class Bridge:
