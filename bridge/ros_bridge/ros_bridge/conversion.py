@@ -151,6 +151,13 @@ class Types:
         with self._lock:
             return _has_byte_arrays(self._ros2, (Nodetype.NAME, msg_name(ros2_name)))
 
+    def defined(self, ros1_name: str, ros2_name: str, text: str) -> TypePair:
+        """Return the pair of types whose definition is no file of its own, such as an action's goal; raises as ``message`` does."""
+        self._adopt_ros2(ros2_name, text)
+        if ros1_name not in self._definitions:
+            self._adopt_ros1(ros1_name, text)
+        return self._message(ros1_name, ros2_name)
+
     def _message(self, ros1_name: str, ros2_name: str) -> TypePair:
         definition = self._definitions[ros1_name]
         to_ros2, to_ros1, same_layout, notes = self._converters(ros1_name, ros2_name)

@@ -29,3 +29,7 @@ class CallError(BridgeError):
 
 class CallTimeoutError(CallError):
     """The time that the configuration gives a service call is over."""
+
+
+class WireError(BridgeError):
+    """Bytes from a peer are not what its type says."""

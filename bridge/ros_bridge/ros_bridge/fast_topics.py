@@ -28,6 +28,7 @@ class FastTopic:
         self._spec = spec
         self._pair = pair
         self._plane = plane
+        self._node = node
         self._native = plane.native
         self._lock = threading.Lock()
         self._upward = spec.direction is Direction.ROS1_TO_ROS2
@@ -67,6 +68,12 @@ class FastTopic:
         """Return how many subscribers the end has that messages go out of."""
         with self._lock:
             return 0 if self._route is None else int(self._native.route_target_peers(self._route))
+
+    def source_peers(self) -> int:
+        """Return how many publishers are connected to the end that messages come from."""
+        if self._upward:
+            return self._plane.connections(self._spec.ros1_name)
+        return int(self._node.count_publishers(self._spec.ros2_name))
 
     def latching_peers(self) -> int:
         """Return how many connected ROS 1 publishers latch."""

@@ -31,14 +31,15 @@ class TypeRules:
 
     def __init__(self, packages: Mapping[str, str] | None = None, rules: Iterable[TypeRule] = ()) -> None:
         """``packages`` maps a ROS 1 package's name to the ROS 2 package that has its types under the same names."""
-        self._packages = dict(packages or {})
-        self._packages_back = {ros2: ros1 for ros1, ros2 in self._packages.items()}
-        self._rules = [*rules, *BUILT_IN]
+        self.packages = dict(packages or {})
+        self.own = tuple(rules)
+        self._packages_back = {ros2: ros1 for ros1, ros2 in self.packages.items()}
+        self._rules = (*self.own, *BUILT_IN)
 
     def to_ros2(self, ros1_type: str) -> str:
         """Return the ROS 2 type that a ROS 1 type becomes."""
         told = next((rule.ros2 for rule in self._rules if rule.ros1 == ros1_type), None)
-        return told or _in_package(ros1_type, self._packages)
+        return told or _in_package(ros1_type, self.packages)
 
     def to_ros1(self, ros2_type: str) -> str:
         """Return the ROS 1 type that a ROS 2 type becomes; of several that a rule names, the one with the same name, else the first."""

@@ -102,6 +102,12 @@ class Plane:
             for link in subscription.links.values() if subscription else ():
                 self._links.pop(link.token, None)
 
+    def connections(self, topic: str) -> int:
+        """Return how many publishers of a subscribed topic are connected."""
+        with self._lock:
+            subscription = self._subscriptions.get(topic)
+            return sum(link.connected for link in subscription.links.values()) if subscription is not None else 0
+
     def register_again(self) -> None:
         """Tell a master that has forgotten us everything."""
         self.node.register_again()

@@ -18,6 +18,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from ros_bridge import raw
 from ros_bridge.config import ServiceRoute, World
 from ros_bridge.errors import CallError, CallTimeoutError
+from ros_bridge.later import Header, LaterService
 from ros_bridge.ros1_call import POLL_S, Deadline, Ros1Service
 from ros_bridge.stats import RouteStats
 from ros_bridge.topics import interface_class
@@ -107,13 +108,6 @@ class Ros2Server:
         self._node.destroy_client(self._client)
 
 
-class _LaterResponse:
-    """Stands for a response that a thread will send."""
-
-    def __init__(self, request: Any) -> None:
-        self.request = request
-
-
 class Ros1Server:
     """A service whose server lives in ROS 1, offered in ROS 2. The executor only takes the request; threads wait for the answer."""
 
@@ -127,30 +121,22 @@ class Ros1Server:
         self._link = Ros1Service(route.ros1_name, service.md5sum, master_uri=rosgraph.get_master_uri(), caller_id=rospy.get_caller_id())
         self._threads = ThreadPoolExecutor(CONCURRENT_CALLS, thread_name_prefix=route.ros2_name)
         self._vacancies = threading.Semaphore(CONCURRENT_CALLS + WAITING_CALLS)
-        self._service = node.create_service(self._ros2_class, route.ros2_name, self._take)
-        # rclpy sends what the callback returns at once, and a callback that awaits makes its executor poll without a pause.
-        # So the callback returns a stand-in, and its sending starts the call.
-        self._send = self._service.send_response
-        self._service.send_response = self._send_later
+        self._service = LaterService(node, self._ros2_class, route.ros2_name, self._take)
 
-    @staticmethod
-    def _take(request: Any, _response: Any) -> _LaterResponse:
-        return _LaterResponse(request)
-
-    def _send_later(self, later: _LaterResponse, header: Any) -> None:
+    def _take(self, request: Any, header: Header) -> None:
         deadline = Deadline.after(self._route.timeout_s)
         if self._vacancies.acquire(blocking=False):
-            self._threads.submit(self._answer, later.request, header, deadline)
+            self._threads.submit(self._answer, request, header, deadline)
         else:
             self._refuse(header, CallError(f"the bridge has {CONCURRENT_CALLS + WAITING_CALLS} calls of this service waiting"))
 
-    def _answer(self, request: Any, header: Any, deadline: Deadline) -> None:
+    def _answer(self, request: Any, header: Header, deadline: Deadline) -> None:
         start_ns = time.perf_counter_ns()
         try:
             ros1_request = self._type.request.to_ros1(serialize_message(request))
             ros1_response = self._link.call(ros1_request, deadline)
             response = deserialize_message(self._type.response.to_ros2(ros1_response), self._ros2_class.Response)
-            self._send(response, header)
+            self._service.reply(response, header)
             self._stats.crossed(time.perf_counter_ns() - start_ns)
         except CallError as error:
             self._refuse(header, error)
@@ -159,14 +145,14 @@ class Ros1Server:
         finally:
             self._vacancies.release()
 
-    def _refuse(self, header: Any, error: CallError) -> None:
+    def _refuse(self, header: Header, error: CallError) -> None:
         self._stats.failed()
         reason = f"{self._route.ros2_name} by the bridge: {error}"
         kind = "timed out" if isinstance(error, CallTimeoutError) else "failed"
         logger.warning("call %s: %s", kind, reason)
         response = refusal(self._ros2_class.Response, reason)
         if response is not None:
-            self._send(response, header)
+            self._service.reply(response, header)
 
     def start(self) -> None:
         """Do nothing: a call reaches for the server when it comes."""
@@ -179,7 +165,7 @@ class Ros1Server:
         """End the calls under way; their callers get refusals."""
         self._link.close()
         self._threads.shutdown(wait=False, cancel_futures=True)
-        self._node.destroy_service(self._service)
+        self._service.close()
 
 
 def refusal(response_class: Any, reason: str) -> Any | None:

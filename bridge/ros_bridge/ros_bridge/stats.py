@@ -59,6 +59,18 @@ class Figures:
     dropped: Mapping[str, int] = field(default_factory=dict)  # reason: number
     errors: int = 0
 
+    def after(self, earlier: Figures) -> Figures:
+        """Return the figures of a route that was made anew: counts go on, durations are those of the newer part."""
+        reasons = earlier.dropped.keys() | self.dropped.keys()
+        return Figures(
+            count=earlier.count + self.count,
+            bytes=earlier.bytes + self.bytes,
+            p50_ms=earlier.p50_ms if self.p50_ms is None else self.p50_ms,
+            p95_ms=earlier.p95_ms if self.p95_ms is None else self.p95_ms,
+            dropped={reason: earlier.dropped.get(reason, 0) + self.dropped.get(reason, 0) for reason in sorted(reasons)},
+            errors=earlier.errors + self.errors,
+        )
+
 
 class RouteStats:
     """The figures of one route while Python counts them; safe to fill from several threads."""

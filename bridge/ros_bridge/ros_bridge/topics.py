@@ -94,6 +94,10 @@ class Ros1ToRos2:
         """Return how many subscriptions in ROS 2 are matched."""
         return int(self._publisher.get_subscription_count())
 
+    def source_peers(self) -> int:
+        """Return how many publishers in ROS 1 are connected."""
+        return 0 if self._subscriber is None else int(self._subscriber.get_num_connections())
+
     def figures(self) -> Figures:
         """Return what has crossed."""
         return self._stats.figures()
@@ -143,6 +147,10 @@ class Ros2ToRos1:
     def target_peers(self) -> int:
         """Return how many subscribers in ROS 1 are connected."""
         return int(self._publisher.get_num_connections())
+
+    def source_peers(self) -> int:
+        """Return how many publishers in ROS 2 are matched."""
+        return 0 if self._subscription is None else int(self._subscription.handle.get_publisher_count())
 
     def figures(self) -> Figures:
         """Return what has crossed."""

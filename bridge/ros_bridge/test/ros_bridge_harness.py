@@ -110,8 +110,8 @@ class Lines:
 
 
 class Ros1Peer(Lines):
-    def __init__(self, master: Master) -> None:
-        command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / "ros_bridge_ros1_peer.py")]
+    def __init__(self, master: Master, script: str = "ros_bridge_ros1_peer.py") -> None:
+        command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / script)]
         super().__init__(command, master.environment, errors=False)
         self.expect("ready")
 

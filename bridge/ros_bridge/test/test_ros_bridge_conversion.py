@@ -221,6 +221,8 @@ def test_recorded_messages_return_byte_for_byte(types, name):
                 message = types.message(ros1_name)
             except TypeUnknownError:
                 continue  # the recorder's own types
+            if not message.same_layout:
+                continue  # what a mapping leaves out does not return
             assert message.md5sum == connection.digest, f"{ros1_name} is another than the recorded one"
             for number, (_, _, ros1) in enumerate(reader.messages([connection])):
                 if number == PER_CONNECTION:
