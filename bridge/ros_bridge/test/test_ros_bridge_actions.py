@@ -72,6 +72,7 @@ class Node2:
         self.executor.add_node(self.node)
         self.thread = threading.Thread(target=self.executor.spin, daemon=True)
         self.clients: dict[str, ActionClient] = {}
+        self.servers: list[ActionServer] = []
         self.started: list[Node2] = []
         self.release = threading.Event()  # ends what its server executes: Python waits for these threads when it ends
 
@@ -84,6 +85,7 @@ class Node2:
     def server(self, name: str) -> "Server2":
         node2 = Node2()
         server = Server2(node2, name)
+        node2.servers.append(server.server)
         node2.thread.start()
         self.started.append(node2)
         return server
@@ -98,6 +100,8 @@ class Node2:
         self.executor.shutdown(timeout_sec=0.0)
         if self.thread.is_alive():
             self.thread.join(5.0)
+        for end in (*self.servers, *self.clients.values()):
+            end.destroy()
         self.node.destroy_node()
 
 
