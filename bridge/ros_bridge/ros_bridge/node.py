@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 from ros_bridge import actions, raw, services, topics
 from ros_bridge.config import ActionRoute, Direction, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
+from ros_bridge.discovery import Discovery, GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Master, MasterWatch
+from ros_bridge.plane import open_plane
 from ros_bridge.routes import Context, Maker, RouteTable
 from ros_bridge.stats import write_json
 
@@ -61,7 +63,13 @@ class Bridge:
         self._config = config
         state_type = types.message(STATE_TYPE)
         self._node = rclpy.create_node("ros_bridge")
-        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, rospy.get_caller_id()))
+        caller_id = rospy.get_caller_id()
+        self._plane = open_plane(caller_id, master.uri, lambda: {rospy.get_node_uri()})
+        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, caller_id, self._plane))
+        self._discovery: Discovery | None = None
+        if config.selection.include:
+            reader = GraphReader(self._node, types, master.uri, caller_id)
+            self._discovery = Discovery(reader, self._node, config.selection, self.table, config.routes)
         self._state_type = state_type
         state_route = TopicRoute(STATE_TOPIC, STATE_TOPIC, Direction.ROS1_TO_ROS2, STATE_TYPE, latched=True, depth=1)
         self._state_ros2 = self._node.create_publisher(String, STATE_TOPIC, topics.qos_profile(state_route))
@@ -70,7 +78,12 @@ class Bridge:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
-        self._watch = MasterWatch(master, rospy.get_caller_id(), register_again)
+        self._watch = MasterWatch(master, caller_id, self._register_again)
+
+    def _register_again(self) -> None:
+        register_again()
+        if self._plane is not None:
+            self._plane.register_again()
 
     def _open_configured(self) -> None:
         """Open what the configuration names.
@@ -81,8 +94,8 @@ class Bridge:
         self.table.reconcile(self._config.routes)
         if self.table.failed:
             raise BridgeError("\n".join(self.table.failed.values()))
-        for route in self.table.running().values():
-            route.start()
+        for spec in self._config.routes:
+            self.table.start(spec)
 
     def _spin(self) -> None:
         try:
@@ -94,7 +107,10 @@ class Bridge:
         """Bridge until asked to stop; heartbeats and figures are this thread's."""
         self._spinner.start()
         self._open_configured()
-        logger.info("bridging %d topics and %d services", len(self._config.topics), len(self._config.services))
+        counts = f"{len(self._config.topics)} topics and {len(self._config.services)} services"
+        logger.info("bridging %s%s", counts, " and what discovery finds" if self._discovery is not None else "")
+        if self._discovery is not None:
+            self._discovery.start()
         while not stop.is_set():
             self._beat("running")
             if stats_file is not None and self._sequence % HEARTBEATS_A_STATS_FILE == 0:
@@ -107,8 +123,7 @@ class Bridge:
     def _summary(self) -> dict[str, dict[str, dict[str, object]]]:
         """Return ``{"topics": {name: figures}, "services": ..., "actions": ...}``."""
         summary: dict[str, dict[str, dict[str, object]]] = {section: {} for section in SECTION_OF.values()}
-        for spec, route in self.table.running().items():
-            figures = route.figures()
+        for spec, figures in self.table.figures().items():
             row = dataclasses.asdict(figures) | {"dropped": sum(figures.dropped.values()), "dropped_why": dict(figures.dropped)}
             summary[SECTION_OF[type(spec)]][spec.ros1_name] = row
         return summary
@@ -138,7 +153,11 @@ class Bridge:
     def close(self) -> None:
         """End the routes, first the callers' side, then the executor."""
         self._watch.close()
+        if self._discovery is not None:
+            self._discovery.close()
         self.table.close()
+        if self._plane is not None:
+            self._plane.close()
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)

@@ -12,14 +12,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
+from ros_bridge.config import TopicRoute
 from ros_bridge.errors import BridgeError
+from ros_bridge.stats import Figures
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
     from ros_bridge.config import Spec
     from ros_bridge.conversion import Types
-    from ros_bridge.stats import Figures
+    from ros_bridge.plane import Plane
 
 logger = logging.getLogger("ros_bridge")
 
@@ -43,6 +45,9 @@ class TopicBridge(Route, Protocol):
     def target_peers(self) -> int:
         """Return how many subscribers are connected to the end that messages go out of."""
 
+    def source_peers(self) -> int:
+        """Return how many publishers are connected to the end that messages come from; 0 before ``start``."""
+
 
 @dataclass(frozen=True)
 class Context:
@@ -52,6 +57,7 @@ class Context:
     types: Types
     master_uri: str
     caller_id: str
+    plane: Plane | None = None
 
 
 class Maker(Protocol):
@@ -59,6 +65,15 @@ class Maker(Protocol):
 
     def __call__(self, spec: Any, context: Context, /) -> Route:
         """Return the route; raises BridgeError."""
+
+
+Key = tuple[str, str, str, str]
+
+
+def key_of(spec: Spec) -> Key:
+    """Return what stays the same of a route while its quality of service or type changes: kind, way and names."""
+    way = spec.direction if isinstance(spec, TopicRoute) else spec.server
+    return type(spec).__name__, way.value, spec.ros1_name, spec.ros2_name
 
 
 class RouteTable:
@@ -70,18 +85,38 @@ class RouteTable:
         self._context = context
         self._lock = threading.RLock()
         self._running: dict[Spec, Route] = {}
+        self._started: set[Spec] = set()
+        self._earlier: dict[Key, Figures] = {}
         self.failed: dict[Spec, str] = {}
 
     def reconcile(self, wanted: Iterable[Spec]) -> None:
         """Close what is not wanted and make what is missing; a spec that fails is reported once, and tried again when wanted anew."""
-        wanted = list(wanted)
+        wanted = dict.fromkeys(wanted)
         with self._lock:
             for spec in [spec for spec in self._running if spec not in wanted]:
-                self._running.pop(spec).close()
+                self._close(spec)
             self.failed = {spec: reason for spec, reason in self.failed.items() if spec in wanted}
             for spec in wanted:
                 if spec not in self._running and spec not in self.failed:
                     self._make(spec)
+
+    def start(self, spec: Spec) -> None:
+        """Let a route flow, once."""
+        with self._lock:
+            if spec in self._running and spec not in self._started:
+                self._running[spec].start()
+                self._started.add(spec)
+
+    def started(self, spec: Spec) -> bool:
+        """Tell whether a route flows."""
+        with self._lock:
+            return spec in self._started
+
+    def park(self, spec: Spec) -> None:
+        """Make a route anew that offers its target but does not flow, as nobody is there to receive."""
+        with self._lock:
+            self._close(spec)
+            self._make(spec)
 
     def _make(self, spec: Spec) -> None:
         try:
@@ -95,10 +130,20 @@ class RouteTable:
             raise BridgeError(f"{spec.label}: this bridge has no maker for a {type(spec).__name__}")
         return self._makers[type(spec)]
 
+    def _close(self, spec: Spec) -> None:
+        route = self._running.pop(spec)
+        self._started.discard(spec)
+        route.close()
+        self._earlier[key_of(spec)] = route.figures().after(self._earlier.get(key_of(spec), Figures()))
+
     def running(self) -> dict[Spec, Route]:
         """Return the running routes by their specs, in the order in which they were made."""
         with self._lock:
             return dict(self._running)
+
+    def figures(self) -> dict[Spec, Figures]:
+        """Return the figures of the running routes, with what crossed before they were made anew."""
+        return {spec: route.figures().after(self._earlier.get(key_of(spec), Figures())) for spec, route in self.running().items()}
 
     def close(self) -> None:
         """Close all routes."""

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ros_bridge import two_worlds
-from ros_bridge.conversion import Types, ament_prefixes
+from ros_bridge.conversion import Types
+from ros_bridge.definitions import DefinitionFiles, ament_prefixes, ros1_shares
 from ros_bridge.master import Master
 
 two_worlds.import_ros1()
@@ -37,7 +38,7 @@ def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.E
     Neither node takes time from ``/clock``: the bridge has to work before it ticks, and is what makes it tick in ROS 2.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    types = Types(ament_prefixes())
+    types = Types(ament_prefixes(), config.rules, DefinitionFiles(ros1_shares(), two_worlds.find_ros1_path()))
     master = Master(master_uri, f"/{NODE_NAME}")
     if not master.wait(stop):
         return

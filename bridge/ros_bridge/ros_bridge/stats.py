@@ -6,7 +6,7 @@ import json
 import math
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +23,14 @@ class Durations:
     def __init__(self) -> None:
         self._bins = [0] * BINS
         self.count = 0
+
+    @classmethod
+    def of(cls, bins: Iterable[int]) -> Durations:
+        """Return the histogram that somebody else has counted, in the same bins."""
+        durations = cls()
+        durations._bins = list(bins)
+        durations.count = sum(durations._bins)
+        return durations
 
     def add(self, duration_ns: int) -> None:
         """Count one duration."""
@@ -50,6 +58,18 @@ class Figures:
     p95_ms: float | None = None
     dropped: Mapping[str, int] = field(default_factory=dict)  # reason: number
     errors: int = 0
+
+    def after(self, earlier: Figures) -> Figures:
+        """Return the figures of a route that was made anew: counts go on, durations are those of the newer part."""
+        reasons = earlier.dropped.keys() | self.dropped.keys()
+        return Figures(
+            count=earlier.count + self.count,
+            bytes=earlier.bytes + self.bytes,
+            p50_ms=earlier.p50_ms if self.p50_ms is None else self.p50_ms,
+            p95_ms=earlier.p95_ms if self.p95_ms is None else self.p95_ms,
+            dropped={reason: earlier.dropped.get(reason, 0) + self.dropped.get(reason, 0) for reason in sorted(reasons)},
+            errors=earlier.errors + self.errors,
+        )
 
 
 class RouteStats:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ros_bridge import raw
 from ros_bridge.config import Direction, Reliability, TopicRoute
 from ros_bridge.errors import TypeUnknownError
+from ros_bridge.fast_topics import FastTopic
 from ros_bridge.stats import RouteStats
 
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
@@ -93,6 +94,10 @@ class Ros1ToRos2:
         """Return how many subscriptions in ROS 2 are matched."""
         return int(self._publisher.get_subscription_count())
 
+    def source_peers(self) -> int:
+        """Return how many publishers in ROS 1 are connected."""
+        return 0 if self._subscriber is None else int(self._subscriber.get_num_connections())
+
     def figures(self) -> Figures:
         """Return what has crossed."""
         return self._stats.figures()
@@ -143,6 +148,10 @@ class Ros2ToRos1:
         """Return how many subscribers in ROS 1 are connected."""
         return int(self._publisher.get_num_connections())
 
+    def source_peers(self) -> int:
+        """Return how many publishers in ROS 2 are matched."""
+        return 0 if self._subscription is None else int(self._subscription.handle.get_publisher_count())
+
     def figures(self) -> Figures:
         """Return what has crossed."""
         return self._stats.figures()
@@ -188,5 +197,8 @@ KINDS: dict[Direction, type[Ros1ToRos2 | Ros2ToRos1]] = {
 
 
 def make(spec: TopicRoute, context: Context) -> TopicBridge:
-    """Make a topic's route; raises BridgeError when its type can't cross."""
-    return KINDS[spec.direction](spec, context.types.message(spec.type_name, spec.ros2_type), context.node)
+    """Make a topic's route, by the native data plane where the layouts agree; raises BridgeError when its type can't cross."""
+    pair = context.types.message(spec.type_name, spec.ros2_type)
+    if context.plane is not None and pair.same_layout:
+        return FastTopic(spec, pair, interface_class(pair.ros2_name, "msg"), context.node, context.plane)
+    return KINDS[spec.direction](spec, pair, context.node)

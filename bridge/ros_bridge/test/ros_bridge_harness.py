@@ -23,6 +23,11 @@ def alula_root() -> Path:
     return Path(os.environ["ALULA_ROOT"])
 
 
+def bag_folder() -> Path:
+    """Return the folder of recordings made by others, beside the checkout; ALULA_DATA names another place."""
+    return Path(os.environ.get("ALULA_DATA", alula_root().parent / "shared" / "data")) / "bags"
+
+
 def wait_until(condition: Callable[[], object], what: str, within_s: float = WITHIN_S) -> None:
     end = time.monotonic() + within_s
     while not condition():

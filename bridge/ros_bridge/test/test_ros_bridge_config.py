@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World, load_config, parse_config
+from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World
+from ros_bridge.config_file import load_config, parse_config
 from ros_bridge.errors import ConfigError
 
 GOOD = """

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from ros_bridge_harness import bag_folder
 from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Reader
 
@@ -199,11 +200,11 @@ def test_a_type_that_differs_is_refused_by_name_and_field(tmp_path):
 
     types = Types([package(tmp_path, "own_msgs", msg_Outer="Inner[] inner\n", msg_Inner="int32 a\nint32 b\n")])
     types._ros1.register(get_types_from_msg("int32 a\nfloat32 b\n", "own_msgs/msg/Inner"))
-    with pytest.raises(TypeDiffersError, match=r"own_msgs/msg/Inner differs: field 'b' is float32 in ROS 1, 'b' is int32 in ROS 2"):
+    with pytest.raises(TypeDiffersError, match=r"own_msgs/Inner differs: field 'b' is float32 in ROS 1, 'b' is int32 in ROS 2"):
         types.message("own_msgs/Outer")
 
 
-BAGS = Path(os.environ.get("ALULA_ROOT", "."), "../shared/data/bags").resolve()
+BAGS = bag_folder()
 PER_CONNECTION = 200
 
 
@@ -220,6 +221,8 @@ def test_recorded_messages_return_byte_for_byte(types, name):
                 message = types.message(ros1_name)
             except TypeUnknownError:
                 continue  # the recorder's own types
+            if not message.same_layout:
+                continue  # what a mapping leaves out does not return
             assert message.md5sum == connection.digest, f"{ros1_name} is another than the recorded one"
             for number, (_, _, ros1) in enumerate(reader.messages([connection])):
                 if number == PER_CONNECTION:
