@@ -1,4 +1,4 @@
-"""A ROS 1 node with real actionlib servers and clients for the bridge's tests: commands and events as JSON lines, as in ros_bridge_ros1_peer."""
+"""A ROS 1 node with real actionlib servers and clients for the bridge's tests: commands and events as JSON lines."""
 
 import json
 import os
