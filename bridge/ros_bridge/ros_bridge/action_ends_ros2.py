@@ -128,17 +128,23 @@ class Ros2ServerEnd:
         self._goals = node.create_client(kinds.SendGoalService, f"{name}/_action/send_goal")
         self._results = node.create_client(kinds.GetResultService, f"{name}/_action/get_result")
         self._cancels = node.create_client(CancelGoal, f"{name}/_action/cancel_goal")
+        self._status_name = f"{name}/_action/status"
+        self._seen: frozenset[bytes] = frozenset()
         self._pending: dict[bytes, list[tuple[Any, Future]]] = {}
         self._feedback = node.create_subscription(
             kinds.FeedbackMessage, f"{name}/_action/feedback", self._take_feedback, QoSProfile(depth=FEEDBACK_DEPTH), raw=True
         )
-        self._status = node.create_subscription(
-            GoalStatusArray, f"{name}/_action/status", self._take_status, qos_profile_action_status_default
-        )
+        self._status = node.create_subscription(GoalStatusArray, self._status_name, self._take_status, qos_profile_action_status_default)
 
     def present(self) -> bool:
         """Tell whether all services are there."""
         return all(client.service_is_ready() for client in (self._goals, self._results, self._cancels))
+
+    def has_come(self) -> bool:
+        """Tell whether a server has come since this was last asked: its publisher is a new one."""
+        before = self._seen
+        self._seen = frozenset(bytes(info.endpoint_gid) for info in self._node.get_publishers_info_by_topic(self._status_name))
+        return bool(self._seen - before)
 
     def send_goal(self, goal: bytes, payload: bytes) -> None:
         """Ask the server to accept a goal."""

@@ -55,7 +55,10 @@ class Clockwork:
 
     def _run(self) -> None:
         while not self._stop.wait(TICK_S if self._busy() else IDLE_TICK_S):
-            self._tick(time.monotonic())
+            try:
+                self._tick(time.monotonic())
+            except Exception:  # of a world that is just going away; the next tick must come
+                logger.exception("a tick failed")
 
     def close(self) -> None:
         """Stop, and return when no tick runs any more."""

@@ -20,6 +20,7 @@ from ros_bridge.actionlib_wire import GoalStatus
 logger = logging.getLogger("ros_bridge")
 
 QUEUED_S = 0.5
+SEND_AGAIN_S = 1.0  # a goal that the server does not list: it was lost on the way; actionlib takes an id only once
 RESULT_WITHIN_S = 2.0  # a terminal status without its result: the result message was lost
 KEEP_RESULT_S = 60.0
 KEEP_RESULTS = 1000
@@ -72,7 +73,7 @@ class Goal:
     answer_by_s: float
     status: Ros2Status = Ros2Status.UNKNOWN
     stamp_ns: int = 0
-    sent: bool = False
+    sent_s: float | None = None
     cancel_seen: bool = False
     listed_s: float | None = None
     ended_in_ros1: tuple[Ros1Status, float] | None = None
@@ -120,13 +121,12 @@ class GoalsToRos1:
                 self._clients.reply_goal(caller, accepted=False, stamp_ns=0)
                 return
             goal = self._goals[goal_uuid] = Goal(goal_uuid, payload, caller, now_s + self._timeout_s)
-            self._send_if_possible(goal)
+            self._send_if_possible(goal, now_s)
 
-    def _send_if_possible(self, goal: Goal) -> None:
+    def _send_if_possible(self, goal: Goal, now_s: float) -> None:
         if self._server.present():
-            goal.sent = True
+            goal.sent_s = now_s
             self._server.send_goal(goal.name, goal.payload)
-            goal.payload = b""
 
     def request_cancel(self, caller: Any, goal_uuid: bytes, stamp_ns: int, now_s: float) -> None:
         """Cancel one goal, those accepted at or before a stamp, or all: the rules of action_msgs/CancelGoal."""
@@ -145,7 +145,7 @@ class GoalsToRos1:
 
     def _cancel(self, goal: Goal, now_s: float) -> None:
         goal.cancel_seen = True
-        if not goal.sent:
+        if goal.sent_s is None:
             self._reject(goal, "cancelled before a server was there", now_s)
             return
         self._server.send_cancel(goal.name)
@@ -176,7 +176,7 @@ class GoalsToRos1:
 
     def _on_goal_status(self, goal: Goal, status: GoalStatus, now_s: float) -> None:
         if goal.listed_s is None:
-            goal.listed_s = now_s
+            goal.listed_s, goal.payload = now_s, b""
         goal.stamp_ns = goal.stamp_ns or status.goal_id.stamp_ns
         goal.cancel_seen |= status.status in (Ros1Status.PREEMPTING, Ros1Status.RECALLING)
         if status.status in ROS1_TERMINAL:
@@ -193,11 +193,14 @@ class GoalsToRos1:
             return self._find(status) is not None
 
     def on_feedback(self, status: GoalStatus, payload: bytes, now_s: float) -> None:
-        """Pass on what the server says on the way."""
+        """Pass on what the server says on the way; the last of it may come after the result, over another connection."""
         with self.lock:
             goal = self._find(status)
-            if goal is not None and goal.open:
+            if goal is None:
+                return
+            if goal.open:
                 self._on_goal_status(goal, status, now_s)
+            if goal.status is not Ros2Status.UNKNOWN:
                 self._clients.publish_feedback(goal.uuid, payload)
 
     def on_result(self, status: GoalStatus, payload: bytes, now_s: float) -> None:
@@ -236,22 +239,23 @@ class GoalsToRos1:
         unanswered = goal.status is Ros2Status.UNKNOWN
         if goal.ended_in_ros1 is not None and now_s - goal.ended_in_ros1[1] > RESULT_WITHIN_S:
             self._end_as_in_ros1(goal, goal.ended_in_ros1[0], None, "the server in ROS 1 has sent no result", now_s)
-        elif goal.sent and gone:
+        elif goal.sent_s is not None and gone:
             self._give_up(goal, "the server in ROS 1 is gone", now_s)
         elif unanswered and goal.listed_s is not None and now_s - goal.listed_s > QUEUED_S and goal.ended_in_ros1 is None:
             self._accept(goal)
         elif unanswered and now_s > goal.answer_by_s and goal.listed_s is None:
-            if goal.sent:
+            if goal.sent_s is not None:
                 self._server.send_cancel(goal.name)  # it must not begin after the client was told that it doesn't
-            self._reject(goal, "the server in ROS 1 has not taken the goal in time" if goal.sent else "no server in ROS 1", now_s)
-        elif not goal.sent:
-            self._send_if_possible(goal)
+            reason = "no server in ROS 1" if goal.sent_s is None else "the server in ROS 1 has not taken the goal in time"
+            self._reject(goal, reason, now_s)
+        elif goal.sent_s is None or (goal.listed_s is None and now_s - goal.sent_s > SEND_AGAIN_S):
+            self._send_if_possible(goal, now_s)
 
     def give_up_all(self, reason: str, now_s: float) -> None:
         """End all goals for the clients, and ask the server to end them too."""
         with self.lock:
             for goal in [goal for goal in self._goals.values() if goal.open]:
-                if goal.sent:
+                if goal.sent_s is not None:
                     self._server.send_cancel(goal.name)
                 self._give_up(goal, reason, now_s)
 

@@ -3,6 +3,10 @@
 Towards ROS 1 it behaves as actionlib's own server does: the status list goes out at each change and at 5 Hz, an ended goal stays in it for
 5 s, a cancel request that overtakes its goal is remembered, one with a stamp also meets goals that come later with an earlier stamp.
 A goal is PENDING until the server in ROS 2 executes it, and PREEMPTING when that server agrees to cancel, not before.
+
+A request to a server that is just coming or going may get lost, and so may its answer. So a goal without an answer, or with a server that
+has come anew, is asked after with a request for its result: a server that does not know the goal says so at once. Then the goal is
+sent again, under the same id, which no server takes twice, or, if it had been accepted, it is over.
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ logger = logging.getLogger("ros_bridge")
 KEEP_S = 5.0  # actionlib's status_list_timeout
 KEEP_MOST = 1000
 MOST_GOALS = 1000  # open at a time; more are rejected
+ASK_AFTER_S = 1.0
 STATUS_PERIOD_S = 0.2  # actionlib's status frequency of 5 Hz
 
 
@@ -30,6 +35,9 @@ class Ros2Server(Protocol):
 
     def present(self) -> bool:
         """Tell whether all its services are there."""
+
+    def has_come(self) -> bool:
+        """Tell whether a server has come since this was last asked."""
 
     def send_goal(self, goal: bytes, payload: bytes) -> None:
         """Ask the server to accept a goal."""
@@ -68,7 +76,8 @@ class Goal:
     uuid: bytes
     status: Ros1Status = Ros1Status.PENDING
     text: str = ""
-    sent: bool = False
+    sent_s: float | None = None
+    asked: bool = False
     accepted: bool = False
     cancel_asked: bool = False
     ended_s: float | None = None
@@ -122,7 +131,7 @@ class GoalsToRos2:
             elif sum(other.open for other in self._goals.values()) > MOST_GOALS:
                 self._end(goal, Ros1Status.REJECTED, None, f"the bridge has {MOST_GOALS} open goals of this action", now_s)
             else:
-                self._send_if_possible(goal)
+                self._send_if_possible(goal, now_s)
 
     def _new(self, goal_id: GoalId, payload: bytes, now_s: float) -> Goal:
         goal_uuid = uuid.uuid4()
@@ -131,11 +140,11 @@ class GoalsToRos2:
         self._goals[name] = self._by_uuid[goal.uuid] = goal
         return goal
 
-    def _send_if_possible(self, goal: Goal) -> None:
+    def _send_if_possible(self, goal: Goal, now_s: float) -> None:
         if self._server.present():
-            goal.sent = True
+            goal.sent_s = now_s
+            goal.asked = False
             self._server.send_goal(goal.uuid, goal.payload)
-            goal.payload = b""
 
     def on_cancel(self, request: GoalId, now_s: float) -> None:
         """Cancel one goal, those stamped at or before a time, or all: the rules of actionlib's server."""
@@ -149,7 +158,7 @@ class GoalsToRos2:
 
     def _cancel(self, goal: Goal, now_s: float) -> None:
         goal.cancel_asked = True
-        if not goal.sent:
+        if goal.sent_s is None:
             self._end(goal, Ros1Status.RECALLED, None, "cancelled before a server was there", now_s)
         elif goal.accepted:
             self._server.send_cancel(goal.uuid)
@@ -161,21 +170,29 @@ class GoalsToRos2:
             if goal is None or not goal.open:
                 if accepted:
                     self._server.send_cancel(goal_uuid)
-            elif not accepted:
-                self._end(goal, Ros1Status.REJECTED, None, reason, now_s)
-            else:
-                goal.accepted = True
+            elif accepted:
                 goal.stamp_ns = goal.stamp_ns or stamp_ns
-                self._server.ask_result(goal.uuid)
-                if goal.cancel_asked:
-                    self._server.send_cancel(goal.uuid)
+                self._accept(goal)
+            elif not goal.accepted:
+                self._end(goal, Ros1Status.REJECTED, None, reason, now_s)
+
+    def _accept(self, goal: Goal) -> None:
+        if goal.accepted:
+            return
+        goal.accepted, goal.payload = True, b""
+        self._server.ask_result(goal.uuid)
+        if goal.cancel_asked:
+            self._server.send_cancel(goal.uuid)
 
     def on_status(self, statuses: Iterable[tuple[bytes, Ros2Status]]) -> None:
         """Take the server's states; how a goal ends is for its result to say."""
         with self.lock:
             for goal_uuid, status in statuses:
                 goal = self._by_uuid.get(goal_uuid)
-                if goal is not None and goal.open and status in (Ros2Status.EXECUTING, Ros2Status.CANCELING):
+                if goal is None or not goal.open:
+                    continue
+                self._accept(goal)  # if the answer was lost
+                if status in (Ros2Status.EXECUTING, Ros2Status.CANCELING):
                     self._move(goal, TO_ROS1[status])
 
     def knows(self, goal_uuid: bytes) -> bool:
@@ -192,10 +209,13 @@ class GoalsToRos2:
                 self._clients.publish_feedback(goal.goal_status, payload)
 
     def on_result(self, goal_uuid: bytes, status: Ros2Status, payload: bytes | None, reason: str, now_s: float) -> None:
-        """End a goal with what the server says; UNKNOWN comes from a server that never saw the goal: a restarted one."""
+        """End a goal with what the server says; UNKNOWN comes from a server that has not seen the goal."""
         with self.lock:
             goal = self._by_uuid.get(goal_uuid)
             if goal is None or not goal.open:
+                return
+            if status is Ros2Status.UNKNOWN and not goal.accepted:
+                self._send_if_possible(goal, now_s)
                 return
             final = TO_ROS1[status]
             if status is Ros2Status.UNKNOWN:
@@ -205,22 +225,26 @@ class GoalsToRos2:
     def tick(self, now_s: float) -> None:
         """Do what time brings: send to a server that came, give up on one that went, publish the list, forget the ended."""
         with self.lock:
-            present = self._server.present()
+            present, come = self._server.present(), self._server.has_come()
             for goal in list(self._goals.values()):
                 if goal.open:
-                    self._tick_open(goal, now_s, present=present)
+                    self._tick_open(goal, now_s, present=present, come=come)
             self._forget(now_s)
             if now_s >= self._next_status_s:
                 self._publish_status()
                 self._next_status_s = now_s + STATUS_PERIOD_S
 
-    def _tick_open(self, goal: Goal, now_s: float, *, present: bool) -> None:
-        if goal.sent and not present:
+    def _tick_open(self, goal: Goal, now_s: float, *, present: bool, come: bool) -> None:
+        if goal.sent_s is not None and not present:
             self._give_up(goal, "the server in ROS 2 is gone", now_s)
         elif not goal.accepted and now_s > goal.answer_by_s:
-            self._give_up(goal, "the server in ROS 2 has not answered in time" if goal.sent else "no server in ROS 2", now_s)
-        elif not goal.sent:
-            self._send_if_possible(goal)
+            reason = "no server in ROS 2" if goal.sent_s is None else "the server in ROS 2 has not answered in time"
+            self._give_up(goal, reason, now_s)
+        elif goal.sent_s is None:
+            self._send_if_possible(goal, now_s)
+        elif come or (not goal.accepted and not goal.asked and now_s - goal.sent_s > ASK_AFTER_S):
+            goal.asked = True
+            self._server.ask_result(goal.uuid)
 
     def _forget(self, now_s: float) -> None:
         ended = [goal for goal in self._goals.values() if goal.ended_s is not None]
