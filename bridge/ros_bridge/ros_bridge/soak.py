@@ -30,6 +30,7 @@ from ros_bridge.fuzz import memory_mb
 PERIOD_S = 0.01
 START_WITHIN_S = 30.0
 STRAGGLERS_S = 5.0
+BACK_WITHIN_S = 4.0  # a new master has started within 2 s, and the bridge has registered with it within 2 s more
 RESTART_EVERY_S = 20.0
 WARM_UP_S = 60.0
 GROWTH_LIMIT_MB = 10.0
@@ -48,13 +49,13 @@ class Steady:
     received: int = 0
     lost: int = 0
     disorder: int = 0
-    _last: int = field(default=-1, repr=False)
+    last: int = -1
 
     def take(self, number: int) -> None:
         """Count an arrival; a gap in the numbers is a loss."""
         self.received += 1
-        self.disorder += number <= self._last
-        self._last = max(self._last, number)
+        self.disorder += number <= self.last
+        self.last = max(self.last, number)
 
 
 @dataclass
@@ -165,9 +166,11 @@ class Ends:
         self._figures, self._dice, self._rospy, self._string = figures, dice, rospy, String
         self._class = raw.message_class(types.message("std_msgs/String"))
         self._node = rclpy.create_node("ros_bridge_soak")
-        self._service_class = raw.service_class(types.service("std_srvs/SetBool"))
+        service = types.service("std_srvs/SetBool")
+        self._service_class = raw.service_class(service)
+        self._request = raw.message_class(service.request)(b"\x01")
         self._node.create_subscription(String, UP, lambda message: figures.up.take(int(message.data)) if message.data else None, 1000)
-        self._node.create_service(SetBool, SERVICE, lambda request, response: (setattr(response, "success", request.data), response)[1])
+        self._node.create_service(SetBool, SERVICE, lambda request, _: SetBool.Response(success=request.data))
         self._down = self._node.create_publisher(String, DOWN, 1000)
         rospy.Subscriber(DOWN, self._class, lambda message: self._take_down(bytes(message.data)[4:]))
         self._up = rospy.Publisher(UP, self._class, queue_size=1000)
@@ -192,13 +195,10 @@ class Ends:
 
     def call(self) -> None:
         """Call the service of ROS 2 as a ROS 1 client, over a connection of its own."""
-        proxy = self._rospy.ServiceProxy(SERVICE, self._service_class)
-        request = self._service_class._request_class(b"\x01")
         try:
-            answer = proxy(request)
+            self._rospy.wait_for_service(SERVICE, BACK_WITHIN_S)
+            answer = self._rospy.ServiceProxy(SERVICE, self._service_class)(self._request)
         except (self._rospy.ServiceException, self._rospy.ROSException, OSError) as error:
-            if "unable to contact master" in str(error):
-                return  # a lookup while the master is away: no call of the bridge
             self._figures.calls_failed += 1
             logging.getLogger("ros_bridge").error("a call failed: %s", error)
         else:
@@ -219,11 +219,11 @@ class Ends:
     def _ros1_publisher(self, number: int) -> Callable[[], None]:
         end: Any = self._rospy.Publisher(f"/soak/up{number}", self._class, queue_size=10, latch=True)
         end.publish(self._class(b"\x01\0\0\0a"))
-        return lambda: end.unregister()
+        return end.unregister  # type: ignore[no-any-return]
 
     def _ros1_subscriber(self, number: int) -> Callable[[], None]:
         end: Any = self._rospy.Subscriber(f"/soak/down{number}", self._class, lambda _: None)
-        return lambda: end.unregister()
+        return end.unregister  # type: ignore[no-any-return]
 
     def _ros2_publisher(self, number: int) -> Callable[[], None]:
         end: Any = self._node.create_publisher(self._string, f"/soak/down{number}", 10)
