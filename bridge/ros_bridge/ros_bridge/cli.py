@@ -1,4 +1,4 @@
-"""The command: ``ros_bridge --config FILE [--stats FILE]``, alone or started by roslaunch."""
+"""The command: ``ros_bridge --config FILE``, ``--all`` and their like, alone or started by roslaunch."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ros_bridge import two_worlds
 from ros_bridge.config_file import NAME, load_config
-from ros_bridge.errors import BridgeError, ConfigError
+from ros_bridge.errors import BridgeError, ConfigError, NoMasterError
 from ros_bridge.selection import Selection
 
 logger = logging.getLogger("ros_bridge")
@@ -72,7 +72,7 @@ def set_up_ros1_environment() -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the bridge until SIGINT or SIGTERM; return 0, or 1 if a type or a world is missing, or 2 if the configuration is wrong."""
+    """Run the bridge until SIGINT or SIGTERM; return 0, 1 when a type or world is missing, 2 for bad options or no master."""
     set_up_logging()
     options = parse_arguments(arguments)
     stop = threading.Event()
@@ -85,9 +85,15 @@ def main(arguments: Sequence[str]) -> int:
         return EXIT_CONFIG
     try:
         two_worlds.import_ros1()
-        from ros_bridge.session import run_session
+        from ros_bridge.session import list_session, run_session
 
-        run_session(config, options.stats, stop, set_up_ros1_environment())
+        if options.list:
+            sys.stdout.write(list_session(config, set_up_ros1_environment()))
+        else:
+            run_session(config, options.stats, stop, set_up_ros1_environment(), wait=bool(options.config))
+    except NoMasterError as error:
+        logger.error("%s", error)
+        return EXIT_CONFIG
     except BridgeError as error:
         logger.error("%s", error)
         return EXIT_FAILED

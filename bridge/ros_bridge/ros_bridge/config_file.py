@@ -114,6 +114,7 @@ DISCOVER_KEYS: Mapping[str, Reader] = {
     "namespace1": _name,
     "namespace2": _name,
     "rename": _mapping(_name, _name),
+    "parameters": _flag,
 }
 SECTIONS: Mapping[str, Mapping[str, Reader]] = {"topics": TOPIC_KEYS, "services": SERVICE_KEYS, "actions": SERVICE_KEYS}
 
@@ -156,6 +157,7 @@ def merge_selections(selections: Iterable[Selection]) -> Selection:
         include=tuple(pattern for selection in selections for pattern in selection.include),
         exclude=tuple(pattern for selection in selections for pattern in selection.exclude),
         renames=tuple(pair for selection in selections for pair in selection.renames),
+        parameters=all(selection.parameters for selection in selections),
         **namespaces,
     )
 

@@ -70,10 +70,9 @@ class FastTopic:
             return 0 if self._route is None else int(self._native.route_target_peers(self._route))
 
     def source_peers(self) -> int:
-        """Return how many publishers are connected to the end that messages come from."""
-        if self._upward:
-            return self._plane.connections(self._spec.ros1_name)
-        return int(self._node.count_publishers(self._spec.ros2_name))
+        """Return how many publishers the end has that messages come from; 0 before ``start``."""
+        with self._lock:
+            return 0 if self._route is None else int(self._native.route_source_peers(self._route))
 
     def latching_peers(self) -> int:
         """Return how many connected ROS 1 publishers latch."""
@@ -104,7 +103,7 @@ class FastTopic:
         if self._route is None:
             return
         if self._upward:
-            self._plane.unsubscribe(self._spec.ros1_name)
+            self._plane.unsubscribe(self._route)
         else:
             self._plane.node.unpublish(self._spec.ros1_name)
         self._counters()

@@ -86,6 +86,7 @@ KEEPING_THE_LOCK = {
     "plane_down_start": (c_int32, [c_void_p]),
     "plane_route_delete": (None, [c_void_p]),
     "plane_route_target_peers": (c_uint64, [c_void_p]),
+    "plane_route_source_peers": (c_uint64, [c_void_p]),
     "plane_route_figures": (None, [c_void_p, POINTER(RouteFigures)]),
     "plane_port": (c_int32, [c_void_p]),
 }

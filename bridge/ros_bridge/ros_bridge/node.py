@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import logging
 import os
+import shutil
+import sys
 import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ros_bridge import actions, services, topics
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
+from ros_bridge.diagnostics import Diagnostics
 from ros_bridge.discovery import Discovery, GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.heartbeat import Heartbeat
 from ros_bridge.master import Master, MasterWatch
+from ros_bridge.parameters import ParameterMirror
 from ros_bridge.plane import open_plane
 from ros_bridge.routes import Context, Maker, RouteTable
+from ros_bridge.rows import SECTION_OF, Rates, live_table, render, summary
 from ros_bridge.stats import write_json
 
 import rclpy  # isort: skip
@@ -26,12 +31,13 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  #
 from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager  # isort: skip
 
 if TYPE_CHECKING:
-    from ros_bridge.config import BridgeConfig
+    from ros_bridge.config import BridgeConfig, Spec
 
 logger = logging.getLogger("ros_bridge")
 
-STATS_EVERY_S = 2.0
-SECTION_OF: dict[type, str] = {TopicRoute: "topics", ServiceRoute: "services", ActionRoute: "actions"}
+LOOK_EVERY_S = 1.0  # diagnostics and the live view
+LOOKS_A_STATS_FILE = 2
+CLEAR_SCREEN = "\x1b[H\x1b[J"
 SPIN_END_S = 1.0
 
 
@@ -54,18 +60,25 @@ class Bridge:
 
     def __init__(self, config: BridgeConfig, types: Types, master: Master) -> None:
         """Start both nodes' ends of the heartbeat; no route yet."""
+        self._rates = Rates()
+        self._rates_hz: dict[Spec, float] = {}
         self._config = config
         self._node = rclpy.create_node("ros_bridge")
         caller_id = rospy.get_caller_id()
         self._plane = open_plane(caller_id, master.uri, lambda: {rospy.get_node_uri()})
         self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, caller_id, self._plane))
         self._discovery: Discovery | None = None
+        self._parameters: ParameterMirror | None = None
         if config.selection.include:
             reader = GraphReader(self._node, types, master.uri, caller_id)
+            self._parameters = ParameterMirror(master.uri, caller_id) if config.selection.parameters else None
             self._discovery = Discovery(reader, self._node, config.selection, self.table, config.routes)
         self._heartbeat = Heartbeat(self._node, types, self._state)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
+        if self._parameters is not None:
+            self._executor.add_node(self._parameters.node)
+        self._diagnostics = Diagnostics(self._node, types)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
         self._watch = MasterWatch(master, caller_id, self._register_again, self._heartbeat.changed)
 
@@ -101,24 +114,32 @@ class Bridge:
         logger.info("bridging %s%s", counts, " and what discovery finds" if self._discovery is not None else "")
         if self._discovery is not None:
             self._discovery.start()
-        while not stop.wait(STATS_EVERY_S):
-            if stats_file is not None:
+        if self._parameters is not None:
+            self._parameters.start()
+        looks = 0
+        while not stop.wait(LOOK_EVERY_S):
+            looks += 1
+            self._tell()
+            if stats_file is not None and looks % LOOKS_A_STATS_FILE == 0:
                 self._write(stats_file)
         self._heartbeat.close(SPIN_END_S / 2)
         if stats_file is not None:
             self._write(stats_file)
 
-    def _summary(self) -> dict[str, dict[str, dict[str, object]]]:
-        """Return ``{"topics": {name: figures}, "services": ..., "actions": ...}``."""
-        summary: dict[str, dict[str, dict[str, object]]] = {section: {} for section in SECTION_OF.values()}
-        for spec, figures in self.table.figures().items():
-            row = dataclasses.asdict(figures) | {"dropped": sum(figures.dropped.values()), "dropped_why": dict(figures.dropped)}
-            summary[SECTION_OF[type(spec)]][spec.ros1_name] = row
-        return summary
+    def _tell(self) -> None:
+        """Publish the diagnostics, and draw the live view where somebody looks."""
+        figures = self.table.figures()
+        self._rates_hz = self._rates.update(figures, time.monotonic())
+        decisions = self._discovery.decisions if self._discovery is not None else []
+        self._diagnostics.publish(figures, self._rates_hz, self.table.failed, decisions)
+        if sys.stdout.isatty():
+            rows = live_table(figures, self._rates_hz)[: shutil.get_terminal_size().lines - 2]
+            sys.stdout.write(CLEAR_SCREEN + render(rows))
+            sys.stdout.flush()
 
     def _write(self, stats_file: Path) -> None:
         try:
-            write_json(stats_file, self._summary())
+            write_json(stats_file, summary(self.table.figures(), self._rates_hz))
         except OSError as error:
             logger.warning("the figures can't be written to %s: %s", stats_file, error)
 
@@ -137,6 +158,8 @@ class Bridge:
         self._watch.close()
         if self._discovery is not None:
             self._discovery.close()
+        if self._parameters is not None:
+            self._parameters.close()
         self.table.close()
         if self._plane is not None:
             self._plane.close()

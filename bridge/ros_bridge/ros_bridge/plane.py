@@ -12,6 +12,7 @@ import logging
 import socket
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -30,6 +31,7 @@ NODE_SUFFIX = "_topics"
 ASKING_THREADS = 4
 LISTEN_MS = 1000
 RETRY_MS = 100
+TOLD_ONCE = 100
 FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 1.0, 5.0
 
 
@@ -37,6 +39,7 @@ FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 1.0, 5.0
 class _Link:
     """A connection to a publisher, made or wanted."""
 
+    route: int
     topic: str
     uri: str
     token: int
@@ -49,7 +52,7 @@ class _Link:
 
 @dataclass
 class _Subscription:
-    route: int  # the native route's address
+    topic: str
     publishers: set[str] = field(default_factory=set)
     links: dict[str, _Link] = field(default_factory=dict)
 
@@ -63,9 +66,10 @@ class Plane:
         self._own_uris = own_uris
         self._tokens = itertools.count(1)
         self._lock = threading.RLock()
-        self._subscriptions: dict[str, _Subscription] = {}
+        self._subscriptions: dict[int, _Subscription] = {}  # by the native route's address
         self._links: dict[int, _Link] = {}
         self._names: dict[int, str] = {}
+        self._told: deque[str] = deque(maxlen=TOLD_ONCE)
         self._closed = threading.Event()
         bind_address = rosgraph.network.get_bind_address()
         self.machinery = library.require(library.new((caller_id + NODE_SUFFIX).encode(), (bind_address or "0.0.0.0").encode()))  # noqa: S104
@@ -91,22 +95,20 @@ class Plane:
     def subscribe(self, topic: str, type_name: str, route: int) -> None:
         """Connect a native route to all publishers of a ROS 1 topic, now and later."""
         with self._lock:
-            self._subscriptions[topic] = _Subscription(route)
+            self._subscriptions[route] = _Subscription(topic)
         self.node.subscribe(topic, type_name)
 
-    def unsubscribe(self, topic: str) -> None:
+    def unsubscribe(self, route: int) -> None:
         """Connect no more; when it returns nobody uses the native route."""
-        self.node.unsubscribe(topic)
         with self._lock:
-            subscription = self._subscriptions.pop(topic, None)
-            for link in subscription.links.values() if subscription else ():
+            subscription = self._subscriptions.pop(route, None)
+            if subscription is None:
+                return
+            for link in subscription.links.values():
                 self._links.pop(link.token, None)
-
-    def connections(self, topic: str) -> int:
-        """Return how many publishers of a subscribed topic are connected."""
-        with self._lock:
-            subscription = self._subscriptions.get(topic)
-            return sum(link.connected for link in subscription.links.values()) if subscription is not None else 0
+            others = any(other.topic == subscription.topic for other in self._subscriptions.values())
+        if not others:
+            self.node.unsubscribe(subscription.topic)
 
     def register_again(self) -> None:
         """Tell a master that has forgotten us everything."""
@@ -122,16 +124,20 @@ class Plane:
             self.native.delete(self.machinery)
 
     def _publishers_changed(self, topic: str, uris: list[str]) -> None:
+        publishers = set(uris) - self._own_uris() - {self.node.uri}
         with self._lock:
-            subscription = self._subscriptions.get(topic)
-            if subscription is None:
-                return
-            subscription.publishers = set(uris) - self._own_uris() - {self.node.uri}
-            for uri in subscription.publishers - subscription.links.keys():
-                link = _Link(topic, uri, next(self._tokens))
-                subscription.links[uri] = link
-                self._links[link.token] = link
-                self._try(link)
+            for route, subscription in self._subscriptions.items():
+                if subscription.topic == topic:
+                    self._connect_all(route, subscription, publishers)
+
+    def _connect_all(self, route: int, subscription: _Subscription, publishers: set[str]) -> None:
+        """Connect to those that are new. The others' connections end when they close them: a restarted master does not know all at once."""
+        subscription.publishers = publishers
+        for uri in publishers - subscription.links.keys():
+            link = _Link(route, subscription.topic, uri, next(self._tokens))
+            subscription.links[uri] = link
+            self._links[link.token] = link
+            self._try(link)
 
     def _try(self, link: _Link) -> None:
         """Ask the publisher where to connect to, in another thread."""
@@ -143,19 +149,19 @@ class Plane:
         try:
             host, port = self.node.place_of(link.topic, link.uri)
             address = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
-        except OSError as error:
+        except (OSError, ValueError, TypeError, LookupError) as error:  # it does not answer, or answers nonsense
             self._failed(link, str(error), refused=False)
             return
         with self._lock:
-            subscription = self._subscriptions.get(link.topic)
-            if subscription is not None and subscription.links.get(link.uri) is link:
-                self.native.up_connect(subscription.route, link.token, address.encode(), port)
+            wanted = link.route in self._subscriptions and link.token in self._links
+            if wanted and not self.native.up_connect(link.route, link.token, address.encode(), port):
+                self._failed(link, self.native.error().decode(errors="replace"), refused=False)
 
     def _failed(self, link: _Link, reason: str, *, refused: bool) -> None:
         """Try again later, unless the publisher is gone by the master's word."""
         with self._lock:
-            subscription = self._subscriptions.get(link.topic)
-            if subscription is None or subscription.links.get(link.uri) is not link:
+            subscription = self._subscriptions.get(link.route)
+            if subscription is None or link.token not in self._links:
                 return
             if refused and link.complaint != reason:
                 link.complaint = reason
@@ -186,7 +192,8 @@ class Plane:
                     self._try(link)
 
     def _hear(self, kind: EventKind, token: int, text: str) -> None:
-        if kind is EventKind.BAD_PEER:
+        if kind is EventKind.BAD_PEER and text not in self._told:
+            self._told.append(text)
             logger.warning("a ROS 1 subscriber was turned away: %s", text)
         if kind is EventKind.BAD_MESSAGE:
             logger.error("%s: %s can't be converted", self._names.get(token, "?"), text)
@@ -197,7 +204,7 @@ class Plane:
             if kind is EventKind.CONNECTED:
                 link.connected, link.under_way, link.failures, link.complaint = True, False, 0, ""
             elif kind is EventKind.NEEDS_WRITER:
-                self.native.up_grant(self._subscriptions[link.topic].route, token)
+                self.native.up_grant(link.route, token)
             elif kind in {EventKind.CLOSED, EventKind.REFUSED}:
                 self._failed(link, text, refused=kind is EventKind.REFUSED)
 

@@ -36,7 +36,7 @@ class Selection:
     """Patterns (``*`` and ``?`` match slashes, too; either world's name may match) and renaming.
 
     ``namespace2``: where ROS 1's names lie in ROS 2; ``namespace1``: where ROS 2's lie in ROS 1. ``renames`` are pairs of a ROS 1 and a
-    ROS 2 name, each for the name itself and all names below it.
+    ROS 2 name, each for the name itself and all names below it. ``parameters``: whether ROS 1's are shown in ROS 2, too.
     """
 
     include: tuple[str, ...] = ()
@@ -44,6 +44,7 @@ class Selection:
     namespace1: str = ""
     namespace2: str = ""
     renames: tuple[tuple[str, str], ...] = ()
+    parameters: bool = True
 
     def selects(self, ros1_name: str, ros2_name: str) -> bool:
         """Tell whether a pair of names is to be bridged."""

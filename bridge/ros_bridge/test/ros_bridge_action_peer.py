@@ -1,4 +1,4 @@
-"""A ROS 1 node with real actionlib servers and clients for the bridge's tests: commands and events as JSON lines."""
+"""A ROS 1 node for the tests of bridged actions, in a process of its own: takes commands as JSON lines, reports events as JSON lines."""
 
 import json
 import os

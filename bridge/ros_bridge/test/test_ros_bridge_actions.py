@@ -1,7 +1,5 @@
 """Actions through the bridge as a process: real actionlib servers and clients in rospy, real action servers and clients in rclpy."""
 
-import os
-import signal
 import threading
 import time
 import uuid

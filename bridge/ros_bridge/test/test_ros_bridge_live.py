@@ -447,8 +447,9 @@ def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, r
         process.process.send_signal(number)
         assert process.process.wait(5.0) == 0
         assert time.monotonic() - start < 2.0
+        about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
         figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
-        assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": figures}, "services": {}, "actions": {}}
+        assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}
 
 
 def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):

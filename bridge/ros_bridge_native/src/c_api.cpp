@@ -143,6 +143,8 @@ PLANE_API void plane_route_delete(void * route) { delete static_cast<Route *>(ro
 
 PLANE_API uint64_t plane_route_target_peers(void * route) { return static_cast<Route *>(route)->target_peers(); }
 
+PLANE_API uint64_t plane_route_source_peers(void * route) { return static_cast<Route *>(route)->source_peers(); }
+
 PLANE_API void plane_route_figures(void * route, PlaneFigures * out) {
   const Counters & counters = static_cast<Route *>(route)->counters;
   out->count = counters.count;

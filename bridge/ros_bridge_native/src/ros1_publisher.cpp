@@ -16,7 +16,6 @@
 namespace plane {
 namespace {
 
-constexpr int64_t kHandshakeNs = 5'000'000'000;
 constexpr int kFramesAtOnce = 64;
 constexpr size_t kMostSenders = 256;  // of latched messages that are kept
 

@@ -15,7 +15,6 @@
 namespace plane {
 namespace {
 
-constexpr int64_t kHandshakeNs = 5'000'000'000;
 constexpr size_t kReadBytes = kLargeBytes + sizeof(uint32_t);
 
 uint32_t length_at(const uint8_t * data) {

@@ -79,6 +79,12 @@ Ros2Subscription::~Ros2Subscription() {
   if (rcl_subscription_fini(&subscription_, node_) != RCL_RET_OK) rcl_reset_error();
 }
 
+size_t Ros2Subscription::peers() const {
+  size_t number = 0;
+  if (rcl_subscription_get_publisher_count(&subscription_, &number) != RCL_RET_OK) rcl_reset_error();
+  return number;
+}
+
 void Ros2Subscription::take(Incoming & incoming, Sender & sender) {
   rmw_message_info_t info = rmw_get_zero_initialized_message_info();
   const rcl_ret_t code = rcl_take(&subscription_, &incoming, &info, nullptr);

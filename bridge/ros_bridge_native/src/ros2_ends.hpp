@@ -56,6 +56,7 @@ class Ros2Subscription {
   void stop_listening();
   // Take a message if there is one; incoming.touched tells.
   void take(Incoming & incoming, Sender & sender);
+  size_t peers() const;
 
  private:
   rcl_node_t * node_;

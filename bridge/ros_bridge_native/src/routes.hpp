@@ -43,7 +43,9 @@ struct Specification {
 class Route {
  public:
   virtual ~Route() = default;
+  // How many peers the end has that messages go out of, and the one that they come from.
   virtual size_t target_peers() = 0;
+  virtual size_t source_peers() = 0;
   Counters counters;
 
  protected:
@@ -62,6 +64,7 @@ class UpRoute : public Route, public Inbox, public Job {
   // Give a connection whose on_open asked for it a writer of its own.
   void grant(uint64_t token);
   size_t target_peers() override;
+  size_t source_peers() override { return counters.peers; }
 
  private:
   struct Large {
@@ -104,6 +107,7 @@ class DownRoute : public Route, public Job {
 
   void start();
   size_t target_peers() override { return counters.peers; }
+  size_t source_peers() override { return subscription_ ? subscription_->peers() : 0; }
 
  private:
   void on_arrived();

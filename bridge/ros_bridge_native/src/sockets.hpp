@@ -5,7 +5,12 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <cstdint>
+
 namespace plane {
+
+// A peer that has not said its header after this time is shut out.
+constexpr int64_t kHandshakeNs = 5'000'000'000;
 
 inline void set_options(int fd) {
   const int yes = 1, idle_s = 5, interval_s = 2, probes = 3;
