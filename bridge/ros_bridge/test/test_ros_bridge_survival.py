@@ -27,6 +27,7 @@ topics:
   - {name: /bs/image, direction: ros1_to_ros2, type: sensor_msgs/Image, depth: 5}
 services:
   - {name: /bs/in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 15.0}
+  - {name: /bs/quick, server: ros1, type: std_srvs/SetBool, timeout_s: 15.0}
 """
 IMAGE = {"type": "sensor_msgs/Image", "md5sum": "060021388200f6f0f447d0fcd9c64743", "message_definition": "", "callerid": "/half"}
 IMAGE_BYTES = 4_000_000
@@ -228,3 +229,23 @@ def test_garbage_on_all_sockets_leaves_the_bridge_alive_and_its_memory_flat(worl
     assert figures.thrown > 10
     assert figures.grown_mb < 30.0
     check("after the garbage")
+
+
+def test_slow_calls_run_side_by_side_and_hold_up_no_other_service(world):
+    """Ten calls of 2 s each: a call of another service is answered before any of them, and together they take less than half their sum."""
+    server = Ros1Peer(world.master)
+    server.do("serve", service="/bs/in_ros1", type="std_srvs/SetBool", behaviour="slow", seconds=2.0)
+    server.do("serve", service="/bs/quick", type="std_srvs/SetBool", behaviour="echo")
+    world.ros2.call("/bs/quick", SetBool, SetBool.Request(data=True), within_s=15.0)
+    slow, quick = (world.ros2.node.create_client(SetBool, name) for name in ("/bs/in_ros1", "/bs/quick"))
+    assert slow.wait_for_service(15.0)
+    start = time.monotonic()
+    futures = [slow.call_async(SetBool.Request(data=True)) for _ in range(10)]
+    server.expect("request", service="/bs/in_ros1")
+    assert quick.call(SetBool.Request(data=True), timeout_sec=15.0).success
+    assert not any(future.done() for future in futures)
+    wait_until(lambda: all(future.done() for future in futures), "all slow calls are answered", 20.0)
+    assert all(future.result().success for future in futures)
+    assert time.monotonic() - start < 10.0
+    for client in (slow, quick):
+        world.ros2.node.destroy_client(client)
