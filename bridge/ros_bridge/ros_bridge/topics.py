@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ros_bridge import raw
 from ros_bridge.config import Direction, Reliability, TopicRoute
+from ros_bridge.echoes import ECHOES
 from ros_bridge.errors import TypeUnknownError
 from ros_bridge.fast_topics import FastTopic
 from ros_bridge.stats import RouteStats
@@ -73,6 +74,7 @@ class Ros1ToRos2:
     def __init__(self, route: TopicRoute, pair: TypePair, node: Node) -> None:
         """Offer the topic in ROS 2."""
         self._name = route.ros1_name
+        self._ros2_name = route.ros2_name
         self._depth = route.depth
         self._pair = pair
         self._stats = RouteStats()
@@ -107,8 +109,11 @@ class Ros1ToRos2:
         if message.take() >= self._depth:
             self._stats.dropped("arrived faster than they crossed")
             return
+        if message._connection_header.get("callerid") == rospy.get_caller_id():  # noqa: SLF001 - rospy's attribute
+            return  # what we have published ourselves
         try:
             cdr = self._pair.to_ros2(bytes(message.data))
+            ECHOES.sent(self._ros2_name, cdr)
             self._publisher.publish(cdr)
         except Exception as error:  # noqa: BLE001 - whatever garbage a peer sends must not end the connection's thread
             complain(self._stats, self._name, error)
@@ -140,6 +145,7 @@ class Ros2ToRos1:
 
     def start(self) -> None:
         """Subscribe in ROS 2; messages flow as soon as the node is spun."""
+        ECHOES.listen(self._name)
         self._subscription = self._node.create_subscription(
             interface_class(self._pair.ros2_name, "msg"), self._name, self._forward, qos_profile(self._route), raw=True
         )
@@ -158,6 +164,8 @@ class Ros2ToRos1:
 
     def _forward(self, cdr: bytes, info: Mapping[str, int]) -> None:
         start_ns = time.perf_counter_ns()
+        if ECHOES.returned(self._name, cdr):
+            return
         self._count_missed(info["publication_sequence_number"])
         try:
             self._seq += 1
@@ -187,6 +195,7 @@ class Ros2ToRos1:
         """Stop receiving, then withdraw the topic from ROS 1."""
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
+            ECHOES.forget(self._name)
         self._publisher.unregister()
 
 
