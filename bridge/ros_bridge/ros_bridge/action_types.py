@@ -50,13 +50,12 @@ class ActionType:
 
 
 def action_type(types: Types, ros1_name: str, ros2_name: str, prefixes: Iterable[Path]) -> ActionType:
-    """Return an action type by its names ``package/Name``; the second may be empty when it is the first.
+    """Return an action type by its names ``package/Name``.
 
     Raises:
         TypeUnknownError: There is no ``.action`` file of it below the prefixes.
         TypeDiffersError: The worlds lay a part of it out differently.
     """
-    ros2_name = ros2_name or ros1_name
     texts = split(_action_text(ros2_name, [prefix / "share" for prefix in prefixes]))
     parts = (_part(types, ros1_name, ros2_name, kind, text) for kind, text in zip(ENVELOPES, texts, strict=True))
     return ActionType(ros1_name, *parts)

@@ -97,6 +97,7 @@ class ServerInRos1:
         self._stats = RouteStats()
         self._crossing = Crossing(self._stats)
         self._goals = GoalsToRos1(spec.label, spec.timeout_s)
+        self._started = False
         self._clockwork = Clockwork(spec.ros2_name, self._goals.tick, lambda: self._goals.busy)
 
     def start(self) -> None:
@@ -119,6 +120,7 @@ class ServerInRos1:
                 on_result=self._on_result_request,
             )
             self._goals.connect(self._server, self._clients)
+            self._started = True
         self._clockwork.start()
 
     def _on_goal_request(self, request: Any, header: Header) -> None:
@@ -157,6 +159,8 @@ class ServerInRos1:
 
     def close(self) -> None:
         """End the open goals for their clients, cancel them at the server, and leave."""
+        if not self._started:
+            return
         self._clockwork.close()
         self._goals.give_up_all(SHUTTING_DOWN, time.monotonic())
         self._clients.close()
@@ -172,6 +176,7 @@ class ServerInRos2:
         self._stats = RouteStats()
         self._crossing = Crossing(self._stats)
         self._goals = GoalsToRos2(spec.label, spec.timeout_s)
+        self._started = False
         self._clockwork = Clockwork(spec.ros1_name, self._goals.tick, lambda: self._goals.busy)
 
     def start(self) -> None:
@@ -185,12 +190,13 @@ class ServerInRos2:
                 on_answer=self._on_answer,
                 on_result=self._on_result,
                 on_feedback=self._on_feedback,
-                on_status=self._goals.on_status,
+                on_status=lambda states: self._goals.on_status(states, time.monotonic()),
             )
             self._clients = ActionlibClientsEnd(
                 self._spec.ros1_name, self._type, self._context.types, on_goal=self._on_goal, on_cancel=self._on_cancel, empty_result=empty
             )
             self._goals.connect(self._server, self._clients)
+            self._started = True
         self._clockwork.start()
 
     def _on_goal(self, message: bytes) -> None:
@@ -228,6 +234,8 @@ class ServerInRos2:
 
     def close(self) -> None:
         """End the open goals for their clients, cancel them at the server, and leave."""
+        if not self._started:
+            return
         self._clockwork.close()
         self._goals.give_up_all(SHUTTING_DOWN, time.monotonic())
         self._clients.close()
@@ -239,5 +247,6 @@ KINDS: dict[World, type[ServerInRos1 | ServerInRos2]] = {World.ROS1: ServerInRos
 
 def make(spec: ActionRoute, context: Context) -> Route:
     """Make an action's route; raises BridgeError when its type can't cross."""
-    action = action_type(context.types, spec.type_name, spec.ros2_type, ament_prefixes())
-    return KINDS[spec.server](spec, action, interface_class(spec.ros2_type or spec.type_name, "action"), context)
+    ros2_type = spec.ros2_type or context.types.rules.to_ros2(spec.type_name)
+    action = action_type(context.types, spec.type_name, ros2_type, ament_prefixes())
+    return KINDS[spec.server](spec, action, interface_class(ros2_type, "action"), context)

@@ -75,6 +75,7 @@ class ServiceType:
     """One service type in both worlds."""
 
     ros1_name: str
+    ros2_name: str
     md5sum: str
     request: TypePair
     response: TypePair
@@ -126,7 +127,7 @@ class Types:
                 self._adopt_ros1(ros1_name + suffix, text1)
                 sums.append(ros1_definition.sum_text(self._definitions[ros1_name + suffix], self._md5))
                 halves.append(self._message(ros1_name + suffix, ros2_name + suffix))
-            return ServiceType(ros1_name, ros1_definition.md5("".join(sums)), *halves)
+            return ServiceType(ros1_name, ros2_name, ros1_definition.md5("".join(sums)), *halves)
 
     def learn(self, ros1_name: str, full_text: str) -> None:
         """Take the definition that a ROS 1 publisher sent in its connection's header (``message_definition``), with all its parts.
@@ -153,10 +154,11 @@ class Types:
 
     def defined(self, ros1_name: str, ros2_name: str, text: str) -> TypePair:
         """Return the pair of types whose definition is no file of its own, such as an action's goal; raises as ``message`` does."""
-        self._adopt_ros2(ros2_name, text)
-        if ros1_name not in self._definitions:
-            self._adopt_ros1(ros1_name, text)
-        return self._message(ros1_name, ros2_name)
+        with self._lock:
+            self._adopt_ros2(ros2_name, text)
+            if ros1_name not in self._definitions:
+                self._adopt_ros1(ros1_name, self._told.get(ros1_name) or self._ros1_files.message(ros1_name) or text)
+            return self._message(ros1_name, ros2_name)
 
     def _message(self, ros1_name: str, ros2_name: str) -> TypePair:
         definition = self._definitions[ros1_name]

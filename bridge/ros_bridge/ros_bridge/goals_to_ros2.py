@@ -18,7 +18,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from ros_bridge.action_states import ROS1_TERMINAL, TO_ROS1, Ros1Status, Ros2Status
+from ros_bridge.action_states import ROS1_TERMINAL, ROS2_TERMINAL, TO_ROS1, Ros1Status, Ros2Status
 from ros_bridge.actionlib_wire import GoalId, GoalStatus
 
 logger = logging.getLogger("ros_bridge")
@@ -78,6 +78,7 @@ class Goal:
     text: str = ""
     sent_s: float | None = None
     asked: bool = False
+    ended_in_ros2_s: float | None = None
     accepted: bool = False
     cancel_asked: bool = False
     ended_s: float | None = None
@@ -184,8 +185,8 @@ class GoalsToRos2:
         if goal.cancel_asked:
             self._server.send_cancel(goal.uuid)
 
-    def on_status(self, statuses: Iterable[tuple[bytes, Ros2Status]]) -> None:
-        """Take the server's states; how a goal ends is for its result to say."""
+    def on_status(self, statuses: Iterable[tuple[bytes, Ros2Status]], now_s: float) -> None:
+        """Take the server's states; how a goal ends is for its result to say, which is asked for again when it does not come."""
         with self.lock:
             for goal_uuid, status in statuses:
                 goal = self._by_uuid.get(goal_uuid)
@@ -194,6 +195,8 @@ class GoalsToRos2:
                 self._accept(goal)  # if the answer was lost
                 if status in (Ros2Status.EXECUTING, Ros2Status.CANCELING):
                     self._move(goal, TO_ROS1[status])
+                elif status in ROS2_TERMINAL and goal.ended_in_ros2_s is None:
+                    goal.ended_in_ros2_s = now_s
 
     def knows(self, goal_uuid: bytes) -> bool:
         """Tell whether what the server says is about a goal of ours."""
@@ -242,8 +245,11 @@ class GoalsToRos2:
             self._give_up(goal, reason, now_s)
         elif goal.sent_s is None:
             self._send_if_possible(goal, now_s)
-        elif come or (not goal.accepted and not goal.asked and now_s - goal.sent_s > ASK_AFTER_S):
+        elif come or (not goal.asked and now_s - goal.sent_s > ASK_AFTER_S):
             goal.asked = True
+            self._server.ask_result(goal.uuid)
+        elif goal.ended_in_ros2_s is not None and now_s - goal.ended_in_ros2_s > ASK_AFTER_S:
+            goal.ended_in_ros2_s = now_s
             self._server.ask_result(goal.uuid)
 
     def _forget(self, now_s: float) -> None:

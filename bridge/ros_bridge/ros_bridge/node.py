@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import shutil
@@ -12,12 +11,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_bridge import actions, raw, services, topics
-from ros_bridge.config import ActionRoute, Direction, ServiceRoute, TopicRoute
+from ros_bridge import actions, services, topics
+from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
 from ros_bridge.diagnostics import Diagnostics
 from ros_bridge.discovery import Discovery, GraphReader
 from ros_bridge.errors import BridgeError
+from ros_bridge.heartbeat import Heartbeat
 from ros_bridge.master import Master, MasterWatch
 from ros_bridge.parameters import ParameterMirror
 from ros_bridge.plane import open_plane
@@ -28,21 +28,16 @@ from ros_bridge.stats import write_json
 import rclpy  # isort: skip
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # isort: skip
-from rclpy.serialization import serialize_message  # isort: skip
 from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager  # isort: skip
-from std_msgs.msg import String  # isort: skip
 
 if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig, Spec
 
 logger = logging.getLogger("ros_bridge")
 
-STATE_TOPIC = "/bridge/state"
-STATE_TYPE = "std_msgs/String"
-HEARTBEAT_S = 0.5
-HEARTBEATS_A_LOOK = 2  # diagnostics and the live view, every second
+LOOK_EVERY_S = 1.0  # diagnostics and the live view
+LOOKS_A_STATS_FILE = 2
 CLEAR_SCREEN = "\x1b[H\x1b[J"
-HEARTBEATS_A_STATS_FILE = 4  # every 2 s
 SPIN_END_S = 1.0
 
 
@@ -65,11 +60,9 @@ class Bridge:
 
     def __init__(self, config: BridgeConfig, types: Types, master: Master) -> None:
         """Start both nodes' ends of the heartbeat; no route yet."""
-        self._sequence = 0
         self._rates = Rates()
         self._rates_hz: dict[Spec, float] = {}
         self._config = config
-        state_type = types.message(STATE_TYPE)
         self._node = rclpy.create_node("ros_bridge")
         caller_id = rospy.get_caller_id()
         self._plane = open_plane(caller_id, master.uri, lambda: {rospy.get_node_uri()})
@@ -80,18 +73,14 @@ class Bridge:
             reader = GraphReader(self._node, types, master.uri, caller_id)
             self._parameters = ParameterMirror(master.uri, caller_id) if config.selection.parameters else None
             self._discovery = Discovery(reader, self._node, config.selection, self.table, config.routes)
-        self._state_type = state_type
-        state_route = TopicRoute(STATE_TOPIC, STATE_TOPIC, Direction.ROS1_TO_ROS2, STATE_TYPE, latched=True, depth=1)
-        self._state_ros2 = self._node.create_publisher(String, STATE_TOPIC, topics.qos_profile(state_route))
-        self._state_class = raw.message_class(state_type)
-        self._state_ros1 = rospy.Publisher(STATE_TOPIC, self._state_class, latch=True, queue_size=1)
+        self._heartbeat = Heartbeat(self._node, types, self._state)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         if self._parameters is not None:
             self._executor.add_node(self._parameters.node)
         self._diagnostics = Diagnostics(self._node, types)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
-        self._watch = MasterWatch(master, caller_id, self._register_again)
+        self._watch = MasterWatch(master, caller_id, self._register_again, self._heartbeat.changed)
 
     def _register_again(self) -> None:
         register_again()
@@ -117,8 +106,9 @@ class Bridge:
             logger.info("ROS 2 was shut down")
 
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
-        """Bridge until asked to stop; heartbeats and figures are this thread's."""
+        """Bridge until asked to stop; figures are this thread's."""
         self._spinner.start()
+        self._heartbeat.start()
         self._open_configured()
         counts = f"{len(self._config.topics)} topics and {len(self._config.services)} services"
         logger.info("bridging %s%s", counts, " and what discovery finds" if self._discovery is not None else "")
@@ -126,14 +116,13 @@ class Bridge:
             self._discovery.start()
         if self._parameters is not None:
             self._parameters.start()
-        while not stop.is_set():
-            self._beat("running")
-            if self._sequence % HEARTBEATS_A_LOOK == 1:
-                self._tell()
-            if stats_file is not None and self._sequence % HEARTBEATS_A_STATS_FILE == 0:
+        looks = 0
+        while not stop.wait(LOOK_EVERY_S):
+            looks += 1
+            self._tell()
+            if stats_file is not None and looks % LOOKS_A_STATS_FILE == 0:
                 self._write(stats_file)
-            stop.wait(HEARTBEAT_S)
-        self._beat("stopping")
+        self._heartbeat.close(SPIN_END_S / 2)
         if stats_file is not None:
             self._write(stats_file)
 
@@ -154,21 +143,15 @@ class Bridge:
         except OSError as error:
             logger.warning("the figures can't be written to %s: %s", stats_file, error)
 
-    def _beat(self, state: str) -> None:
-        """Publish the bridge's state in both worlds."""
-        self._sequence += 1
+    def _state(self) -> dict[str, object]:
+        """Return what a heartbeat says besides its number."""
         routes = self.table.running()
-        text = {
-            "state": state,
-            "sequence": self._sequence,
+        return {
             "pid": os.getpid(),
             "ros1_master": self._watch.reachable,
             **{section: sum(SECTION_OF[type(spec)] == section for spec in routes) for section in SECTION_OF.values()},
             "errors": sum(route.figures().errors for route in routes.values()),
         }
-        cdr = serialize_message(String(data=json.dumps(text)))
-        self._state_ros2.publish(cdr)
-        self._state_ros1.publish(self._state_class(self._state_type.to_ros1(cdr)))
 
     def close(self) -> None:
         """End the routes, first the callers' side, then the executor."""

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("ros_bridge")
 
-CONCURRENT_CALLS = 4  # of one service towards ROS 1, each in a thread
+CONCURRENT_CALLS = 16  # of one service towards ROS 1, each in a thread
 WAITING_CALLS = 32  # of one service; more are refused at once
 FLAGS = ("accepted", "success")
 TEXTS = ("reason", "message")
@@ -51,7 +51,7 @@ class Ros2Server:
         self._node = node
         self._type = service
         self._stats = RouteStats()
-        self._ros2_class = interface_class(route.type_name, "srv")
+        self._ros2_class = interface_class(service.ros2_name, "srv")
         self._closed = threading.Event()
         self._client = node.create_client(self._ros2_class, route.ros2_name)
         self._raw_service = raw.service_class(service)
@@ -117,7 +117,7 @@ class Ros1Server:
         self._node = node
         self._type = service
         self._stats = RouteStats()
-        self._ros2_class = interface_class(route.type_name, "srv")
+        self._ros2_class = interface_class(service.ros2_name, "srv")
         self._link = Ros1Service(route.ros1_name, service.md5sum, master_uri=rosgraph.get_master_uri(), caller_id=rospy.get_caller_id())
         self._threads = ThreadPoolExecutor(CONCURRENT_CALLS, thread_name_prefix=route.ros2_name)
         self._vacancies = threading.Semaphore(CONCURRENT_CALLS + WAITING_CALLS)
@@ -187,4 +187,4 @@ KINDS: dict[World, type[Ros2Server | Ros1Server]] = {World.ROS1: Ros1Server, Wor
 
 def make(spec: ServiceRoute, context: Context) -> Route:
     """Make a service's route; raises BridgeError when its type can't cross."""
-    return KINDS[spec.server](spec, context.types.service(spec.type_name), context.node)
+    return KINDS[spec.server](spec, context.types.service(spec.type_name, spec.ros2_type), context.node)

@@ -289,14 +289,14 @@ def test_publisher_of_another_type_is_refused_and_the_route_lives(ros1, ros2, ma
 
 
 def test_heartbeat_in_both_worlds(ros1, ros2):
-    beats = ros2.subscribe("/bridge/state", String, LATCHED)
-    ros1.do("subscribe", topic="/bridge/state", type="std_msgs/String")
+    beats = ros2.subscribe("/ros_bridge/state", String, LATCHED)
+    ros1.do("subscribe", topic="/ros_bridge/state", type="std_msgs/String")
     wait_until(lambda: len(beats) >= 3, "three heartbeats in ROS 2")
     states = [json.loads(beat.data) for beat in beats[:3]]
     assert [state["sequence"] - states[0]["sequence"] for state in states] == [0, 1, 2]
     assert {state["state"] for state in states} == {"running"}
     assert states[0]["ros1_master"] is True
-    text = bytes.fromhex(ros1.expect("message", topic="/bridge/state")["hex"])[4:]
+    text = bytes.fromhex(ros1.expect("message", topic="/ros_bridge/state")["hex"])[4:]
     assert json.loads(text)["topics"] == 8
 
 
