@@ -42,7 +42,7 @@ step() {
 digest() { cat "$@" 2>/dev/null | sha256sum | cut -c1-16; }
 tree_digest() { # of all files below the given folders that decide what is built
   find -L "$@" -type f \( -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name CMakeLists.txt -o -name package.xml -o -name 'setup.*' \
-    -o -path '*/scripts/*' \) -not -path '*/__pycache__/*' -print0 2>/dev/null | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
+    -o -name '*.cpp' -o -name '*.hpp' -o -path '*/scripts/*' \) -not -path '*/__pycache__/*' -print0 2>/dev/null | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
 }
 
 model_digest() { # of the models and of what generates from them
@@ -115,9 +115,10 @@ make_ros2() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
     unset PYTHONPATH LD_LIBRARY_PATH
     export AMENT_PREFIX_PATH="$ALULA_STATE/venv2" CMAKE_PREFIX_PATH="$ALULA_STATE/venv2"
-    # Only Python uses these packages: C++ support is compiled because rosidl demands it, quickly rather than well.
+    # Only Python uses the interface packages: their C++ support is compiled because rosidl demands it, quickly rather than well. The bridge's
+    # data plane sets flags of its own.
     cd "$ALULA_STATE/ros2" &&
-      colcon --log-base "$ALULA_STATE/ros2/log" build --merge-install --symlink-install --base-paths "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge/ros_bridge" "$ALULA_STATE/generated" \
+      colcon --log-base "$ALULA_STATE/ros2/log" build --merge-install --symlink-install --base-paths "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge/ros_bridge" "$ALULA_ROOT/bridge/ros_bridge_native" "$ALULA_STATE/generated" \
         --build-base "$ALULA_STATE/ros2/build" --install-base "$ALULA_STATE/ros2/install" \
         --event-handlers console_cohesion+ --cmake-args -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=-O0 -DCMAKE_C_FLAGS=-O1 \
         -DPython3_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DPYTHON_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DBUILD_TESTING=OFF )

@@ -1,7 +1,7 @@
-"""Measure the bridge from end to end: ``setup/in_ros2 python -m ros_bridge.bench``, with a ROS master at ROS_MASTER_URI.
+"""Measure the bridge from end to end: ``./alula bench bridge``.
 
-The bridge runs as a process of its own. The ends are this process, rospy in one thread and rclpy in another, so that one steady clock
-stamps both; each message carries its time of sending in its first bytes. The ends share an interpreter: their own cost is in the figures.
+A publisher in one process, the bridge in another, a subscriber in a third: plain rospy and rclpy nodes. The floors, rospy to rospy and
+rclpy to rclpy without a bridge, are measured in the same run. Figures are medians over the repeats.
 """
 
 from __future__ import annotations
@@ -9,203 +9,138 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
-import subprocess
+import random
+import statistics
 import sys
-import tempfile
-import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
-from ros_bridge import raw
-from ros_bridge.cli import set_up_ros1_environment
-from ros_bridge.config import Direction, TopicRoute
-from ros_bridge.conversion import MessageType, Types, ament_prefixes
-from ros_bridge.stats import Durations
-from ros_bridge.topics import interface_class, qos_profile
+from ros_bridge.bench_cases import FLAT_OUT, OFFICIAL, OFFICIAL_IDLE_PERCENT, OFFICIAL_START_S, Case, Official, TopicCase, all_cases
+from ros_bridge.bench_run import Bench, BenchError, open_bench
 
-import rospy  # isort: skip - after ros_bridge.raw, which fetches it
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.serialization import serialize_message
-
-START_WITHIN_S = 20.0
-SETTLE_S = 1.0
-ARRIVE_WITHIN_S = 5.0
-SWITCH_INTERVAL_S = 0.0005
-
-
-@dataclass(frozen=True)
-class Case:
-    """What to send: a type whose field ``data`` is filled to a size, a rate, a number."""
-
-    name: str
-    type_name: str
-    size_bytes: int
-    rate_hz: float
-    number: int
-
-
-CASES = (
-    Case("string_64B", "std_msgs/String", 64, 200.0, 1000),
-    Case("cloud_480kB", "sensor_msgs/PointCloud2", 480_000, 20.0, 100),
-    Case("image_3.7MB", "sensor_msgs/Image", 1280 * 720 * 4, 15.0, 75),
+PACED_S, QUICK_S = 10.0, 2.0
+EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+START = "start and idle"
+Figures = dict[str, float]
+HEADINGS = (
+    "case",
+    "way",
+    "received of sent",
+    "p50 / p95 / p99 ms",
+    "bridge CPU s, peak MB",
+    "official: received",
+    "p50 / p95 ms",
+    "CPU s, peak MB",
 )
 
 
-def topic_name(case: Case, direction: Direction) -> str:
-    """Return the case's topic."""
-    return f"/bench/{case.name.replace('.', '_')}/{direction.value}"
+def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="alula bench bridge", description="Measures the bridge from end to end, with real ends.")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
+    parser.add_argument("--case", action="append", metavar="WORDS", help="only cases whose name begins so, such as image; several times")
+    parser.add_argument("--repeat", type=int, default=3, metavar="N", help="measure each case so often (default 3)")
+    parser.add_argument("--quick", action="store_true", help="2 s a case instead of 10, once: for a first look, not for comparing")
+    return parser.parse_args(arguments)
 
 
-def configuration() -> str:
-    """Return the bridge's configuration for all cases, both ways."""
-    lines = ["topics:"]
-    for case in CASES:
-        lines += [f"  - {{name: {topic_name(case, way)}, direction: {way.value}, type: {case.type_name}, depth: 10}}" for way in Direction]
-    return "\n".join(lines) + "\n"
+def medians(runs: Sequence[Figures]) -> Figures:
+    """Return the median of each figure, and the worst of what was received."""
+    keys = {key for run in runs for key in run}
+    result = {key: float(statistics.median(run[key] for run in runs if key in run)) for key in sorted(keys)}
+    return result | ({"worst_received": min(run["received"] for run in runs)} if "received" in keys else {})
 
 
-def payload(case: Case) -> bytes:
-    """Return a message of the case as CDR whose payload bytes can be found and overwritten by a time stamp."""
-    message = interface_class(case.type_name, "msg")()
-    mark = MARK + b"." * (case.size_bytes - len(MARK))
-    message.data = mark.decode() if isinstance(message.data, str) else mark
-    return bytes(serialize_message(message))
+def received_text(case: Case, figures: Figures) -> str:
+    """Tell how many arrived, a second where the sender had no limit."""
+    if isinstance(case, TopicCase) and case.rate_hz == FLAT_OUT:
+        return f"{figures['rate_hz']:.0f} / s"
+    text = f"{figures['received']:.0f} of {figures['sent']:.0f}"
+    return text if figures["worst_received"] == figures["received"] else f"{text} (worst {figures['worst_received']:.0f})"
 
 
-MARK = b"#time-of-sending"  # 16 bytes: the stamp is written over it as 16 hexadecimal digits, so that it is text, too
+def row(case: Case, figures: Figures) -> tuple[str, ...]:
+    """Return a line of the table."""
+    official = OFFICIAL.get((case.name, case.way), Official())
+    times = " / ".join(f"{figures[key]:.2f}" for key in ("p50_ms", "p95_ms", "p99_ms") if key in figures)
+    cost = f"{figures['bridge_cpu_s']:.2f}, {figures['bridge_peak_mb']:.0f}" if case.way.bridged else ""
+    return (
+        case.name,
+        case.way.value,
+        received_text(case, figures),
+        times,
+        cost,
+        official.received,
+        official.p50_p95_ms,
+        official.cpu_s_peak_mb,
+    )
 
 
-def stamped(template: bytes | memoryview, position: int) -> bytes:
-    """Return the template with the time now written at the mark's position."""
-    message = bytearray(template)
-    message[position : position + 16] = f"{time.monotonic_ns():016x}".encode()
-    return bytes(message)
+def table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as a Markdown table."""
+    lines = [HEADINGS, ["---"] * len(HEADINGS), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-class Meter:
-    """What arrived, and how long it took."""
-
-    def __init__(self, position: int) -> None:
-        self._position = position
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget everything."""
-        self.durations = Durations()
-        self.arrived = 0
-
-    def wait_for(self, enough: Callable[[int], bool], publish: Callable[[], None]) -> None:
-        """Call ``publish`` ten times a second until enough arrived, for at most ``ARRIVE_WITHIN_S``."""
-        end_s = time.monotonic() + ARRIVE_WITHIN_S
-        while not enough(self.arrived) and time.monotonic() < end_s:
-            publish()
-            time.sleep(0.1)
-
-    def take(self, message: bytes) -> None:
-        """Count a message."""
-        now_ns = time.monotonic_ns()
-        sent_ns = int(bytes(message[self._position : self._position + 16]), 16)
-        self.durations.add(now_ns - sent_ns)
-        self.arrived += 1
+def start_text(figures: Figures) -> str:
+    """Tell how long the bridge takes to begin, and what it takes while nothing crosses."""
+    start = f"start to first message {figures['start_s']:.2f} s (official {OFFICIAL_START_S})"
+    return f"{start}, idle {figures['idle_percent']:.1f} % of a core (official {OFFICIAL_IDLE_PERCENT})"
 
 
-def send(case: Case, publish: Callable[[], None]) -> None:
-    """Publish at the case's rate."""
-    start_s = time.monotonic()
-    for index in range(case.number):
-        time.sleep(max(0.0, start_s + index / case.rate_hz - time.monotonic()))
-        publish()
+def measure(bench: Bench, case: Case, repeats: int, progress: str) -> Figures:
+    """Run a case several times, telling how it goes."""
+    runs = []
+    for number in range(repeats):
+        sys.stderr.write(f"{progress} {case.name}, {case.way.value}, run {number + 1} of {repeats}: ")
+        sys.stderr.flush()
+        figures = bench.run(case)
+        sys.stderr.write(f"{figures['received']:.0f} of {figures['sent']:.0f}, p50 {figures.get('p50_ms', float('nan')):.2f} ms\n")
+        runs.append(figures)
+    return medians(runs)
 
 
-def measure(case: Case, direction: Direction, message: MessageType, node: rclpy.node.Node) -> Meter:
-    """Send one case one way and return what arrived."""
-    name = topic_name(case, direction)
-    ros2_class = interface_class(case.type_name, "msg")
-    qos = qos_profile(TopicRoute(name, name, direction, case.type_name))
-    cdr = payload(case)
-    ros1 = bytes(message.to_ros1(cdr))
-    raw_class = raw.message_class(message)
-    if direction is Direction.ROS1_TO_ROS2:
-        meter = Meter(cdr.index(MARK))
-        node.create_subscription(ros2_class, name, meter.take, qos, raw=True)
-        publisher = rospy.Publisher(name, raw_class, queue_size=10, tcp_nodelay=True)
-        template, position = ros1, ros1.index(MARK)
-
-        def publish() -> None:
-            publisher.publish(raw_class(stamped(template, position)))
-
-    else:
-        meter = Meter(ros1.index(MARK))
-        rospy.Subscriber(name, raw_class, lambda received: meter.take(received.data), buff_size=262_144, tcp_nodelay=True)
-        ros2_publisher = node.create_publisher(ros2_class, name, qos)
-        position = cdr.index(MARK)
-
-        def publish() -> None:
-            ros2_publisher.publish(stamped(cdr, position))
-
-    meter.wait_for(lambda arrived: arrived > 0, publish)
-    time.sleep(SETTLE_S)  # the other probes arrive
-    meter.reset()
-    send(case, publish)
-    meter.wait_for(lambda arrived: arrived >= case.number, lambda: None)
-    return meter
+def run(options: argparse.Namespace) -> str:
+    """Measure, write the file, and return the table."""
+    seconds, repeats = (QUICK_S, 1) if options.quick else (PACED_S, options.repeat)
+    wanted = tuple(options.case or ("",))
+    cases = [case for case in all_cases(seconds) if case.name.startswith(wanted)]
+    results: list[tuple[Case, Figures]] = []
+    texts = []
+    with open_bench() as bench:
+        for index, case in enumerate(cases):
+            results.append((case, measure(bench, case, repeats, f"[{index + 1}/{len(cases)}]")))
+        if START.startswith(wanted):
+            start = medians([bench.start_and_idle(seconds) for _ in range(repeats)])
+            texts.append(start_text(start))
+    if options.json is not None:
+        content = [{"case": case.name, "way": case.way.value, **figures} for case, figures in results]
+        content += [{"case": START, **start}] if texts else []
+        options.json.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    return "\n\n".join([table([row(case, figures) for case, figures in results]), *texts]) + "\n"
 
 
-def cpu_s() -> float:
-    """Return the CPU time of ended children, in seconds."""
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
-
-
-def start_bridge(folder: Path) -> subprocess.Popen[str]:
-    """Start the bridge and return when it runs."""
-    (folder / "bench.yaml").write_text(configuration(), encoding="utf-8")
-    command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "bench.yaml"), "--stats", str(folder / "stats.json")]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    if process.stderr is None:
-        raise RuntimeError("no pipe")
-    for line in process.stderr:
-        if "bridging" in line:
-            break
-    return process
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure all cases both ways and write the figures as JSON to standard output."""
-    argparse.ArgumentParser(prog="ros_bridge.bench", description="Measures the bridge; needs a ROS master.").parse_args(arguments)
-    set_up_ros1_environment()
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
-    types = Types(ament_prefixes())
-    rospy.init_node("ros_bridge_bench", anonymous=True, disable_signals=True, disable_rostime=True)
-    rclpy.init(args=[])
-    node = rclpy.create_node("ros_bridge_bench")
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    threading.Thread(target=executor.spin, daemon=True).start()
-    figures: dict[str, object] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        bridge = start_bridge(Path(folder))
-        for case in CASES:
-            for way in Direction:
-                meter = measure(case, way, types.message(case.type_name), node)
-                figures[f"{case.name} {way.value}"] = {
-                    "received": f"{meter.arrived} of {case.number}",
-                    "p50_ms": meter.durations.percentile_ms(0.5),
-                    "p95_ms": meter.durations.percentile_ms(0.95),
-                }
-        peak_kb = int(Path(f"/proc/{bridge.pid}/status").read_text(encoding="utf-8").split("VmHWM:")[1].split()[0])
-        bridge.terminate()
-        bridge.wait(START_WITHIN_S)
-        figures["inside"] = json.loads((Path(folder) / "stats.json").read_text(encoding="utf-8"))["topics"]
-    figures["bridge"] = {"cpu_s": round(cpu_s(), 2), "peak_mb": round(peak_kb / 1024)}
-    sys.stdout.write(json.dumps(figures, indent=1) + "\n")
-    sys.stdout.flush()
-    os._exit(0)  # as in cli.entry
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the benchmark; return the exit code."""
+    options = parse_arguments(arguments)
+    if "ALULA_ROOT" not in os.environ:
+        sys.stderr.write("alula bench bridge: run it by ./alula bench bridge, or by setup/in_ros2 python -m ros_bridge.bench\n")
+        return EXIT_USAGE
+    known = sorted({case.name for case in all_cases(PACED_S)} | {START})
+    unknown = [words for words in options.case or () if not any(name.startswith(words) for name in known)]
+    if unknown or options.repeat < 1:
+        problem = f"no case begins with '{unknown[0]}'; there are: {', '.join(known)}" if unknown else "--repeat has to be 1 or more"
+        sys.stderr.write(f"alula bench bridge: {problem}\n")
+        return EXIT_USAGE
+    os.environ["ROS_DOMAIN_ID"] = str(random.Random(time.monotonic_ns()).randrange(1, 101))  # noqa: S311 - no secret
+    try:
+        sys.stdout.write(run(options))
+    except BenchError as error:
+        sys.stderr.write(f"\nalula bench bridge: {error}\n")
+        return EXIT_FAILED
+    return EXIT_OK
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

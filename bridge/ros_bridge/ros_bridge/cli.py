@@ -1,4 +1,4 @@
-"""The command: ``ros_bridge --config FILE [--stats FILE]``, alone or started by roslaunch."""
+"""The command: ``ros_bridge --config FILE``, ``--all`` and their like, alone or started by roslaunch."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ros_bridge import two_worlds
-from ros_bridge.config import load_config
-from ros_bridge.errors import BridgeError
+from ros_bridge.config_file import NAME, load_config
+from ros_bridge.errors import BridgeError, ConfigError, NoMasterError
+from ros_bridge.selection import Selection
 
 logger = logging.getLogger("ros_bridge")
 
@@ -25,9 +26,32 @@ LOOPBACK = ("http://127.0.0.1", "http://localhost")
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line; what roslaunch adds (``__name:=``, ``__log:=``, remappings) is rospy's business."""
     parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
-    parser.add_argument("--config", type=Path, action="append", required=True, help="what to bridge (YAML); several files are read as one")
-    parser.add_argument("--stats", type=Path, help="write figures of all routes to this JSON file, every 2 s and at the end")
-    return parser.parse_args([argument for argument in arguments if ":=" not in argument])
+    parser.add_argument("--config", type=Path, action="append", default=[], help="what to bridge (YAML); several files are read as one")
+    parser.add_argument("--all", action="store_true", help="bridge every topic, service and action that appears in either world")
+    parser.add_argument(
+        "--include", metavar="PATTERN", action="append", default=[], help="bridge what appears under such a name: '/camera/*'"
+    )
+    parser.add_argument("--exclude", metavar="PATTERN", action="append", default=[], help="but not what has such a name in either world")
+    parser.add_argument("--namespace1", metavar="NAME", default="", help="put ROS 2's names below this one in ROS 1")
+    parser.add_argument("--namespace2", metavar="NAME", default="", help="put ROS 1's names below this one in ROS 2")
+    parser.add_argument("--list", action="store_true", help="show what would be bridged and what can't be, with the reason, and end")
+    parser.add_argument(
+        "--stats", type=Path, metavar="FILE", help="write figures of all routes to this JSON file, every 2 s and at the end"
+    )
+    options = parser.parse_args([argument for argument in arguments if ":=" not in argument])
+    if not (options.config or options.all or options.include or options.list):
+        parser.error("nothing to bridge: give --config FILE, or --all, or --include PATTERN")
+    return options
+
+
+def selection(options: argparse.Namespace) -> Selection:
+    """Return what the command line selects for discovery; raises ConfigError for a namespace that is no name."""
+    for option in ("namespace1", "namespace2"):
+        value = getattr(options, option)
+        if value and not NAME.fullmatch(value):
+            raise ConfigError(f"--{option}: '{value}' is not an absolute ROS name such as /ros1")
+    everything = ("*",) if options.all or (options.list and not options.config and not options.include) else ()
+    return Selection((*options.include, *everything), tuple(options.exclude), options.namespace1, options.namespace2)
 
 
 def set_up_logging() -> None:
@@ -48,22 +72,28 @@ def set_up_ros1_environment() -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the bridge until SIGINT or SIGTERM; return 0, or 1 if a type or a world is missing, or 2 if the configuration is wrong."""
+    """Run the bridge until SIGINT or SIGTERM; return 0, 1 when a type or world is missing, 2 for bad options or no master."""
     set_up_logging()
     options = parse_arguments(arguments)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
-        config = load_config(options.config)
+        config = load_config(options.config, selection(options))
     except BridgeError as error:
         logger.error("%s", error)
         return EXIT_CONFIG
     try:
         two_worlds.import_ros1()
-        from ros_bridge.session import run_session
+        from ros_bridge.session import list_session, run_session
 
-        run_session(config, options.stats, stop, set_up_ros1_environment())
+        if options.list:
+            sys.stdout.write(list_session(config, set_up_ros1_environment()))
+        else:
+            run_session(config, options.stats, stop, set_up_ros1_environment(), wait=bool(options.config))
+    except NoMasterError as error:
+        logger.error("%s", error)
+        return EXIT_CONFIG
     except BridgeError as error:
         logger.error("%s", error)
         return EXIT_FAILED

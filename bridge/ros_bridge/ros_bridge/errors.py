@@ -15,6 +15,10 @@ class WorldError(BridgeError):
     """One of the two ROS worlds can't be imported."""
 
 
+class NoMasterError(BridgeError):
+    """There is no ROS master, and nobody asked to wait for one."""
+
+
 class TypeUnknownError(BridgeError):
     """A message or service type has no definition in one of the worlds, or none that both could have."""
 
@@ -29,3 +33,7 @@ class CallError(BridgeError):
 
 class CallTimeoutError(CallError):
     """The time that the configuration gives a service call is over."""
+
+
+class WireError(BridgeError):
+    """Bytes from a peer are not what its type says."""

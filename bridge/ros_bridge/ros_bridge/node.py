@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
+import shutil
+import sys
 import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_bridge import raw, services, topics
-from ros_bridge.config import Direction, TopicRoute
+from ros_bridge import actions, services, topics
+from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
+from ros_bridge.diagnostics import Diagnostics
+from ros_bridge.discovery import Discovery, GraphReader
+from ros_bridge.errors import BridgeError
+from ros_bridge.heartbeat import Heartbeat
 from ros_bridge.master import Master, MasterWatch
-from ros_bridge.stats import Stats
+from ros_bridge.parameters import ParameterMirror
+from ros_bridge.plane import open_plane
+from ros_bridge.routes import Context, Maker, RouteTable
+from ros_bridge.rows import SECTION_OF, Rates, live_table, render, summary
+from ros_bridge.stats import write_json
 
 import rclpy  # isort: skip
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # isort: skip
-from rclpy.serialization import serialize_message  # isort: skip
 from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager  # isort: skip
-from std_msgs.msg import String  # isort: skip
 
 if TYPE_CHECKING:
-    from ros_bridge.config import BridgeConfig
+    from ros_bridge.config import BridgeConfig, Spec
 
 logger = logging.getLogger("ros_bridge")
 
-STATE_TOPIC = "/bridge/state"
-STATE_TYPE = "std_msgs/String"
-HEARTBEAT_S = 0.5
-HEARTBEATS_A_STATS_FILE = 4  # every 2 s
+LOOK_EVERY_S = 1.0  # diagnostics and the live view
+LOOKS_A_STATS_FILE = 2
+CLEAR_SCREEN = "\x1b[H\x1b[J"
 SPIN_END_S = 1.0
 
 
@@ -45,49 +52,52 @@ def register_again() -> None:
         listeners.notify_added(name, uri, Registration.SRV)
 
 
-def require_types(config: BridgeConfig, types: Types) -> None:
-    """Check that every route's type can cross, before anything is opened.
-
-    Raises:
-        TypeUnknownError: A world does not have a type.
-        TypeDiffersError: The worlds lay a type out differently.
-    """
-    for topic in config.topics:
-        types.message(topic.type_name)
-        topics.interface_class(topic.type_name, "msg")
-    for service in config.services:
-        types.service(service.type_name)
-        topics.interface_class(service.type_name, "srv")
+MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.make, ActionRoute: actions.make}
 
 
 class Bridge:
     """All routes, running. rospy and rclpy have to be initialised, and the types checked."""
 
     def __init__(self, config: BridgeConfig, types: Types, master: Master) -> None:
-        """Open all routes."""
-        self.stats = Stats()
-        self._sequence = 0
-        topic_types = [types.message(route.type_name) for route in config.topics]
-        service_types = [types.service(route.type_name) for route in config.services]
-        state_type = types.message(STATE_TYPE)
+        """Start both nodes' ends of the heartbeat; no route yet."""
+        self._rates = Rates()
+        self._rates_hz: dict[Spec, float] = {}
+        self._config = config
         self._node = rclpy.create_node("ros_bridge")
-        self._topics = [
-            topics.KINDS[route.direction](route, kind, self._node, self.stats.topic(route.ros1_name))
-            for route, kind in zip(config.topics, topic_types, strict=True)
-        ]
-        self._services: list[services.ServiceBridge] = [
-            services.KINDS[route.server](route, kind, self._node, self.stats.service(route.ros1_name))
-            for route, kind in zip(config.services, service_types, strict=True)
-        ]
-        self._state_type = state_type
-        state_route = TopicRoute(STATE_TOPIC, STATE_TOPIC, Direction.ROS1_TO_ROS2, STATE_TYPE, latched=True, depth=1)
-        self._state_ros2 = self._node.create_publisher(String, STATE_TOPIC, topics.qos_profile(state_route))
-        self._state_class = raw.message_class(state_type)
-        self._state_ros1 = rospy.Publisher(STATE_TOPIC, self._state_class, latch=True, queue_size=1)
+        caller_id = rospy.get_caller_id()
+        self._plane = open_plane(caller_id, master.uri, lambda: {rospy.get_node_uri()})
+        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, caller_id, self._plane))
+        self._discovery: Discovery | None = None
+        self._parameters: ParameterMirror | None = None
+        if config.selection.include:
+            reader = GraphReader(self._node, types, master.uri, caller_id)
+            self._parameters = ParameterMirror(master.uri, caller_id) if config.selection.parameters else None
+            self._discovery = Discovery(reader, self._node, config.selection, self.table, config.routes)
+        self._heartbeat = Heartbeat(self._node, types, self._state)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
+        if self._parameters is not None:
+            self._executor.add_node(self._parameters.node)
+        self._diagnostics = Diagnostics(self._node, types)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
-        self._watch = MasterWatch(master, rospy.get_caller_id(), register_again)
+        self._watch = MasterWatch(master, caller_id, self._register_again, self._heartbeat.changed)
+
+    def _register_again(self) -> None:
+        register_again()
+        if self._plane is not None:
+            self._plane.register_again()
+
+    def _open_configured(self) -> None:
+        """Open what the configuration names.
+
+        Raises:
+            BridgeError: Something of it can't cross.
+        """
+        self.table.reconcile(self._config.routes)
+        if self.table.failed:
+            raise BridgeError("\n".join(self.table.failed.values()))
+        for spec in self._config.routes:
+            self.table.start(spec)
 
     def _spin(self) -> None:
         try:
@@ -96,45 +106,63 @@ class Bridge:
             logger.info("ROS 2 was shut down")
 
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
-        """Bridge until asked to stop; heartbeats and figures are this thread's."""
+        """Bridge until asked to stop; figures are this thread's."""
         self._spinner.start()
-        logger.info("bridging %d topics and %d services", len(self._topics), len(self._services))
-        while not stop.is_set():
-            self._beat("running")
-            if stats_file is not None and self._sequence % HEARTBEATS_A_STATS_FILE == 0:
+        self._heartbeat.start()
+        self._open_configured()
+        counts = f"{len(self._config.topics)} topics and {len(self._config.services)} services"
+        logger.info("bridging %s%s", counts, " and what discovery finds" if self._discovery is not None else "")
+        if self._discovery is not None:
+            self._discovery.start()
+        if self._parameters is not None:
+            self._parameters.start()
+        looks = 0
+        while not stop.wait(LOOK_EVERY_S):
+            looks += 1
+            self._tell()
+            if stats_file is not None and looks % LOOKS_A_STATS_FILE == 0:
                 self._write(stats_file)
-            stop.wait(HEARTBEAT_S)
-        self._beat("stopping")
+        self._heartbeat.close(SPIN_END_S / 2)
         if stats_file is not None:
             self._write(stats_file)
 
+    def _tell(self) -> None:
+        """Publish the diagnostics, and draw the live view where somebody looks."""
+        figures = self.table.figures()
+        self._rates_hz = self._rates.update(figures, time.monotonic())
+        decisions = self._discovery.decisions if self._discovery is not None else []
+        self._diagnostics.publish(figures, self._rates_hz, self.table.failed, decisions)
+        if sys.stdout.isatty():
+            rows = live_table(figures, self._rates_hz)[: shutil.get_terminal_size().lines - 2]
+            sys.stdout.write(CLEAR_SCREEN + render(rows))
+            sys.stdout.flush()
+
     def _write(self, stats_file: Path) -> None:
         try:
-            self.stats.write(stats_file)
+            write_json(stats_file, summary(self.table.figures(), self._rates_hz))
         except OSError as error:
             logger.warning("the figures can't be written to %s: %s", stats_file, error)
 
-    def _beat(self, state: str) -> None:
-        """Publish the bridge's state in both worlds."""
-        self._sequence += 1
-        text = {
-            "state": state,
-            "sequence": self._sequence,
+    def _state(self) -> dict[str, object]:
+        """Return what a heartbeat says besides its number."""
+        routes = self.table.running()
+        return {
             "pid": os.getpid(),
             "ros1_master": self._watch.reachable,
-            "topics": len(self._topics),
-            "services": len(self._services),
-            "errors": sum(stats.errors for stats in (*self.stats.topics.values(), *self.stats.services.values())),
+            **{section: sum(SECTION_OF[type(spec)] == section for spec in routes) for section in SECTION_OF.values()},
+            "errors": sum(route.figures().errors for route in routes.values()),
         }
-        cdr = serialize_message(String(data=json.dumps(text)))
-        self._state_ros2.publish(cdr)
-        self._state_ros1.publish(self._state_class(self._state_type.to_ros1(cdr)))
 
     def close(self) -> None:
         """End the routes, first the callers' side, then the executor."""
         self._watch.close()
-        for bridge in (*self._services, *self._topics):
-            bridge.close()
+        if self._discovery is not None:
+            self._discovery.close()
+        if self._parameters is not None:
+            self._parameters.close()
+        self.table.close()
+        if self._plane is not None:
+            self._plane.close()
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)

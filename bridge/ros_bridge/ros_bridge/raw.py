@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any, BinaryIO, ClassVar
+from typing import TYPE_CHECKING, Any, BinaryIO, ClassVar, Protocol
 
 from ros_bridge import two_worlds
 
@@ -12,7 +12,23 @@ two_worlds.import_ros1()
 import genpy  # noqa: E402 - only after rospy is there
 
 if TYPE_CHECKING:
-    from ros_bridge.conversion import MessageType, ServiceType
+    from ros_bridge.conversion import ServiceType
+
+
+class Ros1Type(Protocol):
+    """What rospy compares and passes on of a message type."""
+
+    @property
+    def ros1_name(self) -> str:
+        """``package/Name``."""
+
+    @property
+    def md5sum(self) -> str:
+        """The type's fingerprint."""
+
+    @property
+    def full_text(self) -> str:
+        """The definition, followed by those of its parts."""
 
 
 class RawMessage(genpy.Message):  # type: ignore[misc]  # rospy has no types
@@ -58,17 +74,17 @@ class ArrivingMessage(RawMessage):
         return int(self.waiting.number)
 
 
-def message_class(message: MessageType) -> type[RawMessage]:
+def message_class(message: Ros1Type) -> type[RawMessage]:
     """Return the class for ``rospy.Publisher`` and for services of a type."""
     return type(_class_name(message.ros1_name), (RawMessage,), _message_fields(message))
 
 
-def arriving_class(message: MessageType) -> type[ArrivingMessage]:
+def arriving_class(message: Ros1Type) -> type[ArrivingMessage]:
     """Return the class for one ``rospy.Subscriber`` of a type."""
     return type(_class_name(message.ros1_name), (ArrivingMessage,), _message_fields(message) | {"waiting": threading.local()})
 
 
-def _message_fields(message: MessageType) -> dict[str, object]:
+def _message_fields(message: Ros1Type) -> dict[str, object]:
     return {"__slots__": (), "_type": message.ros1_name, "_md5sum": message.md5sum, "_full_text": message.full_text}
 
 

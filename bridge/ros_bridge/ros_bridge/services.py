@@ -11,14 +11,16 @@ import logging
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from rclpy.serialization import deserialize_message, serialize_message
 
 from ros_bridge import raw
 from ros_bridge.config import ServiceRoute, World
 from ros_bridge.errors import CallError, CallTimeoutError
+from ros_bridge.later import Header, LaterService
 from ros_bridge.ros1_call import POLL_S, Deadline, Ros1Service
+from ros_bridge.stats import RouteStats
 from ros_bridge.topics import interface_class
 
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
@@ -29,32 +31,27 @@ if TYPE_CHECKING:
 
     from ros_bridge.conversion import ServiceType
     from ros_bridge.raw import RawMessage
-    from ros_bridge.stats import RouteStats
+    from ros_bridge.routes import Context, Route
+    from ros_bridge.stats import Figures
 
 logger = logging.getLogger("ros_bridge")
 
-CONCURRENT_CALLS = 4  # of one service towards ROS 1, each in a thread
+CONCURRENT_CALLS = 16  # of one service towards ROS 1, each in a thread
 WAITING_CALLS = 32  # of one service; more are refused at once
 FLAGS = ("accepted", "success")
 TEXTS = ("reason", "message")
 
 
-class ServiceBridge(Protocol):
-    """What the node needs of a bridged service."""
-
-    def close(self) -> None:
-        """End the service and the calls under way."""
-
-
 class Ros2Server:
     """A service whose server lives in ROS 2, offered in ROS 1. rospy gives each caller a thread; it waits here for the answer."""
 
-    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node, stats: RouteStats) -> None:
+    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node) -> None:
         """Offer the service; calls are answered as soon as the node is spun."""
         self._route = route
+        self._node = node
         self._type = service
-        self._stats = stats
-        self._ros2_class = interface_class(route.type_name, "srv")
+        self._stats = RouteStats()
+        self._ros2_class = interface_class(service.ros2_name, "srv")
         self._closed = threading.Event()
         self._client = node.create_client(self._ros2_class, route.ros2_name)
         self._raw_service = raw.service_class(service)
@@ -74,7 +71,7 @@ class Ros2Server:
     def _call(self, ros1_request: bytes) -> memoryview:
         """Call the server in ROS 2 with a serialized request; return the serialized response."""
         deadline = Deadline.after(self._route.timeout_s)
-        request = deserialize_message(self._type.request.to_cdr(ros1_request), self._ros2_class.Request)
+        request = deserialize_message(self._type.request.to_ros2(ros1_request), self._ros2_class.Request)
         self._wait_for_server(deadline)
         answered = threading.Event()
         future = self._client.call_async(request)
@@ -97,55 +94,49 @@ class Ros2Server:
         if not self._client.service_is_ready():
             raise CallError("the server in ROS 2 ended in the call")
 
+    def start(self) -> None:
+        """Do nothing: a call reaches for the server when it comes."""
+
+    def figures(self) -> Figures:
+        """Return what was called."""
+        return self._stats.figures()
+
     def close(self) -> None:
         """Withdraw the service; callers get an error."""
         self._closed.set()
         self._service.shutdown()
-
-
-class _LaterResponse:
-    """Stands for a response that a thread will send."""
-
-    def __init__(self, request: Any) -> None:
-        self.request = request
+        self._node.destroy_client(self._client)
 
 
 class Ros1Server:
     """A service whose server lives in ROS 1, offered in ROS 2. The executor only takes the request; threads wait for the answer."""
 
-    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node, stats: RouteStats) -> None:
+    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node) -> None:
         """Offer the service; calls are taken as soon as the node is spun."""
         self._route = route
+        self._node = node
         self._type = service
-        self._stats = stats
-        self._ros2_class = interface_class(route.type_name, "srv")
+        self._stats = RouteStats()
+        self._ros2_class = interface_class(service.ros2_name, "srv")
         self._link = Ros1Service(route.ros1_name, service.md5sum, master_uri=rosgraph.get_master_uri(), caller_id=rospy.get_caller_id())
         self._threads = ThreadPoolExecutor(CONCURRENT_CALLS, thread_name_prefix=route.ros2_name)
         self._vacancies = threading.Semaphore(CONCURRENT_CALLS + WAITING_CALLS)
-        self._service = node.create_service(self._ros2_class, route.ros2_name, self._take)
-        # rclpy sends what the callback returns at once, and a callback that awaits makes its executor poll without a pause.
-        # So the callback returns a stand-in, and its sending starts the call.
-        self._send = self._service.send_response
-        self._service.send_response = self._send_later
+        self._service = LaterService(node, self._ros2_class, route.ros2_name, self._take)
 
-    @staticmethod
-    def _take(request: Any, _response: Any) -> _LaterResponse:
-        return _LaterResponse(request)
-
-    def _send_later(self, later: _LaterResponse, header: Any) -> None:
+    def _take(self, request: Any, header: Header) -> None:
         deadline = Deadline.after(self._route.timeout_s)
         if self._vacancies.acquire(blocking=False):
-            self._threads.submit(self._answer, later.request, header, deadline)
+            self._threads.submit(self._answer, request, header, deadline)
         else:
             self._refuse(header, CallError(f"the bridge has {CONCURRENT_CALLS + WAITING_CALLS} calls of this service waiting"))
 
-    def _answer(self, request: Any, header: Any, deadline: Deadline) -> None:
+    def _answer(self, request: Any, header: Header, deadline: Deadline) -> None:
         start_ns = time.perf_counter_ns()
         try:
             ros1_request = self._type.request.to_ros1(serialize_message(request))
             ros1_response = self._link.call(ros1_request, deadline)
-            response = deserialize_message(self._type.response.to_cdr(ros1_response), self._ros2_class.Response)
-            self._send(response, header)
+            response = deserialize_message(self._type.response.to_ros2(ros1_response), self._ros2_class.Response)
+            self._service.reply(response, header)
             self._stats.crossed(time.perf_counter_ns() - start_ns)
         except CallError as error:
             self._refuse(header, error)
@@ -154,19 +145,27 @@ class Ros1Server:
         finally:
             self._vacancies.release()
 
-    def _refuse(self, header: Any, error: CallError) -> None:
+    def _refuse(self, header: Header, error: CallError) -> None:
         self._stats.failed()
         reason = f"{self._route.ros2_name} by the bridge: {error}"
         kind = "timed out" if isinstance(error, CallTimeoutError) else "failed"
         logger.warning("call %s: %s", kind, reason)
         response = refusal(self._ros2_class.Response, reason)
         if response is not None:
-            self._send(response, header)
+            self._service.reply(response, header)
+
+    def start(self) -> None:
+        """Do nothing: a call reaches for the server when it comes."""
+
+    def figures(self) -> Figures:
+        """Return what was called."""
+        return self._stats.figures()
 
     def close(self) -> None:
         """End the calls under way; their callers get refusals."""
         self._link.close()
         self._threads.shutdown(wait=False, cancel_futures=True)
+        self._service.close()
 
 
 def refusal(response_class: Any, reason: str) -> Any | None:
@@ -184,3 +183,8 @@ def refusal(response_class: Any, reason: str) -> Any | None:
 
 
 KINDS: dict[World, type[Ros2Server | Ros1Server]] = {World.ROS1: Ros1Server, World.ROS2: Ros2Server}
+
+
+def make(spec: ServiceRoute, context: Context) -> Route:
+    """Make a service's route; raises BridgeError when its type can't cross."""
+    return KINDS[spec.server](spec, context.types.service(spec.type_name, spec.ros2_type), context.node)

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ros_bridge import two_worlds
-from ros_bridge.conversion import Types, ament_prefixes
+from ros_bridge.conversion import Types
+from ros_bridge.definitions import DefinitionFiles, ament_prefixes, ros1_shares
+from ros_bridge.errors import NoMasterError
 from ros_bridge.master import Master
 
 two_worlds.import_ros1()
@@ -19,7 +21,8 @@ import rclpy  # noqa: E402 - ROS 1 goes first
 import rospy  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
-from ros_bridge.node import Bridge, require_types  # noqa: E402
+from ros_bridge.listing import list_routes  # noqa: E402
+from ros_bridge.node import Bridge  # noqa: E402
 
 if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig
@@ -31,15 +34,19 @@ SWITCH_INTERVAL_S = 0.0005  # a thread that copies an image must not keep /clock
 END_WITHIN_S = 1.5
 
 
-def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.Event, master_uri: str) -> None:
-    """Wait for the master, start both nodes, bridge until asked to stop (or shut down by either world), end both nodes.
+def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.Event, master_uri: str, *, wait: bool) -> None:
+    """Start both nodes, bridge until asked to stop (or shut down by either world), end both nodes.
 
     Neither node takes time from ``/clock``: the bridge has to work before it ticks, and is what makes it tick in ROS 2.
+
+    Raises:
+        NoMasterError: There is no master, and ``wait`` does not say to wait for one.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    types = Types(ament_prefixes())
-    require_types(config, types)
+    types = make_types(config)
     master = Master(master_uri, f"/{NODE_NAME}")
+    if not wait:
+        require_master(master)
     if not master.wait(stop):
         return
     rospy.init_node(NODE_NAME, argv=sys.argv, disable_signals=True, disable_rostime=True)
@@ -54,6 +61,27 @@ def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.E
         rospy.signal_shutdown("the bridge ends")
         rclpy.try_shutdown()
     logger.info("ended")
+
+
+def make_types(config: BridgeConfig) -> Types:
+    """Return the types of both worlds, with the configuration's rules."""
+    return Types(ament_prefixes(), config.rules, DefinitionFiles(ros1_shares(), two_worlds.find_ros1_path()))
+
+
+def require_master(master: Master) -> None:
+    """Check that the master answers; raises NoMasterError."""
+    if master.knows(f"/{NODE_NAME}") is None:
+        raise NoMasterError(f"no ROS master answers at {master.uri}: start one (roscore), or set ROS_MASTER_URI to where it is")
+
+
+def list_session(config: BridgeConfig, master_uri: str) -> str:
+    """Return the table of what would be bridged; raises NoMasterError."""
+    require_master(Master(master_uri, f"/{NODE_NAME}"))
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        return list_routes(config, make_types(config), master_uri)
+    finally:
+        rclpy.try_shutdown()
 
 
 def _end_for_sure() -> None:

@@ -6,6 +6,8 @@ import json
 import math
 import os
 import threading
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 # Durations fall into bins that grow by 5 %: any percentile of a run of any length, to 5 %, in constant memory.
@@ -21,6 +23,14 @@ class Durations:
     def __init__(self) -> None:
         self._bins = [0] * BINS
         self.count = 0
+
+    @classmethod
+    def of(cls, bins: Iterable[int]) -> Durations:
+        """Return the histogram that somebody else has counted, in the same bins."""
+        durations = cls()
+        durations._bins = list(bins)
+        durations.count = sum(durations._bins)
+        return durations
 
     def add(self, duration_ns: int) -> None:
         """Count one duration."""
@@ -38,24 +48,50 @@ class Durations:
         return None
 
 
+@dataclass(frozen=True)
+class Figures:
+    """What has crossed a route since it was made. Durations are inside the bridge; None before the first."""
+
+    count: int = 0
+    bytes: int = 0
+    p50_ms: float | None = None
+    p95_ms: float | None = None
+    dropped: Mapping[str, int] = field(default_factory=dict)  # reason: number
+    errors: int = 0
+
+    def after(self, earlier: Figures) -> Figures:
+        """Return the figures of a route that was made anew: counts go on, durations are those of the newer part."""
+        reasons = earlier.dropped.keys() | self.dropped.keys()
+        return Figures(
+            count=earlier.count + self.count,
+            bytes=earlier.bytes + self.bytes,
+            p50_ms=earlier.p50_ms if self.p50_ms is None else self.p50_ms,
+            p95_ms=earlier.p95_ms if self.p95_ms is None else self.p95_ms,
+            dropped={reason: earlier.dropped.get(reason, 0) + self.dropped.get(reason, 0) for reason in sorted(reasons)},
+            errors=earlier.errors + self.errors,
+        )
+
+
 class RouteStats:
-    """The figures of one topic or service; safe to fill from several threads."""
+    """The figures of one route while Python counts them; safe to fill from several threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._durations = Durations()
-        self._dropped = 0
+        self._bytes = 0
+        self._dropped: dict[str, int] = {}
         self.errors = 0
 
-    def crossed(self, duration_ns: int) -> None:
-        """Count a message or call that crossed."""
+    def crossed(self, duration_ns: int, size_bytes: int = 0) -> None:
+        """Count a message or call that crossed, and the bytes that went out."""
         with self._lock:
             self._durations.add(duration_ns)
+            self._bytes += size_bytes
 
-    def dropped(self, number: int = 1) -> None:
-        """Count messages that had to give way to newer ones."""
+    def dropped(self, reason: str, number: int = 1) -> None:
+        """Count messages that did not cross, by the reason."""
         with self._lock:
-            self._dropped += number
+            self._dropped[reason] = self._dropped.get(reason, 0) + number
 
     def failed(self) -> int:
         """Count a message that could not be converted, or a call without an answer; return how many so far."""
@@ -63,42 +99,21 @@ class RouteStats:
             self.errors += 1
             return self.errors
 
-    def summary(self) -> dict[str, float | int | None]:
-        """Return ``count``, ``p50_ms``, ``p95_ms`` (None before the first), ``dropped``, ``errors``."""
+    def figures(self) -> Figures:
+        """Return the figures so far."""
         with self._lock:
-            return {
-                "count": self._durations.count,
-                "p50_ms": self._durations.percentile_ms(0.50),
-                "p95_ms": self._durations.percentile_ms(0.95),
-                "dropped": self._dropped,
-                "errors": self.errors,
-            }
+            return Figures(
+                count=self._durations.count,
+                bytes=self._bytes,
+                p50_ms=self._durations.percentile_ms(0.50),
+                p95_ms=self._durations.percentile_ms(0.95),
+                dropped=dict(self._dropped),
+                errors=self.errors,
+            )
 
 
-class Stats:
-    """The figures of all routes."""
-
-    def __init__(self) -> None:
-        self.topics: dict[str, RouteStats] = {}
-        self.services: dict[str, RouteStats] = {}
-
-    def topic(self, name: str) -> RouteStats:
-        """Return the figures of a topic, made at the first call."""
-        return self.topics.setdefault(name, RouteStats())
-
-    def service(self, name: str) -> RouteStats:
-        """Return the figures of a service, made at the first call."""
-        return self.services.setdefault(name, RouteStats())
-
-    def summary(self) -> dict[str, dict[str, dict[str, float | int | None]]]:
-        """Return ``{"topics": {name: figures}, "services": {name: figures}}``."""
-        return {
-            "topics": {name: stats.summary() for name, stats in self.topics.items()},
-            "services": {name: stats.summary() for name, stats in self.services.items()},
-        }
-
-    def write(self, path: Path) -> None:
-        """Write the summary as JSON, so that a reader sees the old file or the new one, never a part."""
-        aside = path.with_name(f".{path.name}.{os.getpid()}")
-        aside.write_text(json.dumps(self.summary(), indent=1) + "\n", encoding="utf-8")
-        aside.replace(path)
+def write_json(path: Path, content: object) -> None:
+    """Write a JSON file so that a reader sees the old one or the new one, never a part."""
+    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    aside.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    aside.replace(path)

@@ -23,6 +23,11 @@ def alula_root() -> Path:
     return Path(os.environ["ALULA_ROOT"])
 
 
+def bag_folder() -> Path:
+    """Return the folder of recordings made by others, beside the checkout; ALULA_DATA names another place."""
+    return Path(os.environ.get("ALULA_DATA", alula_root().parent / "shared" / "data")) / "bags"
+
+
 def wait_until(condition: Callable[[], object], what: str, within_s: float = WITHIN_S) -> None:
     end = time.monotonic() + within_s
     while not condition():
@@ -105,8 +110,8 @@ class Lines:
 
 
 class Ros1Peer(Lines):
-    def __init__(self, master: Master) -> None:
-        command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / "ros_bridge_ros1_peer.py")]
+    def __init__(self, master: Master, script: str = "ros_bridge_ros1_peer.py") -> None:
+        command = [str(alula_root() / "setup/in_ros1"), "python3", str(HERE / script)]
         super().__init__(command, master.environment, errors=False)
         self.expect("ready")
 
@@ -134,11 +139,11 @@ class Ros1Peer(Lines):
 
 
 class BridgeProcess(Lines):
-    def __init__(self, master: Master, folder: Path, config: str) -> None:
+    def __init__(self, master: Master, folder: Path, config: str, *arguments: str) -> None:
         folder.mkdir(exist_ok=True, parents=True)
         (folder / "bridge.yaml").write_text(config)
         self.stats_file = folder / "bridge_stats.json"
-        command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file)]
+        command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file), *arguments]
         super().__init__([*command, f"__log:={folder}/bridge.log"], master.environment, errors=True)
 
     def wait_running(self) -> None:

@@ -4,14 +4,17 @@ import json
 import os
 import sys
 import threading
+from collections import Counter
 from io import BytesIO
 
+import rosbag
 import roslib.message
 import rospy
 from genpy.message import fill_message_args
 
 WRITE = threading.Lock()
 KEEP = []
+BAG = []
 
 
 def report(**event):
@@ -54,6 +57,61 @@ def publish(topic, values):
     report(event="published", topic=topic, hex=serialized(message))
 
 
+def subscribe_raw(topic):
+    """Subscribe with no type of its own, as `rostopic echo` does."""
+
+    def received(message):
+        report(event="message", topic=topic, hex=message._buff.hex(), caller=message._connection_header["callerid"])
+
+    KEEP.append(rospy.Subscriber(topic, rospy.AnyMsg, received))
+
+
+def publish_once(topic, type, values):  # noqa: A002
+    """Wait for a subscriber as short-lived publishers do, publish one message, and leave for good."""
+    advertise(topic, type)
+    while not PUBLISHERS[topic].get_num_connections():
+        rospy.rostime.wallsleep(0.01)
+    publish(topic, values)
+    rospy.rostime.wallsleep(0.2)  # what rospy has in its queue would be lost
+    os._exit(0)
+
+
+def set_parameter(name, value):
+    rospy.set_param(name, value)
+    report(event="set", name=name)
+
+
+def recorded(path, number):
+    """Yield topic, type, MD5 sum, definition and bytes of each connection's first messages."""
+    counts = Counter()
+    with rosbag.Bag(path) as bag:
+        for topic, (kind, data, md5sum, *_, message_class), _time in bag.read_messages(raw=True):
+            counts[topic] += 1
+            if counts[topic] <= number:
+                yield topic, kind, md5sum, message_class._full_text, data
+
+
+def advertise_bag(path, prefix, number):
+    """Advertise what a recording has, with the recorded types."""
+    for topic, kind, md5sum, text, data in recorded(path, number):
+        name = prefix + topic
+        if name not in PUBLISHERS:
+            fields = {"__slots__": (), "_type": kind, "_md5sum": md5sum, "_full_text": text, "_has_header": False}
+            PUBLISHERS[name] = rospy.Publisher(name, type(f"Recorded{len(PUBLISHERS)}", (rospy.AnyMsg,), fields), queue_size=1000)
+        BAG.append((name, data))
+    report(event="advertised")
+
+
+def play_bag():
+    """Publish it, not faster than queues can take it."""
+    for name, data in BAG:
+        message = PUBLISHERS[name].data_class()
+        message._buff = data
+        PUBLISHERS[name].publish(message)
+        rospy.rostime.wallsleep(0.002)
+    report(event="played", number=len(BAG))
+
+
 def connections(topic):
     report(event="connections", topic=topic, number=PUBLISHERS[topic].get_num_connections())
 
@@ -93,6 +151,11 @@ COMMANDS = {
     "subscribe": subscribe,
     "advertise": advertise,
     "publish": publish,
+    "subscribe_raw": subscribe_raw,
+    "publish_once": publish_once,
+    "set_parameter": set_parameter,
+    "advertise_bag": advertise_bag,
+    "play_bag": play_bag,
     "connections": connections,
     "serve": serve,
     "call": call,

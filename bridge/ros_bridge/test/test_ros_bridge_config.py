@@ -4,8 +4,10 @@ import re
 
 import pytest
 
-from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World, load_config, parse_config
+from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World
+from ros_bridge.config_file import load_config, parse_config
 from ros_bridge.errors import ConfigError
+from ros_bridge.selection import Selection
 
 GOOD = """
 topics:
@@ -31,6 +33,62 @@ def test_reads_all_keys_and_defaults():
     assert config.services == (ServiceRoute("/uav_guidance/takeoff", "/uav_guidance/takeoff", World.ROS1, "uav_msgs/Takeoff", 2.0),)
 
 
+DISCOVERED = """
+discover:
+  all: true
+  include: ["/camera/*"]
+  exclude: [/secret, '*/raw']
+  namespace2: /ros1
+  rename: {/old: /new, /clock: /clock}
+  parameters: false
+types:
+  packages: {old_msgs: new_msgs}
+  messages:
+    - {ros1: tf/tfMessage, ros2: tf2_msgs/TFMessage}
+    - ros1: old_msgs/Pose
+      ros2: new_msgs/Place
+      fields: {header.stamp: at, junk: ''}
+"""
+
+
+def test_reads_what_to_discover_and_how_types_map():
+    config = parse_config(DISCOVERED, "b.yaml")
+    assert config.selection == Selection(
+        ("/camera/*", "*"), ("/secret", "*/raw"), "", "/ros1", (("/old", "/new"), ("/clock", "/clock")), parameters=False
+    )
+    assert config.rules.to_ros2("old_msgs/Pose") == "new_msgs/Place"
+    assert config.rules.to_ros2("old_msgs/Other") == "new_msgs/Other"
+    assert config.rules.fields("old_msgs/Pose", "new_msgs/Place") == {"header.stamp": "at", "junk": ""}
+
+
+def test_files_and_command_line_are_one_selection(tmp_path):
+    (tmp_path / "a.yaml").write_text("discover: {include: [/a], namespace2: /x}\ntypes: {packages: {p: q}}\n")
+    (tmp_path / "b.yaml").write_text("discover: {exclude: [/b]}\ntypes: {packages: {r: s}}\n")
+    paths = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
+    config = load_config(paths, Selection(("/c",), namespace2="/x"))
+    assert config.selection == Selection(("/a", "/c"), ("/b",), "", "/x")
+    assert [config.rules.to_ros2(name) for name in ("p/M", "r/M")] == ["q/M", "s/M"]
+    with pytest.raises(ConfigError, match="namespace2: given as /x and as /y; keep one"):
+        load_config(paths, Selection(namespace2="/y"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("discover: {al: true}", "b.yaml:1: unknown key 'al'"),
+        ("discover:\n  include: /camera", "b.yaml:2: include: '/camera' is not a list of patterns"),
+        ("discover: {rename: {a: /b}}", "is not an absolute ROS name"),
+        ("types: {package: {}}", "b.yaml:1: unknown key 'package'; known are packages, messages, services"),
+        ("types: {packages: [a]}", "packages: \\['a'\\] is not keys and values"),
+        ("types:\n  messages:\n    - {ros1: a/B}", "b.yaml:3: a rule needs 'ros1' and 'ros2'"),
+        ("types:\n  messages:\n    - {ros1: a/B, ros2: a/B, fields: {'a b': c}}", "b.yaml:3: fields: .* is not a field's name"),
+    ],
+)
+def test_errors_of_discovery_and_types_name_their_place(text, words):
+    with pytest.raises(ConfigError, match=words):
+        parse_config(text, "b.yaml")
+
+
 def test_empty_file_is_an_empty_configuration():
     assert parse_config("", "b.yaml").topics == ()
 
@@ -38,7 +96,7 @@ def test_empty_file_is_an_empty_configuration():
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("topcis: []", 1, ["unknown key 'topcis'", "topics, services"]),
+        ("topcis: []", 1, ["unknown key 'topcis'", "topics, services, actions, discover, types"]),
         ("topics: 3", 1, ["'topics' has to be a list"]),
         ("topics:\n  - /clock", 2, ["expected keys and values"]),
         ("topics:\n  - name: /a\n    directoin: x", 3, ["unknown key 'directoin'", "direction"]),

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from ros_bridge_harness import bag_folder
 from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Reader
 
@@ -79,7 +80,7 @@ def test_random_messages_return_byte_for_byte(types, name):
     @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), database=None)
     @given(ros1_bytes(types, name.replace("/", "/msg/")))
     def round_trip(ros1):
-        assert bytes(message.to_ros1(message.to_cdr(ros1))) == ros1
+        assert bytes(message.to_ros1(message.to_ros2(ros1))) == ros1
 
     round_trip()
 
@@ -106,20 +107,20 @@ def test_cdr_is_what_the_layout_says(types):
         + struct.pack("<dd", 10.0, 0.25)
     )
     health = types.message("uav_msgs/SensorHealth")
-    assert health.to_cdr(ros1).hex() == cdr.hex()
+    assert health.to_ros2(ros1).hex() == cdr.hex()
     assert bytes(health.to_ros1(cdr)) == bytes(4) + ros1[4:]
 
 
 def test_sequence_number_is_set_in_a_leading_header_only(types):
     header = types.message("std_msgs/Header")
     pose = types.message("geometry_msgs/PoseStamped")
-    pose_cdr = pose.to_cdr(bytes(4 + 8 + 4 + 56))
+    pose_cdr = pose.to_ros2(bytes(4 + 8 + 4 + 56))
     assert not header.begins_with_header
     assert pose.begins_with_header
     assert bytes(pose.to_ros1(pose_cdr, seq=258))[:4] == b"\x02\x01\x00\x00"
     string = types.message("std_msgs/String")
     text = struct.pack("<I2s", 2, b"hi")
-    assert bytes(string.to_ros1(string.to_cdr(text), seq=258)) == text
+    assert bytes(string.to_ros1(string.to_ros2(text), seq=258)) == text
 
 
 MESSAGES = sorted({*ROUND_TRIPS, "uav_msgs/MappingState", "skillset_interfaces/ResourceState"} - {"diagnostic_msgs/DiagnosticArray"})
@@ -199,11 +200,11 @@ def test_a_type_that_differs_is_refused_by_name_and_field(tmp_path):
 
     types = Types([package(tmp_path, "own_msgs", msg_Outer="Inner[] inner\n", msg_Inner="int32 a\nint32 b\n")])
     types._ros1.register(get_types_from_msg("int32 a\nfloat32 b\n", "own_msgs/msg/Inner"))
-    with pytest.raises(TypeDiffersError, match=r"own_msgs/msg/Inner differs: field 'b' is float32 in ROS 1, 'b' is int32 in ROS 2"):
+    with pytest.raises(TypeDiffersError, match=r"own_msgs/Inner differs: field 'b' is float32 in ROS 1, 'b' is int32 in ROS 2"):
         types.message("own_msgs/Outer")
 
 
-BAGS = Path(os.environ.get("ALULA_ROOT", "."), "../shared/data/bags").resolve()
+BAGS = bag_folder()
 PER_CONNECTION = 200
 
 
@@ -220,11 +221,13 @@ def test_recorded_messages_return_byte_for_byte(types, name):
                 message = types.message(ros1_name)
             except TypeUnknownError:
                 continue  # the recorder's own types
+            if not message.same_layout:
+                continue  # what a mapping leaves out does not return
             assert message.md5sum == connection.digest, f"{ros1_name} is another than the recorded one"
             for number, (_, _, ros1) in enumerate(reader.messages([connection])):
                 if number == PER_CONNECTION:
                     break
-                returned = bytes(message.to_ros1(message.to_cdr(ros1)))
+                returned = bytes(message.to_ros1(message.to_ros2(ros1)))
                 start = 4 if message.begins_with_header else 0
                 assert len(returned) == len(ros1)
                 if "Header" not in message.full_text or message.begins_with_header:

@@ -289,14 +289,14 @@ def test_publisher_of_another_type_is_refused_and_the_route_lives(ros1, ros2, ma
 
 
 def test_heartbeat_in_both_worlds(ros1, ros2):
-    beats = ros2.subscribe("/bridge/state", String, LATCHED)
-    ros1.do("subscribe", topic="/bridge/state", type="std_msgs/String")
+    beats = ros2.subscribe("/ros_bridge/state", String, LATCHED)
+    ros1.do("subscribe", topic="/ros_bridge/state", type="std_msgs/String")
     wait_until(lambda: len(beats) >= 3, "three heartbeats in ROS 2")
     states = [json.loads(beat.data) for beat in beats[:3]]
     assert [state["sequence"] - states[0]["sequence"] for state in states] == [0, 1, 2]
     assert {state["state"] for state in states} == {"running"}
     assert states[0]["ros1_master"] is True
-    text = bytes.fromhex(ros1.expect("message", topic="/bridge/state")["hex"])[4:]
+    text = bytes.fromhex(ros1.expect("message", topic="/ros_bridge/state")["hex"])[4:]
     assert json.loads(text)["topics"] == 8
 
 
@@ -447,8 +447,9 @@ def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, r
         process.process.send_signal(number)
         assert process.process.wait(5.0) == 0
         assert time.monotonic() - start < 2.0
-        figures = {"count": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0}
-        assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": figures}, "services": {}}
+        about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
+        figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
+        assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}
 
 
 def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):

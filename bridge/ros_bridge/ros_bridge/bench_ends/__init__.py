@@ -1,0 +1,1 @@
+"""The benchmark's ends, programs of their own: plain nodes of either world that send, receive, serve or call."""

@@ -1,0 +1,195 @@
+"""Follow both worlds' graphs and keep the table of routes equal to what they want: one thread.
+
+ROS 2 says when its graph changes; the ROS 1 master is asked five times a second, on a kept connection. A new route first offers its
+target's end and begins to flow when the subscribers over there have connected to it (or after a second), so that the only message of
+a short-lived publisher finds them.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, cast
+
+from ros_bridge import ros1_probe
+from ros_bridge.config import Direction, Spec, TopicRoute
+from ros_bridge.graph import Graphs, Ros1Graph
+from ros_bridge.graph_events import GraphEvents
+from ros_bridge.lingering import Lingering
+from ros_bridge.ros1_graph import MasterClient, MasterUnreachableError, Ros1Reader
+from ros_bridge.ros2_graph import read_ros2_graph
+from ros_bridge.routes import key_of
+from ros_bridge.type_book import CheckedTypes
+from ros_bridge.wanted import Decision, Refused, Wanted, decide
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from ros_bridge.conversion import Types
+    from ros_bridge.routes import RouteTable, TopicBridge
+    from ros_bridge.selection import Selection
+
+logger = logging.getLogger("ros_bridge")
+
+ASK_MASTER_EVERY_S = 0.2
+LOOK_EVERY_S = 0.02  # while a route waits for its target's subscribers
+CONNECT_WITHIN_S = 1.0
+AGAIN_AFTER_S = 0.5
+
+
+class GraphReader:
+    """Both graphs, and what can be asked about their types."""
+
+    def __init__(self, node: Node, types: Types, master_uri: str, caller_id: str) -> None:
+        """Ask nothing yet."""
+        self._node = node
+        self._caller_id = caller_id
+        self._client = MasterClient(master_uri, caller_id)
+        self._ros1_reader = Ros1Reader(self._client, lambda name, uri: ros1_probe.service_type(name, uri, caller_id))
+        self.ros1 = Ros1Graph()
+        self.types = CheckedTypes(types, self._publisher_headers)
+
+    def read_ros1(self) -> bool:
+        """Read ROS 1's graph; tell whether it has changed. Raises MasterUnreachableError."""
+        before, self.ros1 = self.ros1, self._ros1_reader.read()
+        return before is not self.ros1
+
+    def graphs(self) -> Graphs:
+        """Return ROS 1's graph as it was last read, and ROS 2's of now."""
+        return Graphs(self.ros1, read_ros2_graph(self._node))
+
+    def _publisher_headers(self, topic: str) -> Iterator[dict[str, str]]:
+        for node in sorted(self.ros1.publishers.get(topic, ())):
+            try:
+                uri = str(self._client.ask("lookupNode", node))
+            except MasterUnreachableError:
+                return
+            if (header := ros1_probe.publisher_header(uri, topic, self._caller_id)) is not None:
+                yield header
+
+    def close(self) -> None:
+        """Close the connection to the master."""
+        self._client.close()
+
+
+class Discovery:
+    """The thread. ``configured`` routes run always; discovery leaves their names alone."""
+
+    def __init__(self, reader: GraphReader, node: Node, selection: Selection, table: RouteTable, configured: Iterable[Spec]) -> None:
+        """Get ready."""
+        self._reader = reader
+        self._selection = selection
+        self._table = table
+        self._configured = tuple(configured)
+        self._events = GraphEvents(node)
+        self._lingering = Lingering()
+        self._made_s: dict[Spec, float] = {}
+        self._said: set[str] = set()
+        self._lost_master = False
+        self._kept_after_loss: set[Spec] = set()
+        self.decisions: list[Decision] = []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="discovery", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._follow()
+            except Exception:  # whatever a graph in motion makes rclpy or a node raise: bridging goes on, and the graph is read anew
+                if not self._stop.wait(AGAIN_AFTER_S):
+                    logger.exception("discovery begins again after an error")
+
+    def _follow(self) -> None:
+        ask_at_s = 0.0
+        changed = True
+        while not self._stop.is_set():
+            now_s = time.monotonic()
+            if now_s >= ask_at_s:
+                changed = self._ask_master() or changed
+                ask_at_s = now_s + ASK_MASTER_EVERY_S
+            if changed:
+                self.decisions = decide(self._reader.graphs(), self._selection, self._reader.types, self._configured)
+                self._report()
+            waiting = self._apply(now_s)
+            changed = self._events.wait(LOOK_EVERY_S if waiting else max(ask_at_s - time.monotonic(), 0.0))
+
+    def _ask_master(self) -> bool:
+        """Read ROS 1's graph. A master that was away knows less than before: what still has connections then goes on."""
+        try:
+            changed = self._reader.read_ros1()
+        except MasterUnreachableError:
+            self._lost_master = True
+            return False
+        if self._lost_master:
+            self._lost_master = False
+            self._kept_after_loss = set(self._table.running())
+        return changed
+
+    def _report(self) -> None:
+        """Say once for each reason what can't be bridged."""
+        for refused in self.decisions:
+            if isinstance(refused, Refused) and refused.reason not in self._said:
+                self._said.add(refused.reason)
+                logger.warning("%s %s is not bridged: %s", refused.kind, refused.ros1_name, refused.reason)
+
+    def _apply(self, now_s: float) -> bool:
+        """Make, start, park and close routes; tell whether one waits for its target's subscribers."""
+        wanted = self._lingering.update([one for one in self.decisions if isinstance(one, Wanted)], now_s)
+        wanted += self._still_connected({one.spec for one in wanted})
+        self._table.reconcile((*self._configured, *(one.spec for one in wanted)))
+        running = self._table.running()
+        self._made_s = {one.spec: self._made_s.get(one.spec, now_s) for one in wanted if one.spec in running}
+        waiting = False
+        for one in wanted:
+            if one.spec in running:
+                waiting = self._let_flow(one, now_s) or waiting
+        return waiting
+
+    def _let_flow(self, one: Wanted, now_s: float) -> bool:
+        """Start a route whose subscribers have connected, park one that has none; tell whether it waits."""
+        flows = self._table.started(one.spec)
+        if not one.flows:
+            if flows and not self._keeps_peers(one.spec):
+                self._table.park(one.spec)
+            self._made_s[one.spec] = now_s
+            return False
+        if flows:
+            return False
+        route = self._table.running()[one.spec]
+        connected = not isinstance(one.spec, TopicRoute) or cast("TopicBridge", route).target_peers() >= one.receivers
+        if connected or now_s - self._made_s[one.spec] >= CONNECT_WITHIN_S:
+            self._table.start(one.spec)
+            return False
+        return True
+
+    def _keeps_peers(self, spec: Spec) -> bool:
+        """Tell whether ROS 1 subscribers that a restarted master has forgotten are still connected."""
+        route = self._table.running().get(spec) if spec in self._kept_after_loss and isinstance(spec, TopicRoute) else None
+        return route is not None and cast("TopicBridge", route).target_peers() > 0
+
+    def _still_connected(self, wanted: set[Spec]) -> list[Wanted]:
+        """Return the routes that a restarted master has forgotten the peers of, while these are still connected."""
+        running = self._table.running()
+        superseded = {key_of(spec) for spec in wanted}
+        kept = []
+        for spec in [spec for spec in self._kept_after_loss if isinstance(spec, TopicRoute) and spec not in wanted]:
+            route = cast("TopicBridge | None", running.get(spec))
+            peers = 0 if route is None else route.source_peers() if spec.direction is Direction.ROS1_TO_ROS2 else route.target_peers()
+            if peers and key_of(spec) not in superseded:
+                kept.append(Wanted(spec, peers))
+        self._kept_after_loss = {one.spec for one in kept} | (self._kept_after_loss & wanted)
+        return kept
+
+    def close(self) -> None:
+        """Stop following; the routes are the table's."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join(CONNECT_WITHIN_S)
+        self._events.close()
+        self._reader.close()

@@ -1,0 +1,54 @@
+"""``--list``: look at both worlds for a moment, and tell what would be bridged and what can't be."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import rclpy
+
+from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
+from ros_bridge.discovery import GraphReader
+from ros_bridge.errors import BridgeError
+from ros_bridge.graph import LIST_NODE
+from ros_bridge.graph_events import GraphEvents
+from ros_bridge.rows import list_table, render
+from ros_bridge.topics import interface_class
+from ros_bridge.wanted import decide
+
+if TYPE_CHECKING:
+    from ros_bridge.config import BridgeConfig, Spec
+    from ros_bridge.conversion import Types
+
+QUIET_S = 1.0
+AT_MOST_S = 5.0
+
+
+def list_routes(config: BridgeConfig, types: Types, master_uri: str) -> str:
+    """Return the table as text. rclpy has to be initialised, and the master has to answer."""
+    node = rclpy.create_node(LIST_NODE)
+    events = GraphEvents(node)
+    reader = GraphReader(node, types, master_uri, f"/{LIST_NODE}")
+    try:
+        end_s = time.monotonic() + AT_MOST_S
+        while time.monotonic() < end_s and events.wait(QUIET_S):  # DDS finds everybody in its own time
+            time.sleep(QUIET_S / 10)
+        reader.read_ros1()
+        decisions = decide(reader.graphs(), config.selection, reader.types, config.routes)
+        return render(list_table(decisions, {spec: problem(spec, types) for spec in config.routes}))
+    finally:
+        events.close()
+        reader.close()
+        node.destroy_node()
+
+
+def problem(spec: Spec, types: Types) -> str:
+    """Return why a configured route can't be, or nothing."""
+    kind = {ActionRoute: "action", ServiceRoute: "srv", TopicRoute: "msg"}[type(spec)]
+    try:
+        if kind != "action":
+            (types.service if kind == "srv" else types.message)(spec.type_name, spec.ros2_type)
+        interface_class(spec.ros2_type or types.rules.to_ros2(spec.type_name), kind)
+    except BridgeError as error:
+        return str(error)
+    return ""

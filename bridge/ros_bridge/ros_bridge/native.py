@@ -1,0 +1,141 @@
+"""The native data plane's C interface (ros_bridge_native, ``c_api.cpp``) as Python sees it.
+
+Functions that make or end something of rcl's node keep Python's lock (``PyDLL``), because rclpy works on the same node under that
+lock; those that may wait, and those that only read, let it go (``CDLL``).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from ctypes import POINTER, Structure, c_char, c_char_p, c_int32, c_int64, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
+from enum import IntEnum
+from pathlib import Path
+from typing import Any, ClassVar
+
+from rclpy.type_support import check_for_type_support
+
+from ros_bridge.definitions import ament_prefixes
+from ros_bridge.errors import BridgeError
+from ros_bridge.stats import BINS
+
+LIBRARY = "libros_bridge_native.so"
+
+
+class EventKind(IntEnum):
+    """What an event tells (``events.hpp``)."""
+
+    CONNECTED = 1
+    CLOSED = 2
+    REFUSED = 3
+    NEEDS_WRITER = 4
+    BAD_MESSAGE = 5
+    BAD_PEER = 6
+
+
+class Specification(Structure):
+    """A route, as ``PlaneSpecification``."""
+
+    _fields_: ClassVar = [
+        ("ros1_topic", c_char_p),
+        ("ros1_type", c_char_p),
+        ("md5sum", c_char_p),
+        ("definition", c_char_p),
+        ("ros2_topic", c_char_p),
+        ("node", c_void_p),
+        ("type_support", c_void_p),
+        ("depth", c_uint64),
+        ("program", POINTER(c_uint32)),
+        ("operations", c_uint64),
+        ("token", c_uint64),
+        ("reliable", c_int32),
+        ("latched", c_int32),
+    ]
+
+
+class RouteFigures(Structure):
+    """A route's counters, as ``PlaneFigures``."""
+
+    _fields_: ClassVar = [
+        ("count", c_uint64),
+        ("bytes", c_uint64),
+        ("errors", c_uint64),
+        ("dropped_slow", c_uint64),
+        ("dropped_overrun", c_uint64),
+        ("peers", c_uint64),
+        ("latching", c_uint64),
+        ("bins", c_uint32 * BINS),
+    ]
+
+
+class Event(Structure):
+    """An event, as ``PlaneEvent``."""
+
+    _fields_: ClassVar = [("kind", c_int32), ("token", c_uint64), ("text", c_char * 512)]
+
+
+KEEPING_THE_LOCK = {
+    "plane_error": (c_char_p, []),
+    "plane_new": (c_void_p, [c_char_p, c_char_p]),
+    "plane_delete": (None, [c_void_p]),
+    "plane_up_new": (c_void_p, [c_void_p, POINTER(Specification)]),
+    "plane_up_connect": (c_int32, [c_void_p, c_uint64, c_char_p, c_uint16]),
+    "plane_up_disconnect": (None, [c_void_p, c_uint64]),
+    "plane_up_grant": (c_int32, [c_void_p, c_uint64]),
+    "plane_down_new": (c_void_p, [c_void_p, POINTER(Specification)]),
+    "plane_down_start": (c_int32, [c_void_p]),
+    "plane_route_delete": (None, [c_void_p]),
+    "plane_route_target_peers": (c_uint64, [c_void_p]),
+    "plane_route_source_peers": (c_uint64, [c_void_p]),
+    "plane_route_figures": (None, [c_void_p, POINTER(RouteFigures)]),
+    "plane_port": (c_int32, [c_void_p]),
+}
+LETTING_IT_GO = {
+    "plane_next_event": (c_int32, [c_void_p, c_int32, POINTER(Event)]),
+    "plane_to_cdr": (c_int64, [POINTER(c_uint32), c_uint64, c_char_p, c_uint64, POINTER(c_uint8)]),
+    "plane_to_ros1": (c_int64, [POINTER(c_uint32), c_uint64, c_char_p, c_uint64, c_uint32, POINTER(c_uint8)]),
+}
+
+
+class NativeError(BridgeError):
+    """The data plane has refused something; the message is its own."""
+
+
+class Native:
+    """The library's functions by their names."""
+
+    def __init__(self, path: Path) -> None:
+        """Load it; raises OSError if that fails."""
+        for library, functions in ((ctypes.PyDLL(str(path)), KEEPING_THE_LOCK), (ctypes.CDLL(str(path)), LETTING_IT_GO)):
+            for name, (result, arguments) in functions.items():
+                function = getattr(library, name)
+                function.restype = result
+                function.argtypes = arguments
+                setattr(self, name.removeprefix("plane_"), function)
+
+    def __getattr__(self, name: str) -> Any:
+        """Tell type checkers that functions are looked up by name."""
+        raise AttributeError(name)
+
+    def require(self, result: int | None) -> int:
+        """Return what a function returned; raise NativeError with its reason when that is nothing."""
+        if not result:
+            raise NativeError(self.error().decode(errors="replace"))
+        return result
+
+
+def find_library() -> Path | None:
+    """Return where the library is, among this environment's prefixes; None when it was not built."""
+    told = os.environ.get("ROS_BRIDGE_NATIVE")
+    candidates = [Path(told)] if told else [prefix / "lib" / LIBRARY for prefix in ament_prefixes()]
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def type_support_of(interface: Any) -> int:
+    """Return the address of the type support that rclpy uses for a message class."""
+    check_for_type_support(interface)
+    capsule = interface.__class__._TYPE_SUPPORT  # noqa: SLF001 - rclpy reads it the same way
+    get_name, get_pointer = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
+    get_name.restype, get_name.argtypes = c_char_p, [ctypes.py_object]
+    get_pointer.restype, get_pointer.argtypes = c_void_p, [ctypes.py_object, c_char_p]
+    return int(get_pointer(capsule, get_name(capsule)))

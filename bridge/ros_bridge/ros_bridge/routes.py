@@ -1,0 +1,150 @@
+"""Routes as the node sees them: made from a spec by their kind's maker, started, read, closed; and the table of those that run.
+
+A kind of route (topic, service, action) is a frozen spec in ``config`` and a maker: ``make(spec, context) -> Route``. A spec is its
+route's identity: when anything in it changes, the old route is closed and another one made.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ros_bridge.config import TopicRoute
+from ros_bridge.errors import BridgeError
+from ros_bridge.stats import Figures
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from ros_bridge.config import Spec
+    from ros_bridge.conversion import Types
+    from ros_bridge.plane import Plane
+
+logger = logging.getLogger("ros_bridge")
+
+
+class Route(Protocol):
+    """One thing that crosses. Made by its kind's maker, which raises BridgeError when it can't be."""
+
+    def start(self) -> None:
+        """Open the end that messages or calls come from; the maker has opened the other, so that its peers can connect first."""
+
+    def figures(self) -> Figures:
+        """Return what has crossed so far; cheap, from any thread, also after ``close``."""
+
+    def close(self) -> None:
+        """Close both ends; nothing crosses any more when it returns."""
+
+
+class TopicBridge(Route, Protocol):
+    """What the node needs of a topic's route besides."""
+
+    def target_peers(self) -> int:
+        """Return how many subscribers are connected to the end that messages go out of."""
+
+    def source_peers(self) -> int:
+        """Return how many publishers are connected to the end that messages come from; 0 before ``start``."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a maker may use."""
+
+    node: Node
+    types: Types
+    master_uri: str
+    caller_id: str
+    plane: Plane | None = None
+
+
+class Maker(Protocol):
+    """Make a route: the ends that offer are open when it returns, nothing flows before ``start``."""
+
+    def __call__(self, spec: Any, context: Context, /) -> Route:
+        """Return the route; raises BridgeError."""
+
+
+Key = tuple[str, str, str, str]
+
+
+def key_of(spec: Spec) -> Key:
+    """Return what stays the same of a route while its quality of service or type changes: kind, way and names."""
+    way = spec.direction if isinstance(spec, TopicRoute) else spec.server
+    return type(spec).__name__, way.value, spec.ros1_name, spec.ros2_name
+
+
+class RouteTable:
+    """The routes that run, kept equal to the wanted ones; safe to read and change from several threads."""
+
+    def __init__(self, makers: Mapping[type, Maker], context: Context) -> None:
+        """Begin with none; ``makers`` has the maker of each kind of spec."""
+        self._makers = makers
+        self._context = context
+        self._lock = threading.RLock()
+        self._running: dict[Spec, Route] = {}
+        self._started: set[Spec] = set()
+        self._earlier: dict[Key, Figures] = {}
+        self.failed: dict[Spec, str] = {}
+
+    def reconcile(self, wanted: Iterable[Spec]) -> None:
+        """Close what is not wanted and make what is missing; a spec that fails is reported once, and tried again when wanted anew."""
+        wanted = dict.fromkeys(wanted)
+        with self._lock:
+            for spec in [spec for spec in self._running if spec not in wanted]:
+                self._close(spec)
+            self.failed = {spec: reason for spec, reason in self.failed.items() if spec in wanted}
+            for spec in wanted:
+                if spec not in self._running and spec not in self.failed:
+                    self._make(spec)
+
+    def start(self, spec: Spec) -> None:
+        """Let a route flow, once."""
+        with self._lock:
+            if spec in self._running and spec not in self._started:
+                self._running[spec].start()
+                self._started.add(spec)
+
+    def started(self, spec: Spec) -> bool:
+        """Tell whether a route flows."""
+        with self._lock:
+            return spec in self._started
+
+    def park(self, spec: Spec) -> None:
+        """Make a route anew that offers its target but does not flow, as nobody is there to receive."""
+        with self._lock:
+            self._close(spec)
+            self._make(spec)
+
+    def _make(self, spec: Spec) -> None:
+        try:
+            self._running[spec] = self._maker(spec)(spec, self._context)
+        except BridgeError as error:
+            self.failed[spec] = str(error)
+            logger.error("%s is not bridged: %s", spec.label, error)
+
+    def _maker(self, spec: Spec) -> Maker:
+        if type(spec) not in self._makers:
+            raise BridgeError(f"{spec.label}: this bridge has no maker for a {type(spec).__name__}")
+        return self._makers[type(spec)]
+
+    def _close(self, spec: Spec) -> None:
+        route = self._running.pop(spec)
+        self._started.discard(spec)
+        route.close()
+        self._earlier[key_of(spec)] = route.figures().after(self._earlier.get(key_of(spec), Figures()))
+
+    def running(self) -> dict[Spec, Route]:
+        """Return the running routes by their specs, in the order in which they were made."""
+        with self._lock:
+            return dict(self._running)
+
+    def figures(self) -> dict[Spec, Figures]:
+        """Return the figures of the running routes, with what crossed before they were made anew."""
+        return {spec: route.figures().after(self._earlier.get(key_of(spec), Figures())) for spec, route in self.running().items()}
+
+    def close(self) -> None:
+        """Close all routes."""
+        self.reconcile(())

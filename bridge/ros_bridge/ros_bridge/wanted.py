@@ -1,0 +1,150 @@
+"""Decide what is to be bridged, from what runs in both worlds: a pure function, asked again at every change.
+
+A topic goes to the other world when somebody publishes it here; both ways when both worlds publish it. It flows only while somebody
+over there subscribes: before that it is offered, so that tools see it, and costs nothing. A service or an action goes from the world
+that has its server, unless both have one.
+
+Quality of service. Towards ROS 2 the bridge offers reliable and transient local, which suits every subscription there can be. From ROS 2
+it asks for what all publishers of the topic offer: reliable if all are, transient local if all are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from ros_bridge.config import ActionRoute, Direction, Reliability, ServiceRoute, Spec, TopicRoute, World
+from ros_bridge.errors import BridgeError
+from ros_bridge.graph import ACTION_PARTS, Graphs, Ros2Endpoint
+from ros_bridge.selection import Selection
+
+DEPTH = 100
+BULKY_DEPTH = 10  # of types with an array of bytes without an end: images, clouds, maps
+
+
+class TypeBook(Protocol):
+    """What is asked about types."""
+
+    def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> tuple[str, str]:
+        """Complete a pair of which one may be unknown, and check that it can cross; raises BridgeError."""
+
+    def check_service(self, ros1_type: str | None, ros2_type: str | None) -> tuple[str, str]:
+        """Do the same for a service."""
+
+    def bulky(self, ros2_type: str) -> bool:
+        """Tell whether messages of the type can be large."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A route that is to exist. ``receivers``: how many foreign subscribers wait at its target; with none it does not flow."""
+
+    spec: Spec
+    receivers: int = 0
+
+    @property
+    def flows(self) -> bool:
+        """Whether somebody is there for what comes out: a call comes by itself."""
+        return self.receivers > 0 or not isinstance(self.spec, TopicRoute)
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Something selected that can't be bridged, and why."""
+
+    kind: str
+    ros1_name: str
+    ros2_name: str
+    reason: str
+
+
+Decision = Wanted | Refused
+
+
+def decide(graphs: Graphs, selection: Selection, types: TypeBook, configured: Iterable[Spec] = ()) -> list[Decision]:
+    """Return everything that is selected: what to bridge and what can't be. Names of configured routes are left to these."""
+    taken1 = {spec.ros1_name for spec in configured}
+    taken2 = {spec.ros2_name for spec in configured}
+    decisions: list[Decision] = []
+    actions = {**_pairs(graphs.ros1.action_servers(), graphs.ros2.actions, selection)}
+    in_actions = {f"{ros1_name}/{part}" for ros1_name, _ in actions for part in ACTION_PARTS}
+    names1 = graphs.ros1.publishers.keys() | graphs.ros1.subscribers.keys()
+    names2 = graphs.ros2.publishers.keys() | graphs.ros2.subscribers.keys()
+    for ros1_name, ros2_name in sorted(_pairs(names1 - in_actions, names2, selection)):
+        if ros1_name not in taken1 and ros2_name not in taken2 and ros1_name not in in_actions:
+            decisions += _topic(graphs, types, ros1_name, ros2_name)
+    for ros1_name, ros2_name in sorted(_pairs(graphs.ros1.services, graphs.ros2.services, selection)):
+        if ros1_name not in taken1 and ros2_name not in taken2:
+            decisions.append(_service(graphs, types, ros1_name, ros2_name))
+    for ros1_name, ros2_name in sorted(actions):
+        if ros1_name not in taken1 and ros2_name not in taken2:
+            decisions.append(_action(graphs, ros1_name, ros2_name))
+    return decisions
+
+
+def _pairs(names1: Iterable[str], names2: Iterable[str], selection: Selection) -> dict[tuple[str, str], None]:
+    """Return the selected pairs of names of which at least one exists."""
+    pairs = [(name, selection.to_ros2(name)) for name in names1] + [(selection.to_ros1(name), name) for name in names2]
+    return {(one, two): None for one, two in pairs if one is not None and two is not None and selection.selects(one, two)}
+
+
+def _topic(graphs: Graphs, types: TypeBook, ros1_name: str, ros2_name: str) -> Iterator[Decision]:
+    publishers1 = graphs.ros1.publishers.get(ros1_name, frozenset())
+    publishers2 = graphs.ros2.publishers.get(ros2_name, ())
+    if not publishers1 and not publishers2:
+        return
+    subscribers1 = len(graphs.ros1.subscribers.get(ros1_name, ()))
+    subscribers2 = graphs.ros2.subscribers.get(ros2_name, ())
+    ros1_type = graphs.ros1.type_of(ros1_name)
+    kinds2 = sorted({end.type_name for end in (publishers2 or subscribers2)})
+    if ros1_type is None and not kinds2:
+        return  # nobody has said the type yet
+    if len(kinds2) > 1:
+        yield Refused("topic", ros1_name, ros2_name, f"ROS 2 has it with different types: {', '.join(kinds2)}")
+        return
+    try:
+        pair = types.pair(ros1_type, kinds2[0] if kinds2 else None, ros1_name)
+        depth = BULKY_DEPTH if types.bulky(pair[1]) else DEPTH
+    except BridgeError as error:
+        yield Refused("topic", ros1_name, ros2_name, str(error))
+        return
+    names = (ros1_name, ros2_name)
+    if publishers1:
+        receivers = sum(end.type_name == pair[1] for end in subscribers2)
+        spec = TopicRoute(*names, Direction.ROS1_TO_ROS2, pair[0], latched=True, depth=max(depth, len(publishers1)), ros2_type=pair[1])
+        yield Wanted(spec, receivers)
+    if publishers2:
+        yield Wanted(_from_ros2(names, pair, depth, publishers2), subscribers1)
+
+
+def _from_ros2(names: tuple[str, str], pair: tuple[str, str], depth: int, publishers: tuple[Ros2Endpoint, ...]) -> TopicRoute:
+    """Return the route with what all publishers offer: asking for more would leave some of them out."""
+    reliable = all(end.reliable for end in publishers)
+    return TopicRoute(
+        *names,
+        Direction.ROS2_TO_ROS1,
+        pair[0],
+        latched=all(end.transient_local for end in publishers),
+        depth=max(depth, len(publishers)),
+        reliability=Reliability.RELIABLE if reliable else Reliability.BEST_EFFORT,
+        ros2_type=pair[1],
+    )
+
+
+def _service(graphs: Graphs, types: TypeBook, ros1_name: str, ros2_name: str) -> Decision:
+    in1, in2 = ros1_name in graphs.ros1.services, ros2_name in graphs.ros2.services
+    if in1 and in2:
+        return Refused("service", ros1_name, ros2_name, "both worlds have a server")
+    try:
+        pair = types.check_service(graphs.ros1.service_types.get(ros1_name), graphs.ros2.services.get(ros2_name))
+    except BridgeError as error:
+        return Refused("service", ros1_name, ros2_name, str(error))
+    return Wanted(ServiceRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, pair[0], ros2_type=pair[1]))
+
+
+def _action(graphs: Graphs, ros1_name: str, ros2_name: str) -> Decision:
+    in1, in2 = graphs.ros1.action_servers().get(ros1_name), graphs.ros2.actions.get(ros2_name)
+    if in1 and in2:
+        return Refused("action", ros1_name, ros2_name, "both worlds have a server")
+    return Wanted(ActionRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, in1 or in2 or ""))

@@ -1,0 +1,152 @@
+"""A ROS 1 node for the tests of bridged actions, in a process of its own: takes commands as JSON lines, reports events as JSON lines."""
+
+import json
+import os
+import sys
+import threading
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalID
+from bridge_test_interfaces.msg import CountAction, CountFeedback, CountGoal, CountResult
+
+WRITE = threading.Lock()
+KEEP = []
+CLIENTS = {}
+HANDLES = {}
+
+
+def report(**event):
+    with WRITE:
+        sys.stdout.write(json.dumps(event) + "\n")
+        sys.stdout.flush()
+
+
+def run_goal(handle, cancelled):
+    """Do as the goal's behaviour says: count, hang (until cancelled), stubborn (never cancelled), abort, reject."""
+    goal = handle.get_goal()
+    name = handle.get_goal_id().id
+    report(event="goal", id=name, target=goal.target, behaviour=goal.behaviour)
+    if goal.behaviour == "reject":
+        handle.set_rejected(CountResult(), "not today")
+        return
+    if goal.behaviour == "silent":
+        return
+    handle.set_accepted()
+    counted = []
+    while len(counted) < goal.target or goal.behaviour == "hang":
+        if cancelled.wait(goal.period_s) and goal.behaviour != "stubborn":
+            report(event="cancelled", id=name)
+            handle.set_canceled(CountResult(counted, "cancelled"), "as you wish")
+            return
+        if goal.behaviour != "hang":
+            counted.append(len(counted) + 1)
+            handle.publish_feedback(CountFeedback(counted[-1], counted[-1] / goal.target))
+    if goal.behaviour == "abort":
+        handle.set_aborted(CountResult(counted, "aborted"), "broken")
+    else:
+        handle.set_succeeded(CountResult(counted, "from ROS 1"), "well done")
+
+
+def serve(name):
+    """Run each goal in a thread of its own."""
+    cancelled = {}
+
+    def on_goal(handle):
+        event = cancelled.setdefault(handle.get_goal_id().id, threading.Event())
+        threading.Thread(target=run_goal, args=(handle, event), daemon=True).start()
+
+    server = actionlib.ActionServer(name, CountAction, on_goal, lambda handle: cancelled[handle.get_goal_id().id].set(), auto_start=False)
+    KEEP.append(server)
+    server.start()
+    report(event="serving", name=name)
+
+
+def serve_simple(name):
+    """Run one goal at a time; a newer one preempts it."""
+
+    def execute(goal):
+        report(event="goal", target=goal.target)
+        while not server.is_preempt_requested() and goal.behaviour == "hang":
+            rospy.rostime.wallsleep(0.01)
+        if server.is_preempt_requested():
+            server.set_preempted(CountResult([], "preempted"))
+        else:
+            server.set_succeeded(CountResult([goal.target], "from ROS 1"))
+
+    server = actionlib.SimpleActionServer(name, CountAction, execute, auto_start=False)
+    KEEP.append(server)
+    server.start()
+    report(event="serving", name=name)
+
+
+def client(name):
+    """Connect to a server."""
+    CLIENTS[name] = actionlib.ActionClient(name, CountAction)
+    report(event="connected", found=CLIENTS[name].wait_for_server(rospy.Duration(10.0)))
+
+
+def goal(name, key, **fields):
+    """Send a goal; its transitions and feedbacks are reported under the key."""
+
+    def on_transition(handle):
+        state = actionlib.CommState.to_string(handle.get_comm_state())
+        event = {"event": "transition", "key": key, "state": state, "status": handle.get_goal_status()}
+        if handle.get_comm_state() == actionlib.CommState.DONE:
+            result = handle.get_result()
+            event["terminal"] = actionlib.TerminalState.to_string(handle.get_terminal_state())
+            event["text"] = handle.get_goal_status_text()
+            event["counted"] = None if result is None else list(result.counted)
+            event["message"] = None if result is None else result.message
+        report(**event)
+
+    def on_feedback(_handle, feedback):
+        report(event="feedback", key=key, count=feedback.count, fraction=feedback.fraction)
+
+    HANDLES[key] = CLIENTS[name].send_goal(CountGoal(**fields), on_transition, on_feedback)
+    stamp = HANDLES[key].comm_state_machine.action_goal.goal_id.stamp
+    report(event="sent", key=key, stamp_ns=stamp.to_nsec())
+
+
+def cancel(key):
+    """Cancel one goal."""
+    HANDLES[key].cancel()
+
+
+def cancel_all(name):
+    """Cancel all goals of a server."""
+    CLIENTS[name].cancel_all_goals()
+
+
+def cancel_before(name, stamp_ns):
+    """Cancel what was stamped at or before a time."""
+    CLIENTS[name].pub_cancel.publish(GoalID(stamp=rospy.Time(0, stamp_ns), id=""))
+
+
+def cancel_id(name, goal_id):
+    """Cancel a goal by its name, whether it is there or not."""
+    CLIENTS[name].pub_cancel.publish(GoalID(stamp=rospy.Time(), id=goal_id))
+
+
+COMMANDS = {
+    "serve": serve,
+    "serve_simple": serve_simple,
+    "client": client,
+    "goal": goal,
+    "cancel": cancel,
+    "cancel_all": cancel_all,
+    "cancel_before": cancel_before,
+    "cancel_id": cancel_id,
+}
+
+
+def main():
+    rospy.init_node("bridge_action_peer", anonymous=True, disable_signals=True, disable_rostime=True)
+    report(event="ready")
+    for line in sys.stdin:
+        command = json.loads(line)
+        COMMANDS[command.pop("do")](**command)
+    os._exit(0)
+
+
+main()

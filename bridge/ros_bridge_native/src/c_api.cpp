@@ -1,0 +1,179 @@
+// What Python calls (native.py). Every function catches everything; what failed is told by plane_error, for the thread that asked.
+#include <cstring>
+#include <string>
+
+#include "layout.hpp"
+#include "routes.hpp"
+#include "type_support.hpp"
+
+#define PLANE_API extern "C" __attribute__((visibility("default")))
+
+using namespace plane;
+
+namespace {
+
+thread_local std::string last_error;
+
+// Return what the function returns, or `otherwise` when it throws.
+template <class Result, class Function>
+Result guarded(Result otherwise, Function function) {
+  try {
+    return function();
+  } catch (const std::exception & error) {
+    last_error = error.what();
+  } catch (...) {
+    last_error = "unknown exception";
+  }
+  return otherwise;
+}
+
+Program program_of(const uint32_t * words, size_t operations) {
+  Program program;
+  for (size_t i = 0; i < operations; ++i, words += 4) program.push_back({static_cast<Code>(words[0]), words[1], words[2], words[3]});
+  if (!valid(program)) throw std::runtime_error("the layout program is not well formed");
+  return program;
+}
+
+}  // namespace
+
+// The structures are the same, field by field, in native.py.
+struct PlaneSpecification {
+  const char * ros1_topic;
+  const char * ros1_type;
+  const char * md5sum;
+  const char * definition;
+  const char * ros2_topic;
+  void * node;
+  const void * type_support;
+  uint64_t depth;
+  const uint32_t * program;
+  uint64_t operations;
+  uint64_t token;
+  int32_t reliable;
+  int32_t latched;
+};
+
+struct PlaneFigures {
+  uint64_t count;
+  uint64_t bytes;
+  uint64_t errors;
+  uint64_t dropped_slow;
+  uint64_t dropped_overrun;
+  uint64_t peers;
+  uint64_t latching;
+  uint32_t bins[kBins];
+};
+
+struct PlaneEvent {
+  int32_t kind;
+  uint64_t token;
+  char text[512];
+};
+
+namespace {
+
+Specification specification_of(const PlaneSpecification & from) {
+  return {{from.ros1_topic, from.ros1_type, from.md5sum, from.definition}, from.ros2_topic, static_cast<rcl_node_t *>(from.node),
+    bytes_type_support(static_cast<const rosidl_message_type_support_t *>(from.type_support)),
+    {from.depth, from.reliable != 0, from.latched != 0}, program_of(from.program, from.operations), from.token};
+}
+
+}  // namespace
+
+PLANE_API const char * plane_error() { return last_error.c_str(); }
+
+PLANE_API void * plane_new(const char * caller_id, const char * address) {
+  return guarded<void *>(nullptr, [&] {
+    auto machinery = std::make_unique<Machinery>(caller_id);
+    machinery->server->listen_on(address);
+    return machinery.release();
+  });
+}
+
+// All routes have to be deleted before.
+PLANE_API void plane_delete(void * machinery) {
+  static_cast<Machinery *>(machinery)->server->close();
+  delete static_cast<Machinery *>(machinery);
+}
+
+PLANE_API int32_t plane_port(void * machinery) { return static_cast<Machinery *>(machinery)->server->port(); }
+
+PLANE_API int32_t plane_next_event(void * machinery, int32_t timeout_ms, PlaneEvent * out) {
+  Event event;
+  if (!static_cast<Machinery *>(machinery)->events.next(timeout_ms, event)) return 0;
+  out->kind = static_cast<int32_t>(event.kind);
+  out->token = event.token;
+  std::strncpy(out->text, event.text.c_str(), sizeof out->text - 1);
+  out->text[sizeof out->text - 1] = 0;
+  return 1;
+}
+
+PLANE_API void * plane_up_new(void * machinery, const PlaneSpecification * specification) {
+  return guarded<void *>(nullptr, [&]() -> Route * { return new UpRoute(*static_cast<Machinery *>(machinery), specification_of(*specification)); });
+}
+
+PLANE_API int32_t plane_up_connect(void * route, uint64_t token, const char * address, uint16_t port) {
+  return guarded(0, [&] {
+    static_cast<UpRoute *>(static_cast<Route *>(route))->connect(token, address, port);
+    return 1;
+  });
+}
+
+PLANE_API void plane_up_disconnect(void * route, uint64_t token) { static_cast<UpRoute *>(static_cast<Route *>(route))->disconnect(token); }
+
+PLANE_API int32_t plane_up_grant(void * route, uint64_t token) {
+  return guarded(0, [&] {
+    static_cast<UpRoute *>(static_cast<Route *>(route))->grant(token);
+    return 1;
+  });
+}
+
+PLANE_API void * plane_down_new(void * machinery, const PlaneSpecification * specification) {
+  return guarded<void *>(nullptr, [&]() -> Route * { return new DownRoute(*static_cast<Machinery *>(machinery), specification_of(*specification)); });
+}
+
+PLANE_API int32_t plane_down_start(void * route) {
+  return guarded(0, [&] {
+    static_cast<DownRoute *>(static_cast<Route *>(route))->start();
+    return 1;
+  });
+}
+
+PLANE_API void plane_route_delete(void * route) { delete static_cast<Route *>(route); }
+
+PLANE_API uint64_t plane_route_target_peers(void * route) { return static_cast<Route *>(route)->target_peers(); }
+
+PLANE_API uint64_t plane_route_source_peers(void * route) { return static_cast<Route *>(route)->source_peers(); }
+
+PLANE_API void plane_route_figures(void * route, PlaneFigures * out) {
+  const Counters & counters = static_cast<Route *>(route)->counters;
+  out->count = counters.count;
+  out->bytes = counters.bytes;
+  out->errors = counters.errors;
+  out->dropped_slow = counters.dropped_slow;
+  out->dropped_overrun = counters.dropped_overrun;
+  out->peers = counters.peers;
+  out->latching = counters.latching;
+  for (int i = 0; i < kBins; ++i) out->bins[i] = counters.bins[i];
+}
+
+// For tests of the layout programs: convert, and return the size, or -1 if the bytes are no message. `out` may be null to only measure.
+PLANE_API int64_t plane_to_cdr(const uint32_t * words, uint64_t operations, const uint8_t * ros1, uint64_t size, uint8_t * out) {
+  return guarded<int64_t>(-2, [&]() -> int64_t {
+    const Program program = program_of(words, operations);
+    const size_t needed = cdr_size(program, ros1, size);
+    if (needed == SIZE_MAX) return -1;
+    if (out != nullptr) write_cdr(program, ros1, size, out);
+    return static_cast<int64_t>(needed);
+  });
+}
+
+PLANE_API int64_t plane_to_ros1(const uint32_t * words, uint64_t operations, const uint8_t * cdr, uint64_t size, uint32_t sequence, uint8_t * out) {
+  return guarded<int64_t>(-2, [&]() -> int64_t {
+    const Program program = program_of(words, operations);
+    const size_t needed = ros1_size(program, cdr, size);
+    if (needed == SIZE_MAX) return -1;
+    if (out != nullptr) write_ros1(program, cdr, size, sequence, out);
+    return static_cast<int64_t>(needed);
+  });
+}

@@ -1,0 +1,53 @@
+// What Python should know: few, bounded, and never waited for.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <string>
+
+namespace plane {
+
+enum class EventKind : int32_t {
+  kConnected = 1,  // a publisher in ROS 1 sends to us from now on
+  kClosed = 2,     // it does no longer, or the connection could not be made
+  kRefused = 3,    // the connection headers do not fit
+  kNeedsWriter = 4,  // a latching publisher waits for a writer of its own
+  kBadMessage = 5,
+  kBadPeer = 6,  // a peer of our server was turned away
+};
+
+struct Event {
+  EventKind kind;
+  uint64_t token;  // of the connection or the route
+  std::string text;
+};
+
+class Events {
+ public:
+  void put(EventKind kind, uint64_t token, std::string text) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    // Losing a report of garbage is fine, losing the end of a connection is not: those are as few as connections.
+    if (queue_.size() >= kMostWaiting && kind >= EventKind::kBadMessage) return;
+    queue_.push_back({kind, token, std::move(text)});
+    arrived_.notify_one();
+  }
+
+  bool next(int timeout_ms, Event & event) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (!arrived_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [&] { return !queue_.empty(); })) return false;
+    event = std::move(queue_.front());
+    queue_.pop_front();
+    return true;
+  }
+
+ private:
+  static constexpr size_t kMostWaiting = 1000;
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<Event> queue_;
+};
+
+}  // namespace plane

@@ -1,0 +1,275 @@
+#include "ros1_publisher.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <sys/epoll.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+#include "sockets.hpp"
+
+namespace plane {
+namespace {
+
+constexpr int kFramesAtOnce = 64;
+constexpr size_t kMostSenders = 256;  // of latched messages that are kept
+
+}  // namespace
+
+// One subscriber: first its connection header is read and answered, then it is sent to.
+class OutConnection : public Handler, public std::enable_shared_from_this<OutConnection> {
+ public:
+  OutConnection(std::shared_ptr<Server> server, int fd) : server_(std::move(server)), fd_(fd), born_ns_(now_ns()) {}
+  ~OutConnection() override { ::close(fd_); }
+
+  void begin() { key_ = server_->loop_.add(fd_, shared_from_this(), EPOLLIN, true); }
+
+  void on_ready(uint32_t epoll_events) override {
+    if (epoll_events & EPOLLOUT) on_writable();
+    if (epoll_events & (EPOLLIN | EPOLLHUP | EPOLLERR)) on_readable();
+  }
+
+  bool on_tick(int64_t now) override {
+    if (publisher_ || closed_) return false;
+    if (now - born_ns_ < kHandshakeNs) return true;
+    turn_away("it sent no connection header within 5 s");
+    return false;
+  }
+
+  // Any thread. Returns how many queued frames had to go.
+  size_t send(const Frame & frame, size_t depth) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    size_t gone = 0;
+    const size_t begun = sent_ || greeting_ ? 1 : 0;
+    while (queue_.size() >= depth + begun) {
+      queue_.erase(queue_.begin() + begun);
+      ++gone;
+    }
+    queue_.push_back(frame);
+    if (!waits_for_room_) flush();
+    return gone;
+  }
+
+  // The loop's thread only.
+  void shut() {
+    if (closed_) return;
+    closed_ = true;
+    if (publisher_) publisher_->detach(shared_from_this());
+    server_->loop_.remove(key_, fd_);
+    ::shutdown(fd_, SHUT_RDWR);
+    std::lock_guard<std::mutex> lock(mutex_);
+    broken_ = true;
+    queue_.clear();
+  }
+
+ private:
+  void on_readable() {
+    uint8_t bytes[4096];
+    const ssize_t number = recv(fd_, bytes, sizeof bytes, MSG_DONTWAIT);
+    if (number == 0 || (number < 0 && errno != EAGAIN && errno != EINTR)) return shut();
+    if (number > 0 && !publisher_) read_header(bytes, static_cast<size_t>(number));
+    // A subscriber has nothing to say after its header; what it says nevertheless is thrown away.
+  }
+
+  void read_header(const uint8_t * bytes, size_t number) {
+    header_.append(reinterpret_cast<const char *>(bytes), number);
+    uint32_t length;
+    if (header_.size() < sizeof length) return;
+    std::memcpy(&length, header_.data(), sizeof length);
+    if (length > kMostHeaderBytes) return turn_away("its connection header would have " + std::to_string(length) + " bytes");
+    if (header_.size() < sizeof length + length) return;
+    Fields fields;
+    if (!decode(reinterpret_cast<const uint8_t *>(header_.data()) + sizeof length, length, fields)) {
+      return turn_away("what it sent is no connection header");
+    }
+    const auto publisher = server_->find(fields["topic"]);
+    if (!publisher) return turn_away("topic [" + fields["topic"] + "] is not published here");
+    const std::string reason = mismatch(fields, publisher->identity);
+    if (!reason.empty()) return turn_away(fields["callerid"] + " on " + fields["topic"] + ": " + reason);
+    accept(publisher);
+  }
+
+  void accept(const std::shared_ptr<Ros1Publisher> & publisher) {
+    header_.clear();
+    header_.shrink_to_fit();
+    const auto & own = publisher->identity;
+    const std::string answer = encode({{"callerid", server_->caller_id_}, {"latching", publisher->latched ? "1" : "0"},
+      {"md5sum", own.md5sum}, {"message_definition", own.definition}, {"topic", own.topic}, {"type", own.type}});
+    auto frame = std::make_shared<Buffer>();
+    frame->reserve(answer.size());
+    std::memcpy(frame->data(), answer.data(), answer.size());
+    frame->set_size(answer.size());
+    send(frame, 1);
+    publisher_ = publisher;
+    publisher_->attach(shared_from_this());
+  }
+
+  void turn_away(const std::string & reason) {
+    server_->events_.put(EventKind::kBadPeer, 0, reason);
+    const std::string answer = encode({{"error", reason}});
+    (void)!::send(fd_, answer.data(), answer.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    shut();
+  }
+
+  void on_writable() {
+    std::lock_guard<std::mutex> lock(mutex_);
+    waits_for_room_ = false;
+    flush();
+    if (!waits_for_room_ && !broken_) server_->loop_.change(key_, fd_, EPOLLIN);
+  }
+
+  // With the lock: send what the socket takes; ask to be called again if there is more.
+  void flush() {
+    while (!queue_.empty() && !broken_) {
+      iovec parts[kFramesAtOnce];
+      const int number = static_cast<int>(std::min<size_t>(queue_.size(), kFramesAtOnce));
+      for (int i = 0; i < number; ++i) parts[i] = {queue_[i]->data(), queue_[i]->size()};
+      parts[0].iov_base = static_cast<uint8_t *>(parts[0].iov_base) + sent_;
+      parts[0].iov_len -= sent_;
+      msghdr message{};
+      message.msg_iov = parts;
+      message.msg_iovlen = number;
+      const ssize_t written = sendmsg(fd_, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0 && errno == EAGAIN) {
+        waits_for_room_ = true;
+        return server_->loop_.change(key_, fd_, EPOLLIN | EPOLLOUT);
+      }
+      if (written < 0) {
+        broken_ = true;  // the loop sees the same on its side, and shuts the connection
+        return queue_.clear();
+      }
+      forget_sent(static_cast<size_t>(written));
+    }
+  }
+
+  void forget_sent(size_t written) {
+    sent_ += written;
+    while (!queue_.empty() && sent_ >= queue_.front()->size()) {
+      sent_ -= queue_.front()->size();
+      queue_.pop_front();
+      greeting_ = false;
+    }
+  }
+
+  const std::shared_ptr<Server> server_;
+  const int fd_;
+  const int64_t born_ns_;
+  Key key_ = 0;
+  bool closed_ = false;
+  std::string header_;
+  std::shared_ptr<Ros1Publisher> publisher_;
+  std::mutex mutex_;
+  std::deque<Frame> queue_;
+  size_t sent_ = 0;  // bytes of the first frame
+  bool greeting_ = true;  // the first frame is our connection header
+  bool waits_for_room_ = false;
+  bool broken_ = false;
+};
+
+Ros1Publisher::Ros1Publisher(TopicIdentity own, bool latched_, size_t depth_, Counters & counters)
+: identity(std::move(own)), latched(latched_), depth(depth_), counters_(counters) {}
+
+void Ros1Publisher::publish(const Frame & frame, const std::string & sender) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (latched) keep(frame, sender);
+  for (const auto & connection : connections_) {
+    const size_t gone = connection->send(frame, depth);
+    if (gone) counters_.dropped_slow.fetch_add(gone, std::memory_order_relaxed);
+  }
+}
+
+void Ros1Publisher::keep(const Frame & frame, const std::string & sender) {
+  const auto old = std::find_if(last_.begin(), last_.end(), [&](const auto & entry) { return entry.first == sender; });
+  if (old != last_.end()) last_.erase(old);
+  if (last_.size() >= kMostSenders) last_.pop_front();
+  last_.emplace_back(sender, frame);
+}
+
+bool Ros1Publisher::wanted() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return latched || !connections_.empty();
+}
+
+void Ros1Publisher::attach(const std::shared_ptr<OutConnection> & connection) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  for (const auto & [sender, frame] : last_) connection->send(frame, kMostSenders + 1);
+  connections_.push_back(connection);
+  counters_.peers = connections_.size();
+}
+
+void Ros1Publisher::detach(const std::shared_ptr<OutConnection> & connection) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  connections_.erase(std::remove(connections_.begin(), connections_.end(), connection), connections_.end());
+  counters_.peers = connections_.size();
+}
+
+std::vector<std::shared_ptr<OutConnection>> Ros1Publisher::connections() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return connections_;
+}
+
+Server::Server(Loop & loop, Events & events, std::string caller_id) : loop_(loop), events_(events), caller_id_(std::move(caller_id)) {}
+
+Server::~Server() {
+  if (fd_ >= 0) ::close(fd_);
+  if (spare_ >= 0) ::close(spare_);
+}
+
+void Server::listen_on(const std::string & address) {
+  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  spare_ = open("/dev/null", O_RDONLY | O_CLOEXEC);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  socklen_t size = sizeof place;
+  if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) != 1 || bind(fd_, reinterpret_cast<sockaddr *>(&place), sizeof place) != 0 ||
+      listen(fd_, SOMAXCONN) != 0 || getsockname(fd_, reinterpret_cast<sockaddr *>(&place), &size) != 0) {
+    throw std::runtime_error("can't listen on " + address + ": " + std::strerror(errno));
+  }
+  port_ = ntohs(place.sin_port);
+  key_ = loop_.add(fd_, shared_from_this(), EPOLLIN);
+}
+
+void Server::close() { loop_.run_and_wait([this] { loop_.remove(key_, fd_); }); }
+
+void Server::on_ready(uint32_t) {
+  const int fd = accept4(fd_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (fd >= 0) {
+    set_options(fd);
+    std::make_shared<OutConnection>(shared_from_this(), fd)->begin();
+  } else if (errno == EMFILE || errno == ENFILE) {
+    ::close(spare_);
+    ::close(accept(fd_, nullptr, nullptr));
+    spare_ = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    events_.put(EventKind::kBadPeer, 0, "this process has no file descriptors left; a subscriber was turned away");
+  }
+}
+
+std::shared_ptr<Ros1Publisher> Server::find(const std::string & topic) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = publishers_.find(topic);
+  return found == publishers_.end() ? nullptr : found->second;
+}
+
+void Server::offer(const std::shared_ptr<Ros1Publisher> & publisher) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  publishers_[publisher->identity.topic] = publisher;
+}
+
+void Server::withdraw(const std::shared_ptr<Ros1Publisher> & publisher) {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = publishers_.find(publisher->identity.topic);
+    if (found != publishers_.end() && found->second == publisher) publishers_.erase(found);
+  }
+  loop_.run_and_wait([&] {
+    for (const auto & connection : publisher->connections()) connection->shut();
+  });
+}
+
+}  // namespace plane

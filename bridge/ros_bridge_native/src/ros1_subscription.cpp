@@ -1,0 +1,187 @@
+#include "ros1_subscription.hpp"
+
+#include <arpa/inet.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "counters.hpp"
+#include "layout.hpp"
+#include "sockets.hpp"
+
+namespace plane {
+namespace {
+
+constexpr size_t kReadBytes = kLargeBytes + sizeof(uint32_t);
+
+uint32_t length_at(const uint8_t * data) {
+  uint32_t length;
+  std::memcpy(&length, data, sizeof length);
+  return length;
+}
+
+}  // namespace
+
+InConnection::InConnection(Loop & loop, Events & events, Inbox & inbox, const TopicIdentity & identity, const std::string & caller_id,
+                           uint64_t token_)
+: token(token_), loop_(loop), events_(events), inbox_(inbox),
+  greeting_(encode({{"callerid", caller_id}, {"md5sum", identity.md5sum}, {"message_definition", identity.definition},
+    {"tcp_nodelay", "1"}, {"topic", identity.topic}, {"type", identity.type}})),
+  identity_(identity), born_ns_(now_ns()) {}
+
+InConnection::~InConnection() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+void InConnection::begin(const std::string & address, uint16_t port) {
+  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(port);
+  const bool known = inet_pton(AF_INET, address.c_str(), &place.sin_addr) == 1;
+  if (fd_ < 0 || !known) return shut(known ? std::strerror(errno) : "no such address: " + address);
+  set_options(fd_);
+  const int code = connect(fd_, reinterpret_cast<sockaddr *>(&place), sizeof place);
+  if (code != 0 && errno != EINPROGRESS) return shut(std::strerror(errno));
+  key_ = loop_.add(fd_, shared_from_this(), EPOLLOUT, true);
+}
+
+void InConnection::on_ready(uint32_t) {
+  if (state_ == State::kConnecting) return on_connected();
+  receive();
+}
+
+bool InConnection::on_tick(int64_t now) {
+  if (state_ == State::kOpen || state_ == State::kClosed) return false;
+  if (now - born_ns_ < kHandshakeNs) return true;
+  shut("no connection header within 5 s");
+  return false;
+}
+
+void InConnection::on_connected() {
+  int error = 0;
+  socklen_t size = sizeof error;
+  getsockopt(fd_, SOL_SOCKET, SO_ERROR, &error, &size);
+  if (error != 0) return shut(std::strerror(error));
+  // A fresh socket takes a header of any sensible length at once.
+  const ssize_t written = send(fd_, greeting_.data(), greeting_.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (written != static_cast<ssize_t>(greeting_.size())) return shut("the connection header could not be sent");
+  state_ = State::kHeader;
+  loop_.change(key_, fd_, EPOLLIN);
+}
+
+void InConnection::receive() {
+  uint8_t * to;
+  size_t room;
+  if (large_) {
+    to = large_->data() + large_->size();
+    room = large_bytes_ - large_->size();
+  } else {
+    received_.reserve(kReadBytes);
+    to = received_.data() + received_.size();
+    room = received_.capacity() - received_.size();
+  }
+  const ssize_t number = recv(fd_, to, room, MSG_DONTWAIT);
+  if (number < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  if (number <= 0) return shut(number == 0 ? "the publisher has closed the connection" : std::strerror(errno));
+  if (large_) {
+    large_->set_size(large_->size() + number);
+    if (large_->size() == large_bytes_) end_large();
+    return;
+  }
+  received_.set_size(received_.size() + number);
+  if (state_ == State::kHeader) take_header();
+  if (state_ == State::kOpen) take_messages();
+}
+
+void InConnection::take_header() {
+  if (received_.size() < sizeof(uint32_t)) return;
+  const uint32_t length = length_at(received_.data());
+  if (length > kMostHeaderBytes) return shut("what it sent is no connection header", EventKind::kRefused);
+  const size_t whole = sizeof length + length;
+  received_.reserve(whole + kReadBytes);
+  if (received_.size() < whole) return;
+  Fields fields;
+  if (!decode(received_.data() + sizeof length, length, fields)) {
+    return shut("what it sent is no connection header", EventKind::kRefused);
+  }
+  if (fields.count("error")) return shut("it refuses: " + fields["error"], EventKind::kRefused);
+  const std::string reason = mismatch(fields, identity_);
+  if (!reason.empty()) return shut(reason, EventKind::kRefused);
+  std::memmove(received_.data(), received_.data() + whole, received_.size() - whole);
+  received_.set_size(received_.size() - whole);
+  peer = fields["callerid"];
+  latching = fields["latching"] == "1";
+  state_ = State::kOpen;
+  const bool at_once = inbox_.on_open(*this);
+  events_.put(EventKind::kConnected, token, peer);
+  if (!at_once) {
+    state_ = State::kHeader;
+    loop_.change(key_, fd_, 0);
+  }
+}
+
+void InConnection::resume() {
+  if (state_ != State::kHeader) return;
+  state_ = State::kOpen;
+  loop_.change(key_, fd_, EPOLLIN);
+  take_messages();
+}
+
+void InConnection::take_messages() {
+  const auto keep_alive = shared_from_this();
+  size_t done = 0;
+  while (state_ == State::kOpen && received_.size() - done >= sizeof(uint32_t)) {
+    const uint8_t * message = received_.data() + done;
+    const size_t length = length_at(message);
+    if (length > kMostBytes) return shut("a message of " + std::to_string(length) + " bytes: that can't be");
+    if (length > kLargeBytes) {
+      std::memmove(received_.data(), message, received_.size() - done);
+      received_.set_size(received_.size() - done);
+      done = 0;
+      if (!begin_large()) return;
+      continue;
+    }
+    if (received_.size() - done < sizeof(uint32_t) + length) break;
+    inbox_.on_small(*this, message + sizeof(uint32_t), length);
+    done += sizeof(uint32_t) + length;
+  }
+  if (done == 0) return;
+  std::memmove(received_.data(), received_.data() + done, received_.size() - done);
+  received_.set_size(received_.size() - done);
+}
+
+// The received bytes begin with a large message: move it to a buffer of its own. Returns whether it was there as a whole.
+bool InConnection::begin_large() {
+  large_bytes_ = length_at(received_.data());
+  const size_t here = std::min(received_.size() - sizeof(uint32_t), large_bytes_);
+  large_ = inbox_.buffer();
+  large_->reserve(large_bytes_);
+  std::memcpy(large_->data(), received_.data() + sizeof(uint32_t), here);
+  large_->set_size(here);
+  const size_t used = sizeof(uint32_t) + here;
+  std::memmove(received_.data(), received_.data() + used, received_.size() - used);
+  received_.set_size(received_.size() - used);
+  if (large_->size() < large_bytes_) return false;
+  end_large();
+  return true;
+}
+
+void InConnection::end_large() {
+  inbox_.on_large(*this, std::move(large_));
+  large_.reset();
+}
+
+void InConnection::shut(const std::string & reason, EventKind kind) {
+  if (state_ == State::kClosed) return;
+  const auto keep_alive = shared_from_this();
+  state_ = State::kClosed;
+  if (key_) loop_.remove(key_, fd_);
+  inbox_.on_closed(*this);
+  events_.put(kind, token, reason);
+}
+
+}  // namespace plane

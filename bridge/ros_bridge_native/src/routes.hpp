@@ -1,0 +1,128 @@
+// A topic from one world to the other.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "counters.hpp"
+#include "events.hpp"
+#include "loop.hpp"
+#include "ros1_publisher.hpp"
+#include "ros1_subscription.hpp"
+#include "ros2_ends.hpp"
+#include "worker.hpp"
+
+namespace plane {
+
+// What all routes share.
+struct Machinery {
+  explicit Machinery(const std::string & caller_id_) : caller_id(caller_id_), server(std::make_shared<Server>(loop, events, caller_id_)) {}
+
+  const std::string caller_id;
+  Events events;
+  Loop loop;
+  Worker upward{"plane_to_ros2"};
+  Worker downward{"plane_to_ros1"};
+  std::shared_ptr<Server> server;
+};
+
+struct Specification {
+  TopicIdentity ros1;
+  std::string ros2_topic;
+  rcl_node_t * node;
+  const rosidl_message_type_support_t * type;
+  Quality quality;
+  Program program;
+  uint64_t token;  // names the route in events
+};
+
+class Route {
+ public:
+  virtual ~Route() = default;
+  // How many peers the end has that messages go out of, and the one that they come from.
+  virtual size_t target_peers() = 0;
+  virtual size_t source_peers() = 0;
+  Counters counters;
+
+ protected:
+  // Count a message that is none of the type, and report the first and each thousandth.
+  void count_bad(Events & events, uint64_t token, const std::string & from);
+};
+
+// ROS 1 to ROS 2.
+class UpRoute : public Route, public Inbox, public Job {
+ public:
+  UpRoute(Machinery & machinery, Specification specification);
+  ~UpRoute() override;
+
+  void connect(uint64_t token, const std::string & address, uint16_t port);
+  void disconnect(uint64_t token);
+  // Give a connection whose on_open asked for it a writer of its own.
+  void grant(uint64_t token);
+  size_t target_peers() override;
+  size_t source_peers() override { return counters.peers; }
+
+ private:
+  struct Large {
+    Frame message;
+    size_t writer;
+    int64_t arrived_ns;
+  };
+  struct Writer {
+    std::unique_ptr<Ros2Publisher> publisher;
+    std::string peer;
+    bool taken = false;
+  };
+
+  bool on_open(InConnection & connection) override;
+  void on_small(InConnection & connection, const uint8_t * message, size_t size) override;
+  Frame buffer() override { return pool_->get(); }
+  void on_large(InConnection & connection, Frame message) override;
+  void on_closed(InConnection & connection) override;
+  void work() override;
+  void publish(size_t writer, const uint8_t * message, size_t size, int64_t arrived_ns);
+  void count_peers();
+  std::unique_ptr<Ros2Publisher> make_writer() const;
+
+  Machinery & machinery_;
+  const Specification specification_;
+  std::map<uint64_t, std::shared_ptr<InConnection>> connections_;  // the loop's thread only
+  std::mutex writers_mutex_;
+  std::vector<Writer> writers_;
+  std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
+  std::mutex large_mutex_;
+  std::deque<Large> large_;
+  std::atomic<size_t> under_way_{0};  // large ones not published yet: smaller ones wait their turn behind them
+};
+
+// ROS 2 to ROS 1.
+class DownRoute : public Route, public Job {
+ public:
+  DownRoute(Machinery & machinery, Specification specification);
+  ~DownRoute() override;
+
+  void start();
+  size_t target_peers() override { return counters.peers; }
+  size_t source_peers() override { return subscription_ ? subscription_->peers() : 0; }
+
+ private:
+  void on_arrived();
+  void work() override { drain(); }
+  void drain();
+  void count_missed(const Sender & sender);
+
+  Machinery & machinery_;
+  const Specification specification_;
+  std::shared_ptr<Ros1Publisher> publisher_;
+  std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
+  std::atomic<bool> large_{false};  // once a large message has come, a worker takes them all
+  uint32_t sequence_ = 0;
+  std::map<Gid, uint64_t> last_sequence_;
+  std::unique_ptr<Ros2Subscription> subscription_;
+};
+
+}  // namespace plane
