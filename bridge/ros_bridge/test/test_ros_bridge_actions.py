@@ -1,5 +1,7 @@
 """Actions through the bridge as a process: real actionlib servers and clients in rospy, real action servers and clients in rclpy."""
 
+import os
+import signal
 import threading
 import time
 import uuid
