@@ -69,10 +69,12 @@ def condition(draw, leaf, depth=2):
     return {"and": And, "or": Or}[shape](several) if shape != "implies" else Implies(*several)
 
 
-def _effect(draw, resources):
-    names = draw(st.lists(st.sampled_from([r.name for r in resources]), max_size=2, unique=draw(st.booleans())))
-    by_name = {resource.name: resource for resource in resources}
-    return Effect("", tuple(Assignment(name, draw(st.sampled_from(by_name[name].states))) for name in names)) if names else NO_EFFECT
+def _effect(draw, resources, *, possible=False):
+    """A change or two; with ``possible`` each to a state that some arrow for skills leads to."""
+    aims = {r.name: [t.target for t in r.transitions if not t.extern] if possible else r.states for r in resources}
+    names = sorted(name for name, states in aims.items() if states)
+    chosen = draw(st.lists(st.sampled_from(names), max_size=2, unique=draw(st.booleans()))) if names else []
+    return Effect("", tuple(Assignment(name, draw(st.sampled_from(aims[name]))) for name in chosen)) if chosen else NO_EFFECT
 
 
 def datum(draw):
@@ -102,18 +104,24 @@ def _skill(draw, name, resources, timed):
     def asks(*, data=timed):
         return condition(draw, lambda d: datum(d) if data and d(st.booleans()) else atom(d, resources))
 
+    def kept():
+        return datum(draw) if timed and draw(st.booleans()) else asks()
+
+    def does():
+        return _effect(draw, resources, possible=timed)
+
     def post():
         return asks(data=False) if draw(st.booleans()) else TRUE
 
     kinds = st.sampled_from(ResultKind)
     return Skill(
         name=name,
-        preconditions=tuple(Precondition(f"p{i}", asks()) for i in range(draw(st.integers(0, 2)))),
-        start=_effect(draw, resources),
-        invariants=tuple(_invariant(draw, f"i{i}", asks(), _effect(draw, resources), timed) for i in range(draw(st.integers(0, 2)))),
+        preconditions=tuple(Precondition(f"p{i}", asks()) for i in range(draw(st.integers(0, 1 if timed else 2)))),
+        start=does(),
+        invariants=tuple(_invariant(draw, f"i{i}", kept(), does(), timed) for i in range(draw(st.integers(int(timed), 2)))),
         progress=_progress(draw, timed),
-        interrupt=Interrupt(effect=_effect(draw, resources), postcondition=post()),
-        results=tuple(Result(f"R{i}", draw(kinds), _effect(draw, resources), post()) for i in range(draw(st.integers(1, 2)))),
+        interrupt=Interrupt(effect=does(), postcondition=post()),
+        results=tuple(Result(f"R{i}", draw(kinds), does(), post()) for i in range(draw(st.integers(1, 2)))),
     )
 
 
@@ -124,7 +132,7 @@ def skillsets(draw, *, most_resources=3, most_skills=3, properties=False, events
     skills = tuple(_skill(draw, name, resources, timed) for name in SKILLS[: draw(st.integers(1, most_skills))])
     made_events = ()
     if events and draw(st.booleans()):
-        made_events = (Event("e", condition(draw, lambda d: atom(d, resources)), _effect(draw, resources)),)
+        made_events = (Event("e", condition(draw, lambda d: atom(d, resources)), _effect(draw, resources, possible=draw(st.booleans()))),)
     skillset = Skillset(
         "random", resources=resources, skills=skills, events=made_events, data=(Data("d", "float64", 1.0),) if timed else ()
     )
