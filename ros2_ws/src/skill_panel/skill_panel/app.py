@@ -80,7 +80,7 @@ class Panel(App[None]):
                 data = DataLines(id="data")
                 data.border_title = "data"
                 yield data
-        log = RichLog(id="log", max_lines=1000, wrap=True)
+        log = RichLog(id="log", max_lines=1000, wrap=True, min_width=0)
         log.border_title = "events"
         yield log
         yield Footer()
@@ -100,6 +100,8 @@ class Panel(App[None]):
 
     async def _refresh(self) -> None:
         """Show what has changed."""
+        if not self.query(SkillsetBar):  # the screen is being taken down
+            return
         watched = self._source.watched
         self._refresh_bar([one.root for one in watched])
         somebody = bool(watched)
@@ -154,7 +156,7 @@ class Panel(App[None]):
             return
         log, lines, count = self.query_one("#log", RichLog), list(one.view.log), one.view.logged
         for line in lines[-(count - self._logged) :]:
-            log.write(Text(line))
+            log.write(Text(line), width=max(log.scrollable_content_region.width, 40))
         self._logged = count
 
     # --- what is wanted ----------------------------------------------------------------------------------------------

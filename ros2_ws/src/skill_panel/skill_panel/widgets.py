@@ -54,7 +54,7 @@ class SkillsetBar(Static):
 class SkillTable(DataTable[Text]):
     """The skills, one a line; the line under the cursor is the one that keys speak of."""
 
-    COLUMNS: ClassVar[Sequence[tuple[str, int]]] = (("skill", 18), ("state", 14), ("progress", 15), ("last end", 32))
+    COLUMNS: ClassVar[Sequence[tuple[str, int]]] = (("skill", 18), ("state", 14), ("progress", 15), ("last end", 20))
 
     def on_mount(self) -> None:
         """Make the columns."""

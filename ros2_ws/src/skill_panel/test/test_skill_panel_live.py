@@ -16,6 +16,7 @@ pytest.importorskip("navigation_interfaces.action")
 
 from textual.widgets import Button, Input, RichLog, Static
 
+from skill_panel.__main__ import main
 from skill_panel.app import Panel
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watcher
@@ -85,7 +86,7 @@ class Screen:
 def test_a_skillset_is_driven_by_keyboard(skillset, watcher, tmp_path):
     memory = Memory(tmp_path / "panel.json")
 
-    async def main() -> None:
+    async def drive() -> None:
         app = Panel(watcher, where="in a test", memory=memory)
         async with app.run_test(size=SIZE) as pilot:
             screen = Screen(app, pilot)
@@ -96,7 +97,7 @@ def test_a_skillset_is_driven_by_keyboard(skillset, watcher, tmp_path):
             await refusals_are_shown(screen)
             await managers_may_go(screen, skillset)
 
-    asyncio.run(main())
+    asyncio.run(drive())
     assert Memory(tmp_path / "panel.json").texts("navigation", "takeoff") == {"height": "300", "speed": "1.5"}
 
 
@@ -156,7 +157,7 @@ async def managers_may_go(screen: Screen, served) -> None:
 
 
 def test_nobody_there(watcher):
-    async def main() -> None:
+    async def drive() -> None:
         app = Panel(watcher, where="in DDS domain 7", others=["A run is under way: ./alula panel --run here"])
         async with app.run_test(size=SIZE) as pilot:
             await pilot.pause()
@@ -167,7 +168,16 @@ def test_nobody_there(watcher):
             assert not app.query_one("#middle").display
             await pilot.press("f5", "f6", "f7", "f8", "r", "i", "right_square_bracket", "escape", "q")
 
-    asyncio.run(main())
+    asyncio.run(drive())
+
+
+def test_wrong_input_is_one_line_and_exit_code_2(tmp_path, capsys):
+    assert main(["--run", str(tmp_path)]) == 2
+    assert f"alula panel: {tmp_path} is no run's folder" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ended:
+        main(["--domain", "999"])
+    assert ended.value.code == 2
+    assert "a number from 0 to 232" in capsys.readouterr().err
 
 
 def test_the_list_says_what_runs(skillset, ros2_domain):

@@ -109,6 +109,21 @@ def test_a_busy_skill_refuses_the_second_caller_and_goes_on_for_the_first(uav, m
         assert other["navigation"].axes_authority.becomes("AVAILABLE").get(SOON_S) == "AVAILABLE"
 
 
+def test_pause_and_resume_where_the_hooks_can(uav, managers):
+    handle = uav.navigation.takeoff(height=5.0, speed=1.0)
+    managers.running()
+    assert handle.pause().get(SOON_S) == ""
+    until(lambda: handle.state is S.PAUSED, "it is paused")
+    assert handle.resume().get(SOON_S) == ""
+    until(lambda: handle.state is S.RUNNING, "it is resumed")
+    managers.hooks["takeoff"].acts["on_pause"] = lambda execution: "not in a climb"
+    assert handle.pause().get(SOON_S) == "not in a climb"
+    del managers.hooks["takeoff"].acts["on_pause"]
+    handle.interrupt()
+    assert handle.get(SOON_S).state is S.INTERRUPTED
+    assert handle.pause().get(SOON_S) == "takeoff has ended"
+
+
 def test_asyncio_awaits_skills_resources_and_data(uav, managers):
     async def main() -> None:
         handle = uav.navigation.takeoff(height=5.0, speed=1.0)

@@ -51,13 +51,18 @@ def prune(files: Mapping[str, str], out: Path) -> None:
 def _replace(new: Path, place: Path, aside: Path) -> None:
     """Move ``new`` to ``place``, what was there before to ``aside``; put that back if the move fails."""
     if place.exists():
-        place.rename(aside)
+        _move(place, aside)
     try:
-        new.rename(place)
+        _move(new, place)
     except OSError:
         if aside.exists():
-            aside.rename(place)
+            _move(aside, place)
         raise
+
+
+def _move(source: Path, target: Path) -> None:
+    """Rename; copy where the system can't rename: a folder of a lower layer, in containers."""
+    shutil.move(source, target)
 
 
 def _holds(out: Path, entry: str, texts: Mapping[str, str]) -> bool:
