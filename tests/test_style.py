@@ -13,7 +13,7 @@ ROS1_PACKAGES = ("uav_guidance", "resource_reporter", "perception_core", "zed_de
 TYPED = [
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",
-    *(f"ros2_ws/src/{name}/{name}" for name in ("skill_language", "skill_runtime", "uav_skills", "uav_missions")),
+    *(f"ros2_ws/src/{name}/{name}" for name in ("skill_language", "skill_runtime", "skill_missions", "uav_skills", "uav_missions")),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
 ]
 

@@ -1,8 +1,8 @@
 """`python -m skill_language.check_cli FILE... [--json] [--strict] [--to rl|paper]`: read models and say what is wrong with them.
 
 A model without errors is handed to the prover (``--no-proofs`` leaves that out), what that finds is told with the rest.
-Ends with 0 when all is well (warnings do not count, unless ``--strict``), 1 when a model has errors, 2 when a file can't be read:
-because it is not there, is no text, or is not in a notation (ALU0.. and ALU1..).
+Ends with 0 when all is well (warnings do not count, unless ``--strict``), 1 when a model has errors, of syntax or of meaning, or a
+property fails, 2 when a file can't be read: because it is not there, is no UTF-8 text or far too large (ALU0..).
 With ``--to`` the models are printed in that notation instead, findings go to the standard error stream.
 """
 
@@ -21,7 +21,11 @@ from skill_language.models import ModelFile, check_files
 from skill_language.notation import Notation
 from skill_language.printer import print_file
 
-UNREADABLE = ("ALU0", "ALU1")  # files, syntax
+UNREADABLE = "ALU0"
+EXIT_CODES = """
+exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of syntax) or a property fails; 2 a file can't be read
+(not there, no UTF-8 text, too large), or the arguments are wrong
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,9 +52,14 @@ def exit_code(findings: Sequence[Diagnostic]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="alula check", description="Check skill models.")
+    description = "Read skill models, say what is wrong with them and where, and prove the rest."
+    parser = argparse.ArgumentParser(prog="alula check", description=description, epilog=EXIT_CODES)
     parser.add_argument("files", nargs="+", metavar="FILE", help="skillsets in the paper's notation (*.skill) or the Robot Language (*.rl)")
-    parser.add_argument("--json", action="store_true", help="print the findings as one JSON object instead of text")
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print one JSON object: each finding's place, code, counterexample",
+    )
     parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
     parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
     parser.add_argument("--strict", action="store_true", help="make errors of warnings")

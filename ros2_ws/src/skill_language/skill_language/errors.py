@@ -1,69 +1,13 @@
-"""What is wrong with a model: findings with a stable code, their place, and how to mend it.
-
-Codes are a contract: tests, users and tools refer to them, so that a number is never given a second meaning.
-"""
+"""What is wrong with a model: findings with a stable code (``codes``), their place, and how to mend it."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
 from skill_language.model import NOWHERE, Span
-
-CODES: Mapping[str, str] = {
-    "ALU001": "a file can't be read",
-    "ALU002": "a file is not UTF-8 text",
-    "ALU003": "a file is too large for a model",
-    "ALU004": "a JSON form that is no model",
-    "ALU005": "a side file (types, bindings) that is not as it should be",
-    "ALU006": "a folder without skillsets",
-    "ALU100": "a character that the language doesn't know",
-    "ALU101": "a string without its end",
-    "ALU102": "a number out of range",
-    "ALU103": "something else was expected here",
-    "ALU104": "a block without its end",
-    "ALU105": "a condition nested too deeply",
-    "ALU106": "a block or setting given twice",
-    "ALU107": "too many errors to go on",
-    "ALU108": "a comment without its end",
-    "ALU109": "more states than a resource can have",
-    "ALU201": "a name defined twice",
-    "ALU202": "unknown resource",
-    "ALU203": "unknown state",
-    "ALU204": "unknown effect",
-    "ALU205": "unknown type",
-    "ALU206": "unknown data",
-    "ALU207": "a resource without an initial state",
-    "ALU208": "an initial state that has no arrow",
-    "ALU209": "an effect that no arrow of the resource allows",
-    "ALU210": "an effect that would need an extern arrow",
-    "ALU211": "a period that is not positive",
-    "ALU212": "a resource set twice by one effect",
-    "ALU213": "data where only resources may be asked",
-    "ALU214": "a comparison that makes no sense for its value",
-    "ALU215": "a name that the generated interface needs for itself",
-    "ALU216": "a name that ROS doesn't allow",
-    "ALU217": "two names that become one in generated code",
-    "ALU218": "a skill that can't end by itself nor be ended",
-    "ALU219": "a unit that is not known",
-    "ALU220": "a progress deadline that is no longer than the period",
-    "ALU221": "a duration or a recovery value that makes no sense",
-    "ALU222": "unknown skill",
-    "ALU223": "an execution asked where only properties may",
-    "ALU224": "unknown skillset",
-    "ALU301": "an effect that is never used",
-    "ALU302": "a state that can't be reached",
-    "ALU303": "a type that is never used",
-    "ALU304": "an input or output that has the name of a resource or data",
-    "ALU401": "a type without an entry in types.yaml",
-    "ALU402": "a binding for something that isn't there",
-    "ALU403": "data that no topic is bound to",
-    "ALU404": "two skillsets of one name",
-    "ALU405": "data of a type that no topic can carry",
-    "ALU406": "a file that does not hold exactly one skillset where one is needed",
-}
 
 
 class Severity(Enum):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hypothesis import strategies as st
 
 from skill_language.model import (
@@ -9,15 +11,20 @@ from skill_language.model import (
     TRUE,
     And,
     Assignment,
+    Comparison,
     Constant,
+    Data,
+    DataIs,
     Effect,
     Event,
+    Hold,
     Implies,
     Interrupt,
     Invariant,
     Not,
     Or,
     Precondition,
+    Progress,
     Property,
     PropertyKind,
     Resource,
@@ -32,6 +39,7 @@ from skill_language.model import (
 
 RESOURCES = ("r", "q", "p")
 SKILLS = ("f", "g", "h")
+VALUES = (0.0, 1.0, 2.0)
 
 
 def _resources(draw, most):
@@ -62,37 +70,64 @@ def condition(draw, leaf, depth=2):
 
 
 def _effect(draw, resources):
-    names = draw(st.lists(st.sampled_from([r.name for r in resources]), max_size=2, unique=True))
+    names = draw(st.lists(st.sampled_from([r.name for r in resources]), max_size=2, unique=draw(st.booleans())))
     by_name = {resource.name: resource for resource in resources}
     return Effect("", tuple(Assignment(name, draw(st.sampled_from(by_name[name].states))) for name in names)) if names else NO_EFFECT
 
 
-def _skill(draw, name, resources):
-    def asks():
-        return condition(draw, lambda d: atom(d, resources))
+def datum(draw):
+    """An atom over one number; its threshold is one of the values that tests give."""
+    comparison = draw(st.sampled_from([Comparison.LT, Comparison.LE, Comparison.GT, Comparison.GE, Comparison.EQ]))
+    return DataIs("d", (), comparison, draw(st.sampled_from(VALUES)))
+
+
+def _hold(draw, asked):
+    """Patience for a condition, or none; recovery values go with a threshold and lie on its good side."""
+    for_s = draw(st.sampled_from([0.0, 0.0, 1.0, 2.0]))
+    good_side = {Comparison.LT: -1.0, Comparison.LE: -1.0, Comparison.GT: 1.0, Comparison.GE: 1.0}
+    recovers = isinstance(asked, DataIs) and asked.comparison in good_side and draw(st.booleans())
+    hysteresis = asked.value + good_side[asked.comparison] if recovers else None
+    return Hold(for_s, hysteresis) if for_s or recovers else None
+
+
+def _invariant(draw, name, asked, effect, timed):
+    return Invariant(name, asked, effect, _hold(draw, asked) if timed else None)
+
+
+def _progress(draw, timed):
+    return Progress(0.1, deadline_s=draw(st.sampled_from([1.5, 3.0]))) if timed and draw(st.booleans()) else None
+
+
+def _skill(draw, name, resources, timed):
+    def asks(*, data=timed):
+        return condition(draw, lambda d: datum(d) if data and d(st.booleans()) else atom(d, resources))
 
     def post():
-        return asks() if draw(st.booleans()) else TRUE
+        return asks(data=False) if draw(st.booleans()) else TRUE
 
     kinds = st.sampled_from(ResultKind)
     return Skill(
         name=name,
         preconditions=tuple(Precondition(f"p{i}", asks()) for i in range(draw(st.integers(0, 2)))),
         start=_effect(draw, resources),
-        invariants=tuple(Invariant(f"i{i}", asks(), _effect(draw, resources)) for i in range(draw(st.integers(0, 2)))),
+        invariants=tuple(_invariant(draw, f"i{i}", asks(), _effect(draw, resources), timed) for i in range(draw(st.integers(0, 2)))),
+        progress=_progress(draw, timed),
         interrupt=Interrupt(effect=_effect(draw, resources), postcondition=post()),
         results=tuple(Result(f"R{i}", draw(kinds), _effect(draw, resources), post()) for i in range(draw(st.integers(1, 2)))),
     )
 
 
 @st.composite
-def skillsets(draw, *, most_resources=3, most_skills=3, properties=False, events=True):
+def skillsets(draw, *, most_resources=3, most_skills=3, properties=False, events=True, timed=False):
+    """``timed`` models ask a number ``d``, wait, and have progress deadlines."""
     resources = _resources(draw, most_resources)
-    skills = tuple(_skill(draw, name, resources) for name in SKILLS[: draw(st.integers(1, most_skills))])
+    skills = tuple(_skill(draw, name, resources, timed) for name in SKILLS[: draw(st.integers(1, most_skills))])
     made_events = ()
     if events and draw(st.booleans()):
         made_events = (Event("e", condition(draw, lambda d: atom(d, resources)), _effect(draw, resources)),)
-    skillset = Skillset("random", resources=resources, skills=skills, events=made_events)
+    skillset = Skillset(
+        "random", resources=resources, skills=skills, events=made_events, data=(Data("d", "float64", 1.0),) if timed else ()
+    )
     return skillset if not properties else draw(_with_properties(skillset))
 
 
@@ -107,4 +142,4 @@ def _with_properties(draw, skillset):
     for number, kind in enumerate(draw(st.lists(st.sampled_from(PropertyKind), min_size=1, max_size=3))):
         consequence = condition(draw, leaf, 1) if kind is PropertyKind.LEADS_TO else None
         wanted.append(Property(f"w{number}", kind, condition(draw, leaf, 1), consequence, draw(st.booleans())))
-    return Skillset(skillset.name, resources=skillset.resources, skills=skillset.skills, events=skillset.events, properties=tuple(wanted))
+    return replace(skillset, properties=tuple(wanted))

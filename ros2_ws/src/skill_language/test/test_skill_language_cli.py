@@ -28,8 +28,8 @@ def write(folder, **texts):
         ({"a": SOUND}, 0),
         ({"a": WARNED}, 0),
         ({"a": SOUND, "b": WRONG}, 1),
-        ({"a": BROKEN}, 2),
-        ({"a": ""}, 2),
+        ({"a": BROKEN}, 1),
+        ({"a": ""}, 1),
         ({"a": b"\xff\xfe"}, 2),
         ({"a": BROKEN, "b": b"\xff\xfe"}, 2),
     ],
@@ -80,8 +80,57 @@ def test_json(tmp_path, capsys):
 def test_as_a_program(tmp_path):
     (path,) = write(tmp_path, a=BROKEN)
     done = subprocess.run([sys.executable, "-m", "skill_language.check_cli", path], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
+    assert done.returncode == 1
     assert "did you mean `skill`?" in done.stdout
     assert done.stderr == ""
     done = subprocess.run([sys.executable, "-m", "skill_language.check_cli"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
+
+
+UAV = """
+type Pose
+
+skillset uav {
+  data pose: Pose period 100 ms
+  resource {
+    authority {
+      state { Pilot Drone None }
+      initial Pilot
+      transition { Pilot -> None  None -> Pilot  None -> Drone  Drone -> None }
+    }
+    motion { state { Free Used } initial Free transition all }
+  }
+  event {
+    pilot_lets_go { guard authority == Pilot effect authority -> None }
+    drone_takes { guard authority == None effect authority -> Drone }
+    drone_lets_go { guard authority == Drone effect authority -> None }
+  }
+  skill goto {
+    input target: Pose
+    precondition { nobody_flies: authority != Pilot  free: motion == Free }
+    start motion -> Used
+    invariant {
+      in_control { guard authority == Drone effect motion -> Free }
+    }
+    interrupt { interrupting false effect motion -> Free }
+    success arrived { effect motion -> Free postcondition motion == Free }
+    failure blocked { effect motion -> Free }
+  }
+}
+"""
+
+
+def test_a_proof_that_fails_is_told_with_its_place_its_line_and_its_story(tmp_path, capsys):
+    path = tmp_path / "uav.rl"
+    path.write_text(UAV)
+    assert main([str(path), "--json"]) == 1
+    (file,) = json.loads(capsys.readouterr().out)["files"]
+    (finding,) = [f for f in file["findings"] if f["severity"] == "error"]
+    line = next(number for number, text in enumerate(UAV.split("\n"), 1) if "in_control" in text)
+    assert (finding["code"], finding["line"], finding["column"]) == ("ALU510", line, 7)
+    assert finding["counterexample"][0] == "authority == None"
+    assert finding["counterexample"][-1].endswith("`in_control` of goto is false and ends it: motion Used -> Free")
+    assert main([str(path)]) == 1
+    assert f"{line:5} |       in_control {{ guard authority == Drone" in capsys.readouterr().out
+    path.write_text(UAV.replace("authority != Pilot", "authority == Drone"))
+    assert main([str(path)]) == 0

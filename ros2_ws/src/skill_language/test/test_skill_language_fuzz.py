@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import time
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from hypothesis import given, settings
@@ -10,12 +14,32 @@ from hypothesis import strategies as st
 from test_skill_language_listings import LISTING_2, LISTING_3
 
 from skill_language.check import check
+from skill_language.check_cli import main
 from skill_language.errors import LanguageError
 from skill_language.lexer import MAX_CHARACTERS, MAX_ERRORS
 from skill_language.load import load_skillset
 from skill_language.paper import parse
 
 WHOLE = f"skillset navigation {{ type Point data p: Point period = 1 {LISTING_2} {LISTING_3} }}"
+ROBOT_LANGUAGE = """
+type Point
+skillset s {
+  data d: float64 period 100 ms
+  resource r { state { A B } initial A transition { A -> B  extern B -> A } }
+  event e { guard r == B effect r -> A }
+  skill f {
+    input x: Point
+    precondition p: r == A and not d < 3 %
+    start r -> B
+    invariant { i { guard d >= 10 for 2 s recovers at 12 effect { r -> B r -> B } } }
+    progress { period 1 sec deadline 5 s message y: float64 }
+    interrupt { interrupting false effect r -> B postcondition r == B => true }
+    success ok { effect r -> B } // done
+    failure { KO {} }
+  }
+  property q: f running leads to r == A assuming termination
+}
+"""
 PIECES = [*"{}():=", "==", "->", "=>", "not", "and", "skill", "resource", "data", "initial", '"', "//", "0.5", "1e999", "é", "\0", "\n"]
 
 
@@ -51,6 +75,23 @@ def test_any_row_of_words(text):
 @given(st.integers(0, len(WHOLE)), st.integers(0, 30), st.sampled_from(["", *PIECES]))
 def test_a_model_with_something_cut_out_or_put_in(place, length, piece):
     read(WHOLE[:place] + piece + WHOLE[place + length :])
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_the_whole_check_of_a_mutated_model_of_the_robot_language(data):
+    """Many single characters changed, put in or left out, then all that `./alula check` does: an exit code, and text or JSON."""
+    text = list(ROBOT_LANGUAGE)
+    for _ in range(data.draw(st.integers(0, 12))):
+        place = data.draw(st.integers(0, len(text)))
+        text[place : place + data.draw(st.integers(0, 2))] = data.draw(st.sampled_from(["", *PIECES, *"abAZ09_.>< \t"]))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "x.rl"
+        path.write_text("".join(text), encoding=data.draw(st.sampled_from(["utf-8", "utf-8", "latin-1", "utf-16"])))
+        with redirect_stdout(StringIO()) as told:
+            code = main([str(path), "--time", "5", *data.draw(st.sampled_from([[], ["--json"]]))])
+        assert code in {0, 1, 2}
+        assert told.getvalue().strip()
 
 
 def test_what_is_cut_is_found():

@@ -156,6 +156,17 @@ def test_the_bridge_configuration(files):
     }
 
 
+def test_events_can_be_triggered_from_the_other_world(tmp_path):
+    folder = tmp_path / "lamp"
+    folder.mkdir()
+    (folder / "lamp.skill").write_text("skillset lamp { resource r { initial A A -> B B -> A } event e { effect { r -> B } } }")
+    services = yaml.safe_load(robot_files(load_robot(folder))["lamp_bridge.yaml"])["services"]
+    assert [(service["name"], service["type"]) for service in services] == [
+        ("/lamp/transition", "skillset_interfaces/Transition"),
+        ("/lamp/trigger", "skillset_interfaces/TriggerEvent"),
+    ]
+
+
 def test_a_robot_of_nothing(tmp_path):
     folder = tmp_path / "stone"
     folder.mkdir()

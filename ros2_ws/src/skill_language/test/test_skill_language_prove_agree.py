@@ -6,7 +6,7 @@ import itertools
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from skill_language_prove_models import skillsets
+from skill_language_prove_models import VALUES, skillsets
 
 from skill_language.model import TRUE
 from skill_language.prove.abstract import without_data
@@ -37,7 +37,7 @@ def graph_of(skillset):
 
 
 @settings(max_examples=60, **QUIET)
-@given(skillsets(most_resources=2))
+@given(skillsets(most_resources=2) | skillsets(most_resources=2, timed=True))
 def test_sets_hold_every_situation_and_where_no_order_matters_no_other(skillset):
     graph = graph_of(skillset)
     if not graph.complete:
@@ -50,7 +50,7 @@ def test_sets_hold_every_situation_and_where_no_order_matters_no_other(skillset)
 
 
 @settings(max_examples=60, **QUIET)
-@given(skillsets(properties=True, most_resources=2))
+@given(skillsets(properties=True, most_resources=2) | skillsets(properties=True, most_resources=2, timed=True))
 def test_both_searches_find_the_same(skillset):
     _certain, suspects = local_checks(skillset, ANY_TIME)
     plain = without_data(skillset, ANY_TIME)
@@ -78,89 +78,135 @@ def found(findings):
 # --- the runtime ------------------------------------------------------------------------------------------------------
 
 
-def engine_of(skillset):
-    hooks = {skill.name: SkillHooks() for skill in skillset.skills}
-    return SkillsetEngine(skillset, lambda: 0, hooks, lambda _events: None)
+class Bench:
+    """An engine on a clock that the test sets."""
+
+    def __init__(self, skillset):
+        hooks = {skill.name: SkillHooks() for skill in skillset.skills}
+        self.skillset = skillset
+        self.now_ns = 0
+        self.engine = SkillsetEngine(skillset, lambda: self.now_ns, hooks, lambda _events: None)
+
+    def state(self):
+        resources = tuple(self.engine.resources[resource.name].state for resource in self.skillset.resources)
+        return resources, tuple(sorted(execution.skill for execution in self.engine.executions))
+
+    def give(self, stimulus):
+        engine = self.engine
+        match stimulus:
+            case ("extern", resource, state):
+                engine.transition(resource, state)
+            case ("event", event):
+                engine.trigger(event)
+            case ("start", skill):
+                engine.request(skill, {})
+            case ("terminate", _, execution, result):
+                engine.terminate(execution, result)
+            case ("interrupt", _, execution):
+                engine.interrupt(execution)
+            case ("fail", _, execution):
+                engine.fail(execution, "asked to")
+            case ("value", _, value):
+                engine.update_data("d", value)
+            case ("time", "to the next moment", _):
+                self.now_ns = max(self.now_ns, engine.due_ns or 0)
+                engine.tick()
+            case ("time", "on", milliseconds):
+                self.now_ns += milliseconds * 1_000_000
+                engine.tick()
+
+    def stimuli(self, copies):
+        """Return what may be done now: half of it to what runs, so that walks get somewhere."""
+        running = [execution.skill for execution in self.engine.executions]
+        given = [("extern", r.name, state) for r in self.skillset.resources for state in r.states]
+        given += [("event", event.name) for event in self.skillset.events]
+        given += [("start", skill.name) for skill in self.skillset.skills if running.count(skill.name) < copies]
+        if self.skillset.data:
+            given += [("value", "d", value) for value in (*VALUES, None)]
+            given += [("time", "to the next moment", 0), ("time", "on", 400)]
+        for execution in self.engine.executions:
+            results = self.skillset.skill(execution.skill).results
+            given += [("terminate", execution.skill, execution.id, result.name) for result in results]
+            given += [("interrupt", execution.skill, execution.id), ("fail", execution.skill, execution.id)]
+        return given
 
 
-def state_of(world, engine):
-    resources = tuple(engine.resources[resource.name].state for resource in world.skillset.resources)
-    return resources, tuple(sorted(execution.skill for execution in engine.executions))
+def asked(edge, stimulus):
+    """Tell whether the checker's step is what a stimulus asks for; a failure does what an interruption does."""
+    kind = {"fail": "interrupt"}.get(stimulus[0], stimulus[0])
+    return edge.kind in {kind, "interrupt"} and edge.subject[0] == stimulus[1]
 
 
-@settings(max_examples=60, **QUIET)
-@given(skillsets(most_resources=2, events=False), st.data())
-def test_the_runtime_goes_where_the_checker_says_and_nowhere_else(skillset, data):
+def followed(graph, numbers):
+    """Return these situations and what data and time make of them: they break one execution after the other."""
+    stuck = {("interrupt", s.name) for s in graph.world.skillset.skills if s.progress is not None}
+    found, todo = set(numbers), list(numbers)
+    while todo:
+        for edge in graph.edges[todo.pop()]:
+            if (edge.kind == "data" or (edge.kind, edge.subject[0]) in stuck) and edge.target not in found:
+                found.add(edge.target)
+                todo.append(edge.target)
+    return found
+
+
+def walk(skillset, data, steps):
+    """Give stimuli to the runtime; every situation that it comes to must be one that the checker's steps lead to."""
     graph = graph_of(skillset)
-    engine = engine_of(skillset)
     if not graph.complete:
         return
+    bench = Bench(skillset)
     numbers = {0}
-    for _ in range(12):
-        stimulus = data.draw(st.sampled_from(stimuli(skillset, engine, graph.world.copies)))
-        before = state_of(graph.world, engine)
-        give(engine, stimulus)
-        after = state_of(graph.world, engine)
-        if after == before:
-            continue
-        kinds = {"fail": "interrupt"}.get(stimulus[0], stimulus[0])
-        ways = [e for n in numbers for e in graph.edges[n] if e.kind in {kinds, "interrupt"} and e.subject[0] == stimulus[1]]
-        numbers = {e.target for e in ways if plain(graph.states[e.target]) == after}
+    for _ in range(steps):
+        stimulus = data.draw(st.sampled_from(bench.stimuli(graph.world.copies)))
+        before = bench.state()
+        bench.give(stimulus)
+        after = bench.state()
+        ways = {e.target for n in numbers for e in graph.edges[n] if asked(e, stimulus)}
+        if stimulus[0] in {"value", "time"} or after == before:
+            ways |= numbers
+        if skillset.data:
+            ways = followed(graph, ways)
+        numbers = {n for n in ways if plain(graph.states[n]) == after}
         assert numbers, (stimulus, before, after)
 
 
 @settings(max_examples=60, **QUIET)
-@given(skillsets(most_resources=2, events=False))
+@given(skillsets(most_resources=2), st.data())
+def test_the_runtime_goes_where_the_checker_says_and_nowhere_else(skillset, data):
+    walk(skillset, data, 12)
+
+
+@settings(max_examples=120, **QUIET)
+@given(skillsets(most_resources=2, most_skills=2, timed=True), st.data())
+def test_it_does_with_data_durations_and_deadlines_too(skillset, data):
+    walk(skillset, data, 16)
+
+
+@settings(max_examples=60, **QUIET)
+@given(skillsets(most_resources=2))
 def test_every_step_of_the_checker_can_be_taken_in_the_runtime(skillset):
     graph = graph_of(skillset)
     for number in range(min(len(graph.states), 12)):
-        engine = engine_of(skillset)
+        bench = Bench(skillset)
         for edge in graph.path(number):
-            follow(engine, edge)
-        assert state_of(graph.world, engine) == plain(graph.states[number])
+            follow(bench, edge)
+        assert bench.state() == plain(graph.states[number])
 
 
 def plain(state):
     return state.resources, tuple(sorted(state.running))
 
 
-def stimuli(skillset, engine, copies):
-    running = [execution.skill for execution in engine.executions]
-    given = [("extern", r.name, state) for r in skillset.resources for state in r.states]
-    given += [("start", skill.name) for skill in skillset.skills if running.count(skill.name) < copies]
-    for execution in engine.executions:
-        results = skillset.skill(execution.skill).results
-        given += [("terminate", execution.skill, execution.id, result.name) for result in results]
-        given += [("interrupt", execution.skill, execution.id), ("fail", execution.skill, execution.id)]
-    return given
-
-
-def give(engine, stimulus):
-    match stimulus:
-        case ("extern", resource, state):
-            engine.transition(resource, state)
-        case ("start", skill):
-            engine.request(skill, {})
-        case ("terminate", _, execution, result):
-            engine.terminate(execution, result)
-        case ("interrupt", _, execution):
-            engine.interrupt(execution)
-        case ("fail", _, execution):
-            engine.fail(execution, "asked to")
-
-
-def follow(engine, edge):
+def follow(bench, edge):
     """Take a step of the checker; of several executions of a skill any one: these tests compare what is left of all."""
-    oldest = next((e.id for e in engine.executions if e.skill == edge.subject[0]), "")
+    oldest = next((e.id for e in bench.engine.executions if e.skill == edge.subject[0]), "")
     match edge.kind:
-        case "extern":
-            give(engine, ("extern", *edge.subject))
-        case "start":
-            give(engine, ("start", *edge.subject))
+        case "extern" | "event" | "start":
+            bench.give((edge.kind, *edge.subject))
         case "terminate":
-            give(engine, ("terminate", edge.subject[0], oldest, edge.subject[1]))
+            bench.give(("terminate", edge.subject[0], oldest, edge.subject[1]))
         case _:
-            give(engine, ("interrupt", edge.subject[0], oldest))
+            bench.give(("interrupt", edge.subject[0], oldest))
 
 
 # --- z3 ---------------------------------------------------------------------------------------------------------------
@@ -209,7 +255,13 @@ def every_state(skillset):
 
 
 def fits(skillset, effect, states):
-    return all(skillset.resource(a.resource).has_arrow(states[a.resource], a.target, extern=False) for a in effect.assignments)
+    states = dict(states)
+    for change in effect.assignments:
+        source = states[change.resource]
+        if source != change.target and not skillset.resource(change.resource).has_arrow(source, change.target, extern=False):
+            return False
+        states[change.resource] = change.target
+    return True
 
 
 def after(effect, states):

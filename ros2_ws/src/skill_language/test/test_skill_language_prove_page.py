@@ -7,15 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from skill_language.codes import PROOF_CODES
 from skill_language.errors import Severity, has_errors
 from skill_language.models import check_files
-from skill_language.prove import CODES, prove
+from skill_language.notation import Notation, read
+from skill_language.printer import print_file
+from skill_language.prove import prove
 
 PAGE = next(p / "skillsets" / "PROOFS.md" for p in Path(__file__).resolve().parents if (p / "skillsets" / "PROOFS.md").exists())
 SECTION = re.compile(r"^### (ALU\d+): (.*?)\n(.*?)(?=^### |\Z)", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 SECTIONS = {code: (title, BLOCK.findall(body)) for code, title, body in SECTION.findall(PAGE.read_text())}
-WITH_EXAMPLE = sorted(set(CODES) - {"ALU540"})
+WITH_EXAMPLE = sorted(set(PROOF_CODES) - {"ALU540"})
 
 
 def proved(tmp_path, text, **options):
@@ -28,7 +31,7 @@ def proved(tmp_path, text, **options):
 
 
 def test_the_page_has_every_code_by_its_meaning():
-    assert {code: title for code, (title, _) in SECTIONS.items()} == CODES
+    assert {code: title for code, (title, _) in SECTIONS.items()} == PROOF_CODES
 
 
 @pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
@@ -44,6 +47,19 @@ def test_example_and_mended_twin(code, most, tmp_path):
     assert shown
     assert all(finding.span.line for finding in shown)
     assert proved(tmp_path, mended, most=most) == []
+
+
+@pytest.mark.parametrize("code", WITH_EXAMPLE)
+def test_the_same_is_found_in_the_papers_notation(code, tmp_path):
+    (_, broken), _, (_, mended) = SECTIONS[code][1]
+    for text in (broken, mended):
+        document, source = read(text, "example.rl")
+        assert source.diagnostics == []
+        path = tmp_path / "example.skill"
+        path.write_text(print_file(document.skillsets, Notation.PAPER, []))
+        (file,) = check_files([path])
+        assert not has_errors(file.findings), file.findings
+        assert {f.code for f in prove(file.skillsets[0])} == {f.code for f in proved(tmp_path, text)}
 
 
 def test_time_is_bounded_and_said(tmp_path):

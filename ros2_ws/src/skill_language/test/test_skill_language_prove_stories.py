@@ -136,3 +136,16 @@ def test_the_benchmark_measures(capsys):
     row = json.loads(capsys.readouterr().out)
     assert (row["family"], row["size"], row["proved"], row["findings"]) == ("neighbours", 6, True, [])
     assert row["seconds"] > 0
+
+
+def test_the_benchmark_tells_each_line_and_writes_what_it_measured(capsys, tmp_path):
+    path = tmp_path / "bench.json"
+    assert bench.main(["--sizes", "2", "--json", str(path), "--timeout", "60"]) == 0
+    rows = json.loads(path.read_text())["proofs"]
+    assert [(row["family"], row["method"], row["size"], row["proved"]) for row in rows] == [
+        ("tools", "one by one", 2, True),
+        ("tools", "sets", 2, True),
+        ("neighbours", "one by one", 2, True),
+        ("neighbours", "sets", 2, True),
+    ]
+    assert len(capsys.readouterr().out.splitlines()) == 5

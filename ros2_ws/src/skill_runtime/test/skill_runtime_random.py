@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from itertools import pairwise, permutations
 
 from hypothesis import strategies as st
@@ -204,27 +204,42 @@ def check_executions(bench):
     return told
 
 
-def check_effects(bench, told):
-    """Each effect that an execution's states call for was applied once and whole, and no other."""
-    causes = Counter(event.cause for event in bench.events if isinstance(event, TransitionEvent) and event.cause != "extern")
-    expected: Counter[str] = Counter()
+def called_for(skill, event, before):
+    """Return the effect that an execution's new state calls for; ``before`` are the states it was in."""
+    match event.state:
+        case S.RUNNING if S.RUNNING not in before:  # again after a pause
+            return skill.start
+        case S.TERMINATED:
+            return skill.result(event.result).effect
+        case S.RESOURCE_INVARIANT_VIOLATED:
+            return next(i.effect for i in skill.invariants if i.name == event.result)
+        case S.INTERRUPTED | S.FAILED if S.RUNNING in before:
+            return skill.interrupt.effect
+    return Effect()
+
+
+def check_effects(bench):
+    """Each effect that an execution's states call for was applied once and whole, just before, and no other.
+
+    What is in the wanted state already does not change.
+    """
+    states = {resource.name: resource.initial for resource in bench.skillset.resources}
+    before = defaultdict(list)
+    pending: list[TransitionEvent] = []
     for event in bench.events:
-        if isinstance(event, ExecutionEvent):
-            skill = bench.skillset.skill(event.skill)
-            prefix = f"{event.skill} {event.id} "
-            if event.state is S.RUNNING:  # again after a pause
-                expected[prefix + "begin"] = len(skill.start.assignments)
-            elif event.state is S.TERMINATED:
-                expected[f"{prefix}end{event.result}"] += len(skill.result(event.result).effect.assignments)
-            elif event.state is S.INTERRUPTED and S.RUNNING in told[event.id]:
-                expected[prefix + "cut"] += len(skill.interrupt.effect.assignments)
-            elif event.state is S.FAILED and S.RUNNING in told[event.id]:
-                expected[prefix + "cut"] += causes[prefix + "cut"] and len(skill.interrupt.effect.assignments)
-            elif event.state is S.RESOURCE_INVARIANT_VIOLATED:
-                effect = next(i.effect for i in skill.invariants if i.name == event.result)
-                applied = 0 if "has no transition" in event.message else len(effect.assignments)
-                expected[prefix + effect.name] += applied
-    assert +causes == +expected
+        if isinstance(event, TransitionEvent):
+            pending.append(event)
+            continue
+        own = [change for change in pending if change.cause.startswith(f"{event.skill} {event.id} ")]
+        states |= {change.resource: change.to_state for change in pending if change not in own}
+        effect = called_for(bench.skillset.skill(event.skill), event, before[event.id])
+        wanted = [(a.resource, a.target) for a in effect.assignments if states[a.resource] != a.target]
+        found = [(change.resource, change.to_state) for change in own]
+        impossible = event.state is S.RESOURCE_INVARIANT_VIOLATED and "has no transition" in event.message
+        assert found == ([] if impossible or (event.state is S.FAILED and not own) else wanted)
+        states |= {change.resource: change.to_state for change in own}
+        before[event.id].append(event.state)
+        pending = []
 
 
 def check_invariants(bench):

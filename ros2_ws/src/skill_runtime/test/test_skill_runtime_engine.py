@@ -6,7 +6,7 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, TAKE, Bench, Recorder, flying_skill, flying_skillset
+from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, Recorder, flying_skill, flying_skillset
 
 from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
 from skill_runtime.core import ExecutionState, SkillsetEngine
@@ -57,12 +57,32 @@ def test_a_second_execution_is_for_the_preconditions_to_forbid():
     assert [bench.run("watch").state, bench.run("watch").state] == [S.RUNNING, S.RUNNING]
 
 
+LOSE_SDK = Effect("lose_sdk", (Assignment("sdk", "UNAVAILABLE"),))  # an extern arrow: not for skills
+
+
 def test_a_start_effect_that_is_no_transition_refuses_and_names_all():
-    skill = flying_skill("takeoff", preconditions=(), start=RELEASE)
+    skill = flying_skill("takeoff", preconditions=(), start=LOSE_SDK)
     execution = Bench(flying_skillset(skill)).run()
     assert execution.state is S.NOT_READY
-    for word in ("takeoff", "release_control", "axes", "AVAILABLE -> AVAILABLE"):
+    for word in ("takeoff", "lose_sdk", "sdk", "AVAILABLE -> UNAVAILABLE for skills"):
         assert word in execution.message
+
+
+def test_a_resource_that_is_in_the_wanted_state_stays_there_without_a_change():
+    skill = flying_skill("takeoff", preconditions=(), start=RELEASE, invariants=())
+    bench = Bench(flying_skillset(skill))
+    execution = bench.run()
+    assert execution.state is S.RUNNING
+    execution.terminate("DONE")
+    assert bench.story() == ["sdk AVAILABLE", "REQUESTED", "RUNNING", "TERMINATED"]
+
+
+def test_changes_of_one_resource_follow_each_other():
+    there_and_back = Effect("blink", (Assignment("axes", "USED"), Assignment("axes", "AVAILABLE")))
+    skill = flying_skill("takeoff", preconditions=(), start=there_and_back, invariants=())
+    bench = Bench(flying_skillset(skill))
+    bench.run()
+    assert bench.story()[1:] == ["REQUESTED", "axes USED", "axes AVAILABLE", "RUNNING"]
 
 
 def test_effects_are_applied_as_one_or_not_at_all():
@@ -124,12 +144,13 @@ def test_violations_cascade_in_order_of_start_and_none_is_mended_by_another():
 
 
 def test_a_violation_effect_that_is_no_transition_is_told_and_not_applied():
-    skill = flying_skill("takeoff", invariants=(Invariant("keep_sdk", SDK, TAKE),))
-    bench = Bench(flying_skillset(skill))
+    skill = flying_skill("takeoff", invariants=(Invariant("free", AXES_FREE, LOSE_SDK),), start=RESET)
+    bench = Bench(flying_skillset(skill, flying_skill("land", invariants=())))
     execution = bench.run()
-    bench.engine.transition("sdk", "UNAVAILABLE")
+    bench.run("land")
     assert execution.state is S.RESOURCE_INVARIANT_VIOLATED
-    assert "USED -> USED" in execution.message
+    assert "AVAILABLE -> UNAVAILABLE" in execution.message
+    assert bench.states() == {"sdk": "AVAILABLE", "axes": "USED"}
 
 
 def test_an_invariant_false_from_the_start_dispatches_nothing():

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from skill_runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, Recorder, flying_skill, flying_skillset
 
 from skill_language.model import Assignment, Comparison, Data, DataIs, Effect, Event, Hold, Implies, Interrupt, Invariant, Or, Progress
@@ -245,11 +247,11 @@ def test_an_event_is_taken_with_all_that_it_breaks():
 
 
 def test_an_event_is_refused_with_a_reason_and_changes_nothing():
-    twice = Event("twice", effect=Effect("", (Assignment("axes", "USED"), Assignment("sdk", "UNAVAILABLE"))))
-    bench = Bench(flying_skillset(events=(LOSE_SDK, twice)), authority=False)
+    wild = Event("wild", effect=Effect("", (Assignment("axes", "USED"), Assignment("sdk", "BROKEN"))))
+    bench = Bench(flying_skillset(events=(LOSE_SDK, wild)), authority=False)
     assert bench.engine.trigger("lose_sdk").reason == "event lose_sdk: its guard is false: sdk is UNAVAILABLE"
-    assert "sdk is UNAVAILABLE and has no transition UNAVAILABLE -> UNAVAILABLE" in bench.engine.trigger("twice").reason
-    assert bench.engine.trigger("nosuch").reason == "skillset flying has no event nosuch; it has lose_sdk, twice"
+    assert bench.engine.trigger("wild").reason == "event wild: resource sdk is UNAVAILABLE and has no transition UNAVAILABLE -> BROKEN"
+    assert bench.engine.trigger("nosuch").reason == "skillset flying has no event nosuch; it has lose_sdk, wild"
     assert bench.events == []
 
 
@@ -272,3 +274,53 @@ def test_stop_hooks_of_what_time_ends_are_deferred():
     (job,) = jobs
     job()
     assert hooks["takeoff"].calls[-1] == "on_failure"
+
+
+# --- against a slow and obvious reading of the language page -----------------------------------------------------------
+
+STEP_MS = 250
+TRACES = st.lists(st.sampled_from([None, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0]), min_size=1, max_size=24)
+"""What is received every 250 ms from the start on; None is a lost value."""
+
+
+def breaks_at_ms(values, hold):
+    """Return when `fps >= 10`, patient by ``hold``, is broken in a trace whose last value stays, by looking at every millisecond."""
+    fallen, false_for_ms = False, 0
+    for_ms = hold.for_s * 1000
+    for now_ms in range(len(values) * STEP_MS + 5000):
+        if for_ms and false_for_ms >= for_ms:
+            return now_ms  # what comes now is too late
+        value = values[min(now_ms // STEP_MS, len(values) - 1)]
+        if value is not None and now_ms % STEP_MS == 0 and now_ms // STEP_MS < len(values):
+            fallen = value < 10.0 or (fallen and value < (hold.hysteresis or 10.0))
+        if value is not None and value >= 10.0 and not fallen:
+            false_for_ms = 0
+            continue
+        if not for_ms:
+            return now_ms
+        false_for_ms += 1
+    return None
+
+
+@settings(max_examples=60, deadline=None)
+@given(TRACES, st.sampled_from([Hold(0.5), Hold(1.0, 12.0), Hold(hysteresis=12.0), Hold(0.3, 11.0)]), st.booleans())
+def test_an_invariant_breaks_when_the_page_says_so(values, hold, punctual):
+    bench = watching(hold)
+    execution = bench.run("film")
+    for number, value in enumerate(values):
+        pass_to(bench, number * STEP_MS, punctual=punctual)
+        bench.fps(value)
+    pass_to(bench, len(values) * STEP_MS + 4999, punctual=punctual)
+    bench.engine.tick()
+    expected_ms = breaks_at_ms(values, hold)
+    assert execution.done == (expected_ms is not None)
+    if punctual and expected_ms is not None:
+        (ended,) = [event for event in bench.events if getattr(event, "state", None) is S.RESOURCE_INVARIANT_VIOLATED]
+        assert ended.stamp_ns == expected_ms * MS
+
+
+def pass_to(bench, at_ms, *, punctual):
+    """Let time pass; who is punctual calls at each moment that is due on the way, others leave it to what comes next."""
+    while punctual and (due_ns := bench.engine.due_ns) is not None and due_ns <= at_ms * MS:
+        bench.at(due_ns / MS)
+    bench.at(at_ms, tick=False)

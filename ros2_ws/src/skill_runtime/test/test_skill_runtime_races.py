@@ -44,7 +44,8 @@ def test_every_trace_obeys_the_model(skillset, behaviours, programs):
     run_all(bench, programs)
     assert [event.sequence for event in bench.events] == list(range(1, len(bench.events) + 1))
     check_resources(bench)
-    check_effects(bench, check_executions(bench))
+    check_executions(bench)
+    check_effects(bench)
     check_invariants(bench)
     check_hooks(running)
     bench.now_ns += FOREVER_NS

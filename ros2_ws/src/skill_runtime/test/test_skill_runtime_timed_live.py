@@ -15,6 +15,9 @@ mapping_actions = pytest.importorskip("mapping_interfaces.action")
 from mapping_managers.model import SKILLSET  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.time import Time  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
 from skill_runtime_models import Recorder  # noqa: E402
 from skillset_interfaces.msg import Event as EventMessage  # noqa: E402
 from skillset_interfaces.srv import TriggerEvent  # noqa: E402
@@ -55,7 +58,7 @@ def until(condition, what: str) -> None:
 class Managers:
     """The mapping skillset, watched by an invariant over ``fps`` or a deadline, and the camera that publishes it."""
 
-    def __init__(self, *, hold: Hold | None = None, deadline_s: float | None = None, events=(), period_s=0.1) -> None:
+    def __init__(self, *, hold: Hold | None = None, deadline_s: float | None = None, events=(), period_s=0.1, simulated=False) -> None:
         invariants = () if deadline_s else (Invariant("fast", FAST, FINISH, hold),)
         skill = replace(SKILL, invariants=invariants, progress=Progress(0.05, deadline_s=deadline_s))
         model = replace(SKILLSET, skills=(skill, *SKILLSET.skills[1:]), data=(Data("fps", "float64", period_s),), events=events)
@@ -63,7 +66,8 @@ class Managers:
         self.hooks = {skill.name: Recorder() for skill in model.skills}
         place = {"namespace": f"timed_{number}"}
         bindings = {"fps": (f"/timed_{number}/camera/fps", "std_msgs/msg/Float64")}
-        self.node = SkillsetNode(model, mapping_actions, lambda _: self.hooks, data_bindings=bindings, **place)
+        clock = {"parameter_overrides": [Parameter("use_sim_time", value=True)]} if simulated else {}
+        self.node = SkillsetNode(model, mapping_actions, lambda _: self.hooks, data_bindings=bindings, **place, **clock)
         self.other = Node("tester", **place)
         self.camera = self.other.create_publisher(Float64, "camera/fps", 10)
         self.trigger = self.other.create_client(TriggerEvent, "mapping/trigger")
@@ -130,6 +134,27 @@ def test_an_execution_that_stands_still_fails_at_its_deadline(managers):
     until(lambda: execution.done, "the deadline passes")
     assert time.monotonic() - began >= 0.4
     assert (execution.state, execution.message) == (S.FAILED, "no progress for 0.4 s")
+
+
+def test_deadlines_are_of_the_simulated_clock(managers):
+    mapping = managers(deadline_s=5.0, simulated=True)
+    clock = mapping.other.create_publisher(Clock, "/clock", 10)
+
+    def at(seconds: float) -> None:
+        stamp = Time(seconds=seconds)
+        until(
+            lambda: clock.publish(Clock(clock=stamp.to_msg())) or mapping.node.get_clock().now().nanoseconds == stamp.nanoseconds,
+            "the clock is heard",
+        )
+
+    at(100.0)
+    execution = mapping.run()
+    assert mapping.node.engine.due_ns == 105_000_000_000
+    at(104.75)
+    assert execution.state is S.RUNNING
+    at(105.0)
+    until(lambda: execution.done, "the deadline passes")
+    assert execution.message == "no progress for 5 s"
 
 
 def test_an_event_is_triggered_over_ros(managers):

@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ET
 import pytest
 from uav_missions_fakes import World, clients, make_blackboard
 
-from uav_missions.director import EXIT_CODES, Director, Outcome, unmet_conditions
-from uav_missions.drawing import draw
-from uav_missions.mapping import MappingMission
+from skill_missions.director import EXIT_CODES, Director, Outcome
+from skill_missions.drawing import draw
+from uav_missions.mapping import MappingMission, unmet_conditions
 
 READY = {
     "SDK_authority": "AVAILABLE",
@@ -22,7 +22,7 @@ READY = {
 def make(world: World) -> Director:
     blackboard = make_blackboard(world)
     skillsets = clients(world)
-    return Director(MappingMission(skillsets, blackboard), skillsets, blackboard, start_timeout_s=60.0)
+    return Director(MappingMission(skillsets, blackboard), blackboard, start_timeout_s=60.0)
 
 
 def run(director: Director, world: World, until=lambda: False, limit_s: float = 200.0) -> None:
@@ -97,8 +97,8 @@ def test_an_abort_in_the_air_stops_everything_and_lands():
     world = World(resources=dict(READY))
     director = make(world)
     run(director, world, until=lambda: ("running", "goto_straight") in world.log)
-    assert director.abort("operator") == "the vehicle stops and lands where it is"
-    assert director.abort("operator again") == "the vehicle is landing already"
+    assert director.abort("operator") == "the robot stops where it is"
+    assert director.abort("operator again") == "the robot is being stopped already"
     run(director, world)
     assert director.end.outcome is Outcome.ABORTED
     assert director.end.reason == "operator"
@@ -121,7 +121,7 @@ def test_an_abort_while_landing_leaves_the_landing_alone():
     world = World(resources=dict(READY))
     director = make(world)
     run(director, world, until=lambda: ("running", "land") in world.log)
-    assert director.abort("operator") == "the vehicle is landing already"
+    assert director.abort("operator") == "the robot is being stopped already"
     run(director, world)
     assert director.end.outcome is Outcome.ACCOMPLISHED
     assert world.starts().count("land") == 1

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from uav_missions_fakes import SQUARE, State, World, clients, make_blackboard
 
-from uav_missions.leaves import SkillLeaf
+from skill_missions.leaves import SkillLeaf
 from uav_missions.mapping import MappingMission
 
 
@@ -281,7 +281,7 @@ def test_stopping_the_tree_and_landing_is_what_an_abort_does():
     flight = Flight(World())
     flight.fly_until_running("goto_straight", 2)
     flight.mission.root.stop(Status.INVALID)
-    landing = flight.mission.landing_here()
+    landing = flight.mission.stop_here()
     while flight.world.now_s < 60.0 and landing.status is not Status.SUCCESS:
         landing.tick_once()
         flight.world.pass_time()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uav_missions.files import EventLog, write_json
+from skill_missions.files import EventLog, write_json
 from uav_missions.route import Route, RouteError, load_route, wrap_rad
 
 

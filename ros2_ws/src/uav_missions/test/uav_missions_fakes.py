@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from uav_missions.blackboard import Blackboard
+from skill_missions.pending import PendingInterrupts
+from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients
-from uav_missions.pending import PendingInterrupts
 from uav_missions.route import Route
 
 SQUARE = [(0.0, 0.0, 3.0), (10.0, 0.0, 3.0), (10.0, 8.0, 3.0)]
@@ -176,5 +176,5 @@ def clients(world: World) -> Clients:
     return Clients(FakeClient("navigation", world), FakeClient("perception", world), FakeClient("mapping", world))
 
 
-def make_blackboard(world: World, waypoints=SQUARE) -> Blackboard:
-    return Blackboard(world.clock_ns, Route(waypoints), PendingInterrupts(world.clock_ns))
+def make_blackboard(world: World, waypoints=SQUARE) -> RouteBlackboard:
+    return RouteBlackboard(clock_ns=world.clock_ns, route=Route(waypoints), pending=PendingInterrupts(world.clock_ns))

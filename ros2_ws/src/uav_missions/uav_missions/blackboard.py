@@ -1,48 +1,43 @@
-"""What the nodes of one tree share.
-
-py_trees' own blackboard is one for the whole process, so two trees (or two tests) would write into each other's; this one is
-typed, and each mission has its own.
-"""
+"""What the nodes of the drone's trees share: the route, and what leaves tell one another."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from uav_missions.pending import PendingInterrupts
-from uav_missions.route import Route
-from uav_missions.skillset import Clock
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
 
-
-@dataclass(frozen=True)
-class Failure:
-    """How a skill ended that should have succeeded; ``result`` names a result, a precondition or an invariant."""
-
-    leaf: str
-    skill: str
-    outcome: str
-    result: str
-    message: str
-
-    def sentence(self) -> str:
-        """Return what a person wants to read."""
-        what = self.result if self.outcome == "TERMINATED" else " ".join(filter(None, (self.outcome, self.result)))
-        why = self.message.removeprefix(f"{self.result}: ") if self.result else self.message
-        return f"{self.skill}: {what}" + (f" ({why})" if why else "")
+from skill_missions.blackboard import Blackboard
+from uav_missions.route import Route, Waypoint
 
 
-@dataclass
-class Blackboard:
+@dataclass(kw_only=True)
+class RouteBlackboard(Blackboard):
     """The mission's memory; frames and units: map, metres, radians."""
 
-    clock_ns: Clock
     route: Route
-    pending: PendingInterrupts
-    waypoint: tuple[float, float, float] | None = None
+    waypoint: Waypoint | None = None
     aligned_yaw_rad: float | None = None
-    failures: list[Failure] = field(default_factory=list)
-    reason: str = ""
 
-    @property
-    def now_s(self) -> float:
-        """Mission clock."""
-        return self.clock_ns() / 1e9
+
+class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+    """Writes the next waypoint of the route onto the blackboard (paper, Figure 10): SUCCESS while there are some.
+
+    It writes the same one until it was reached, whichever branch flies there: a leg that one branch was interrupted on is
+    finished by the other.
+    """
+
+    def __init__(self, name: str, *, blackboard: RouteBlackboard) -> None:
+        super().__init__(name)
+        self._blackboard = blackboard
+
+    def update(self) -> Status:
+        """Write."""
+        route = self._blackboard.route
+        self._blackboard.waypoint = route.current
+        if self._blackboard.waypoint is None:
+            self.feedback_message = "no more waypoints"
+            return Status.FAILURE
+        x, y, z = self._blackboard.waypoint
+        self.feedback_message = f"{route.reached + 1} of {len(route.waypoints)}: ({x:g}, {y:g}, {z:g})"
+        return Status.SUCCESS

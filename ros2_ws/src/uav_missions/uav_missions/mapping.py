@@ -39,15 +39,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import ParallelPolicy
+from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import FailureIsSuccess, SuccessIsFailure
 
-from uav_missions.blackboard import Blackboard
-from uav_missions.decorators import RetryAfter, Until
-from uav_missions.leaves import Check, Do, SkillLeaf, Stays, WaypointWriter
+from skill_missions.decorators import RetryAfter, Until
+from skill_missions.leaves import Check, Do, SkillLeaf, Stays
+from skill_missions.skillset import Client
+from uav_missions.blackboard import RouteBlackboard, WaypointWriter
 from uav_missions.route import wrap_rad
-from uav_missions.skillset import Client
 
 AUTHORITY_INVARIANTS = frozenset({"keep_sdk_authority", "sdk_authority"})
 HEADING_TOLERANCE_RAD = 0.06
@@ -79,7 +79,7 @@ class Clients:
 class MappingMission:
     """The tree, and what its end means."""
 
-    def __init__(self, clients: Clients, blackboard: Blackboard, settings: Settings | None = None) -> None:
+    def __init__(self, clients: Clients, blackboard: RouteBlackboard, settings: Settings | None = None) -> None:
         self._clients = clients
         self._blackboard = blackboard
         self._settings = settings or Settings()
@@ -87,8 +87,8 @@ class MappingMission:
         self._lidar = self._skill("watch with the LiDAR", clients.perception, "lidar_depthmap")
         self.land = self._land("land")
         self.flight = self._map_the_area()
-        note = Do("note why", note_reason, blackboard=blackboard)
-        give_up = Sequence("give up", memory=True, children=[note, self.landing_here()])
+        note = Do("note why", RouteBlackboard.note_reason, blackboard=blackboard)
+        give_up = Sequence("give up", memory=True, children=[note, self.stop_here()])
         self.giving_up = SuccessIsFailure("given up", give_up)
         self.root = Selector("mapping mission", memory=True, children=[self.flight, self.giving_up])
 
@@ -96,6 +96,15 @@ class MappingMission:
     def degraded(self) -> bool:
         """Tell whether the LiDAR had to watch ahead."""
         return self._lidar.handle is not None
+
+    @property
+    def stopping(self) -> bool:
+        """Tell whether the vehicle is landing."""
+        return Status.RUNNING in {self.land.status, self.giving_up.status}
+
+    def unmet_conditions(self) -> list[str]:
+        """Return what keeps the mission from starting, in words."""
+        return unmet_conditions(self._clients)
 
     # --- the tree, from the root down --------------------------------------------------------------------------------
 
@@ -122,7 +131,7 @@ class MappingMission:
         branch = beside("LiDAR watches", watched, self._lidar)
         return Sequence("LiDAR navigation", memory=True, children=[Check("the vehicle obeys", self._obeys), branch])
 
-    def landing_here(self) -> Behaviour:
+    def stop_here(self) -> Behaviour:
         """Make a tree that stops the vehicle and lands it where it is; also what an abort from outside ends with."""
         settings, navigation = self._settings, self._clients.navigation
         hover = self._skill("hover", navigation, "hover", {"duration": settings.hover_s}, success="DONE")
@@ -148,16 +157,16 @@ class MappingMission:
         name: str,
         client: Client,
         skill: str,
-        inputs: Mapping[str, object] | Callable[[Blackboard], Mapping[str, object]] | None = None,
+        inputs: Mapping[str, object] | Callable[[RouteBlackboard], Mapping[str, object]] | None = None,
         *,
         success: str = "",
-        on_success: Callable[[Blackboard], None] | None = None,
-    ) -> SkillLeaf:
+        on_success: Callable[[RouteBlackboard], None] | None = None,
+    ) -> SkillLeaf[RouteBlackboard]:
         results = {success} if success else set()
         after = on_success or (lambda _blackboard: None)
         return SkillLeaf(name, client, skill, inputs or {}, blackboard=self._blackboard, success=results, on_success=after)
 
-    def _land(self, name: str) -> SkillLeaf:
+    def _land(self, name: str) -> SkillLeaf[RouteBlackboard]:
         return self._skill(name, self._clients.navigation, "land", success="LANDED")
 
     def _leg(self, name: str, skill: str) -> Behaviour:
@@ -189,18 +198,18 @@ class MappingMission:
 
     # --- what leaves ask and tell ------------------------------------------------------------------------------------
 
-    def _goto_inputs(self, blackboard: Blackboard) -> Mapping[str, object]:
+    def _goto_inputs(self, blackboard: RouteBlackboard) -> Mapping[str, object]:
         x, y, z = blackboard.waypoint or (math.nan, math.nan, math.nan)
         return {"target": {"x": x, "y": y, "z": z}, "speed": self._settings.speed_m_s}
 
-    def _rotate_inputs(self, blackboard: Blackboard) -> Mapping[str, object]:
+    def _rotate_inputs(self, blackboard: RouteBlackboard) -> Mapping[str, object]:
         return {"heading": sideways_yaw_rad(blackboard), "rate": self._settings.turn_rate_rad_s}
 
-    def _lock_inputs(self, blackboard: Blackboard) -> Mapping[str, object]:
+    def _lock_inputs(self, blackboard: RouteBlackboard) -> Mapping[str, object]:
         return {"heading": sideways_yaw_rad(blackboard)}
 
     @staticmethod
-    def _note_yaw(blackboard: Blackboard) -> None:
+    def _note_yaw(blackboard: RouteBlackboard) -> None:
         blackboard.aligned_yaw_rad = sideways_yaw_rad(blackboard)
 
     def _is_sideways(self) -> bool:
@@ -216,27 +225,39 @@ class MappingMission:
         return not taken and self._clients.navigation.resources.get("SDK_authority") == "AVAILABLE"
 
 
+def unmet_conditions(clients: Clients) -> list[str]:
+    """Return what keeps the mission from starting, in words."""
+    navigation, perception = clients.navigation.resources, clients.perception.resources
+    unmet = [f"the skillset {client.skillset} can't be called" for client in vars(clients).values() if not client.ready]
+    if navigation.get("SDK_authority") != "AVAILABLE":
+        unmet.append("the autopilot is not ours to command (SDK_authority)")
+    if navigation.get("homepoint_status") != "VALID":
+        unmet.append("the home point is not valid")
+    if navigation.get("flight_status") != "ON_GROUND":
+        unmet.append("the vehicle is not on the ground")
+    for sensor, name in (("zed_status", "ZED"), ("lidar_status", "LiDAR")):
+        if perception.get(sensor, "UNKNOWN") == "UNKNOWN":
+            unmet.append(f"nothing is known of the {name}")
+    if perception.get("lidar_status") == "BROKEN":
+        unmet.append("the LiDAR is broken: there is nothing to map with")
+    return unmet
+
+
 def beside(name: str, work: Behaviour, companion: Behaviour) -> Parallel:
     """Run a companion as long as the work takes: it is started first and interrupted last, and the work fails with it."""
     return Parallel(name, policy=ParallelPolicy.SuccessOnSelected([work], synchronise=False), children=[companion, work])
 
 
-def note_reason(blackboard: Blackboard) -> None:
-    """Keep what went wrong up to here as the reason; what fails while stopping and landing is not the reason."""
-    sentences = dict.fromkeys(failure.sentence() for failure in blackboard.failures)
-    blackboard.reason = "; then ".join(sentences)
-
-
-def is_on(leaf: SkillLeaf) -> Callable[[], bool]:
+def is_on(leaf: SkillLeaf[RouteBlackboard]) -> Callable[[], bool]:
     """Make a condition: the leaf's skill is RUNNING."""
     return lambda: leaf.handle is not None and getattr(leaf.handle.state, "name", "") == "RUNNING"
 
 
-def sees(leaf: SkillLeaf) -> Callable[[], bool]:
+def sees(leaf: SkillLeaf[RouteBlackboard]) -> Callable[[], bool]:
     """Make a condition: the leaf's depth map skill is RUNNING and obstacle messages arrive."""
     return lambda: is_on(leaf)() and leaf.handle is not None and leaf.handle.progress >= 1.0
 
 
-def sideways_yaw_rad(blackboard: Blackboard) -> float:
+def sideways_yaw_rad(blackboard: RouteBlackboard) -> float:
     """Return the heading for crabbing along the present leg: the LiDAR's scan plane then holds the direction of travel."""
     return wrap_rad(blackboard.route.leg_heading_rad() + math.pi / 2)

@@ -25,15 +25,15 @@ from skillset_interfaces.msg import Event
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
+from skill_missions.director import EXIT_CODES, Director, End, Outcome
+from skill_missions.drawing import draw
+from skill_missions.files import EventLog, event_record, write_json, write_text
+from skill_missions.pending import PendingInterrupts
+from skill_missions.skillset import Handle
 from skill_runtime.ros2 import SkillsetClient
-from uav_missions.blackboard import Blackboard
-from uav_missions.director import EXIT_CODES, Director, End, Outcome
-from uav_missions.drawing import draw
-from uav_missions.files import EventLog, event_record, write_json, write_text
+from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients, MappingMission, Settings
-from uav_missions.pending import PendingInterrupts
 from uav_missions.route import Route, RouteError, load_route
-from uav_missions.skillset import Handle
 
 SKILLSETS = ("navigation", "perception", "mapping")
 TICK_PERIOD_S = 0.1
@@ -156,11 +156,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _make_director(self) -> Director:
         clock_ns = lambda: int(self.get_clock().now().nanoseconds)  # noqa: E731
-        blackboard = Blackboard(clock_ns, self._route, PendingInterrupts(clock_ns))
+        blackboard = RouteBlackboard(clock_ns=clock_ns, route=self._route, pending=PendingInterrupts(clock_ns))
         clients = Clients(self._skillsets["navigation"], self._skillsets["perception"], self._skillsets["mapping"])
         settings = Settings(**{name: self._parameter(name, value) for name, value in vars(Settings()).items()})
         timeout_s = self._parameter("start_timeout_s", 60.0)
-        return Director(MappingMission(clients, blackboard, settings), clients, blackboard, start_timeout_s=timeout_s)
+        return Director(MappingMission(clients, blackboard, settings), blackboard, start_timeout_s=timeout_s)
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value

@@ -93,7 +93,9 @@ def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> I
     seen: set[str] = set()
     for change in effect.assignments:
         if change.resource in seen:
-            yield error("ALU212", f"effect `{effect.name}` sets `{change.resource}` twice", change.span)
+            yield warning(
+                "ALU212", f"effect `{effect.name}` sets `{change.resource}` twice", change.span, hint="one change follows the other"
+            )
         seen.add(change.resource)
         resource = resources.get(change.resource)
         if resource is None:
@@ -108,7 +110,7 @@ def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_a
     arrows = [arrow for arrow in resource.transitions if arrow.target == target]
     if any(any_arrow or not arrow.extern for arrow in arrows):
         return
-    name = f"effect `{effect.name}`" if effect.name else "the effect"
+    name = _called(effect)
     if arrows:
         message = f"{name} would take `{resource.name}` to `{target}`, but only the functional layer may (every arrow there is extern)"
         hint = f"add an arrow without `extern` to resource `{resource.name}` if skills are to take it"
@@ -116,7 +118,13 @@ def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_a
         return
     targets = dict.fromkeys(arrow.target for arrow in resource.transitions if not arrow.extern)
     hint = f"skills can take it to {quoted(list(targets))}" if targets else f"add `STATE -> {target}` to resource `{resource.name}`"
-    yield error("ALU209", f"{name} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
+    # Who is in the initial state may stay there, though it is an effect that never does anything.
+    tell = warning if target == resource.initial else error
+    yield tell("ALU209", f"{_called(effect)} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
+
+
+def _called(effect: Effect) -> str:
+    return f"effect `{effect.name}`" if effect.name else "the effect"
 
 
 def _unknown_resource(skillset: Skillset, name: str, span: Span) -> Diagnostic:
@@ -140,6 +148,13 @@ def duplicates(what: str, elements: Sequence[Named]) -> Iterator[Diagnostic]:
             hint = f"it is defined in line {at.line} first" if at.line else ""
             yield error("ALU201", f"{what} `{element.name}` is defined twice", element.span, hint=hint)
         first.setdefault(element.name, element)
+
+
+def names_of_types(skillset: Skillset, elements: Sequence[Named]) -> Iterator[Diagnostic]:
+    """Yield a finding for every element that has the name of a type."""
+    for element in elements:
+        if element.name in skillset.types:
+            yield error("ALU201", f"`{element.name}` is the name of a type", element.span, hint="name one of them otherwise")
 
 
 def one_in_code(what: str, elements: Sequence[Named], code_name: Callable[[str], str]) -> Iterator[Diagnostic]:

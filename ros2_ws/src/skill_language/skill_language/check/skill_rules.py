@@ -7,11 +7,13 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from skill_language.check.references import (
+    Named,
     condition_findings,
     duplicates,
     effect_findings,
     error,
     for_generator,
+    names_of_types,
     ros_name,
     unit_findings,
     warning,
@@ -29,15 +31,13 @@ def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     yield from duplicates("parameter", skill.parameters)
     yield from duplicates("input", skill.inputs)
     yield from duplicates("output", skill.outputs)
+    named: tuple[Named, ...] = (*skill.preconditions, *skill.invariants, *skill.results, *skill.parameters, *skill.inputs, *skill.outputs)
+    yield from names_of_types(skillset, named)
     shared = {resource.name: "resource" for resource in skillset.resources} | {data.name: "data" for data in skillset.data}
     for parameter in (*skill.inputs, *skill.outputs):
         if parameter.name in shared:
             message = f"`{parameter.name}` of `{skill.name}` has the name of a {shared[parameter.name]}, and hides it from no condition"
             yield warning("ALU304", message, parameter.span, hint="conditions speak of resources and data, never of inputs")
-    inputs = {given.name for given in skill.inputs}
-    for output in skill.outputs:
-        if output.name in inputs:
-            yield error("ALU201", f"`{output.name}` is an input and an output of `{skill.name}`", output.span)
 
 
 def _interface_names(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:

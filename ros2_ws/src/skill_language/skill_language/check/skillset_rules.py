@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from skill_language import ros_types
 from skill_language.check.references import (
+    Named,
     condition_findings,
     duplicates,
     effect_findings,
     error,
     for_generator,
+    names_of_types,
     one_in_code,
     ros_name,
     unknown_state,
@@ -30,6 +32,8 @@ def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:
     yield from duplicates("event", skillset.events)
     yield from duplicates("parameter", skillset.parameters)
     yield from duplicates("property", skillset.properties)
+    named: tuple[Named, ...] = (*skillset.resources, *skillset.data, *skillset.skills, *skillset.events, *skillset.parameters)
+    yield from names_of_types(skillset, named)
     for name, times in Counter(skillset.types).items():
         if times > 1:
             yield error("ALU201", f"type `{name}` is declared twice", skillset.span)

@@ -36,8 +36,9 @@ def topics(robot: Robot) -> list[BridgedTopic]:
 
 
 def services(robot: Robot) -> list[BridgedService]:
-    """Return every skillset's service for extern transitions, and the services of the bindings; each name once."""
+    """Return every skillset's services for extern transitions and its events, and those of the bindings; each name once."""
     found = [BridgedService(f"/{s.name}/transition", "ros2", "skillset_interfaces/Transition") for s in robot.skillsets]
+    found += [BridgedService(f"/{s.name}/trigger", "ros2", "skillset_interfaces/TriggerEvent") for s in robot.skillsets if s.events]
     found += robot.bindings.services
     return list({service.name: service for service in reversed(found)}.values())[::-1]
 

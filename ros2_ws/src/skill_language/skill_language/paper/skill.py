@@ -13,12 +13,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from skill_language.errors import nearest
 from skill_language.lexer import Kind, Token
 from skill_language.model import (
     NO_EFFECT,
     TRUE,
-    Assignment,
     Effect,
     Expression,
     Interrupt,
@@ -32,9 +30,9 @@ from skill_language.model import (
 )
 from skill_language.syntax.conditions import paper_condition
 from skill_language.syntax.cursor import Cursor, starts_block, starts_member
-from skill_language.syntax.elements import read_change, read_parameter
+from skill_language.syntax.elements import read_parameter
 from skill_language.syntax.quantities import duration, hold, setting
-from skill_language.syntax.skill_parts import SkillParts
+from skill_language.syntax.skill_reader import SkillReader
 
 BLOCKS = ("progress", "parameter", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
 _OUTSIDE = ("resource", "event", "skill", "property")
@@ -54,19 +52,17 @@ def ends_block(cursor: Cursor) -> bool:
     return progress or starts_block(cursor, BLOCKS) or starts_member(cursor, _OUTSIDE)
 
 
-class _SkillReader:
+class _SkillReader(SkillReader):
     """Reads the blocks of one skill in any order."""
 
     def __init__(self, cursor: Cursor) -> None:
-        self.cursor = cursor
-        self.parts = SkillParts()
-        self._seen: set[str] = set()
+        super().__init__(cursor, lambda: ends_block(cursor))
 
     def member(self) -> None:
         """Read one block, or `progress = 0.5`."""
         word = self.cursor.here
         if word.text in BLOCKS and word.kind is Kind.NAME:
-            self._once(word)
+            self.once(word)
         parts = self.parts
         match word.text:
             case "progress":
@@ -78,9 +74,7 @@ class _SkillReader:
             case "output":
                 self._block(lambda: parts.outputs.append(read_parameter(self.cursor, "an output")))
             case "effect":
-                before = len(self.cursor.source.diagnostics)
-                self._block(self._effect)
-                parts.effects_complete &= len(self.cursor.source.diagnostics) == before
+                self.named_effects(self._block)
             case "precondition":
                 self._block(self._precondition)
             case "invariant":
@@ -90,20 +84,13 @@ class _SkillReader:
             case "result":
                 self._block(self._result)
             case _:
-                hint = nearest(word.text, BLOCKS) if word.kind is Kind.NAME else ""
-                raise self.cursor.fail(*(f"`{block}`" for block in BLOCKS), "`}`", hint=hint if hint.startswith("did") else "")
+                raise self.unknown(word, BLOCKS)
 
     # --- blocks ---------------------------------------------------------------------------------------------------
 
-    def _once(self, word: Token) -> None:
-        if word.text in self._seen:
-            hint = "a skill has one of each; put the entries together"
-            self.cursor.source.report("ALU106", f"`{word.text}` is given twice in this skill", self.cursor.span(word), hint=hint)
-        self._seen.add(word.text)
-
     def _block(self, entry: Callable[[], None]) -> None:
         self.cursor.advance()
-        self.cursor.block(entry, lambda: ends_block(self.cursor))
+        self.cursor.block(entry, self.outside)
 
     def _progress(self) -> None:
         """Read `progress = 0.5`, and what may follow it: `deadline = 5`, `message T` or `message { x: T }`."""
@@ -117,21 +104,10 @@ class _SkillReader:
         while cursor.at("message"):
             cursor.advance()
             if cursor.at("{"):
-                cursor.block(lambda: outputs.append(read_parameter(cursor, "a value")), lambda: ends_block(cursor))
+                cursor.block(lambda: outputs.append(read_parameter(cursor, "a value")), self.outside)
             else:
                 message = cursor.name("a type").text
         self.parts.progress = Progress(period, message, deadline, tuple(outputs), span=span)
-
-    def _effect(self) -> None:
-        name = self.cursor.name("the name of an effect")
-        changes: list[Assignment] = []
-        if self.cursor.accept(":"):
-            changes.append(read_change(self.cursor))
-        elif self.cursor.at("{"):
-            self.cursor.block(lambda: changes.append(read_change(self.cursor)), lambda: ends_block(self.cursor))
-        else:
-            raise self.cursor.fail("`:`", "`{`", hint=f"write `{name.text}: resource -> STATE` or `{name.text} {{}}`")
-        self.parts.effects.append(Effect(name.text, tuple(changes), span=self.cursor.span(name)))
 
     def _precondition(self) -> None:
         if self.cursor.at_word("success"):
@@ -212,9 +188,7 @@ class _SkillReader:
     def _reference(self) -> Effect:
         """Read the name of an effect, or the changes themselves in braces."""
         if self.cursor.at("{"):
-            changes: list[Assignment] = []
-            first = self.cursor.here
-            self.cursor.block(lambda: changes.append(read_change(self.cursor)), lambda: ends_block(self.cursor))
+            first, changes = self.cursor.here, self.changes()
             return Effect("", tuple(changes), span=self.cursor.span(first))
         name = self.cursor.name("the name of an effect")
         return Effect(name.text, span=self.cursor.span(name))

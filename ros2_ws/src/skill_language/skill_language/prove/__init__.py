@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from skill_language.prove.finding import CODES, Finding
+from skill_language.prove.finding import Finding
 from skill_language.prove.prover import prove
 
-__all__ = ["CODES", "Finding", "prove"]
+__all__ = ["Finding", "prove"]

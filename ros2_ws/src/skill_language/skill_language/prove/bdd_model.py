@@ -20,6 +20,7 @@ from typing import Any
 
 from dd import cudd
 
+from skill_language.arrows import origins, targets_of
 from skill_language.model import (
     And,
     Constant,
@@ -35,7 +36,6 @@ from skill_language.model import (
     atoms,
 )
 from skill_language.prove.abstract import Abstraction, Breaker
-from skill_language.prove.solver import sources
 
 ENDED = "ended"
 """A variable to tell, where it matters, the steps that end a certain skill."""
@@ -139,14 +139,10 @@ class Encoded:
         return result
 
     def applies(self, effect: Effect, *, by_event: bool = False) -> Any:
-        """Return the situations in which every change of an effect is an arrow."""
-        names = [change.resource for change in effect.assignments]
-        if len(set(names)) < len(names):
-            return self.bdd.false
+        """Return the situations in which every change of an effect is possible."""
         return self.all_of(
-            self.any_of(self.is_state(resource.name, source) for source in sources(resource, change.target, by_event))
-            for change in effect.assignments
-            for resource in [self.skillset.resource(change.resource)]
+            self.any_of(self.is_state(name, source) for source in origins(self.skillset.resource(name), targets, any_arrow=by_event))
+            for name, targets in targets_of(effect).items()
         )
 
     def changes(self, effect: Effect) -> dict[str, bool]:

@@ -1,7 +1,8 @@
-"""`python -m skill_language.prove.bench [--json] [--sizes 10,20,50,100,200] [--timeout 60]`: how far the proofs scale.
+"""`./alula bench prove [--json FILE] [--sizes 10,20,50,100,200] [--timeout 30]`: how far the proofs scale.
 
 Grows two kinds of skillsets by skills and resources alike, and proves them one situation at a time and as sets, each
-in a process of its own: seconds of the clock, peak memory, how many situations, and where it stops.
+in a process of its own: seconds of the clock and of the processor, peak memory, and where it stops. A line is printed as soon
+as it is measured.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from skill_language.model import (
     And,
@@ -83,14 +85,15 @@ def _using(name: str, resources: Sequence[str], needs: ResourceIs | None = None)
 
 def measure(family: str, count: int, method: str, timeout_s: float) -> dict[str, object]:
     """Prove one skillset in this process."""
-    begin = time.monotonic()
+    begin, worked = time.monotonic(), time.process_time()
     findings = prove(FAMILIES[family](count), timeout_s=timeout_s, most=METHODS[method])
-    seconds = time.monotonic() - begin
+    seconds, cpu_s = time.monotonic() - begin, time.process_time() - worked
     return {
         "family": family,
         "size": count,
         "method": method,
         "seconds": round(seconds, 3),
+        "cpu_s": round(cpu_s, 3),
         "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
         "proved": not any(finding.code == "ALU540" for finding in findings),
         "findings": sorted({finding.code for finding in findings}),
@@ -98,51 +101,55 @@ def measure(family: str, count: int, method: str, timeout_s: float) -> dict[str,
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure all sizes until a method stops; print a table or JSON."""
-    parser = argparse.ArgumentParser(prog="bench", description="Measure how far the proofs of skillsets scale.")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    parser.add_argument("--sizes", default="10,20,50,100,200", help="numbers of skills, and as many resources")
-    parser.add_argument("--timeout", type=float, default=60.0, metavar="SECONDS", help="for each proof")
-    parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure this one only, in this process")
-    options = parser.parse_args(arguments)
+    """Measure all sizes until a method stops; print a table, and write JSON where it is wanted."""
+    options = _parser().parse_args(arguments)
     if options.one:
         family, size, method = options.one
         sys.stdout.write(json.dumps(measure(family, int(size), method, options.timeout)) + "\n")
         return 0
-    rows = _all([int(size) for size in options.sizes.split(",")], options.timeout)
-    sys.stdout.write((json.dumps({"timeout_s": options.timeout, "proofs": rows}, indent=2) if options.json else _table(rows)) + "\n")
+    _say(_HEAD)
+    rows: list[dict[str, object]] = []
+    for row in _all(options.sizes, options.timeout):
+        rows.append(row)
+        _say(_ROW.format(**{**row, "proved": "yes" if row["proved"] else "no"}))
+    if options.json is not None:
+        options.json.write_text(json.dumps({"timeout_s": options.timeout, "proofs": rows}, indent=2) + "\n")
     return 0
 
 
-def _all(sizes: Sequence[int], timeout_s: float) -> list[dict[str, object]]:
-    rows: list[dict[str, object]] = []
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="alula bench prove", description="Measure how far the proofs of skillsets scale.")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured to this file, too")
+    parser.add_argument("--sizes", type=_sizes, default=_sizes("10,20,50,100,200"), help="numbers of skills, and as many resources")
+    parser.add_argument("--timeout", type=float, default=30.0, metavar="SECONDS", help="for each proof (30)")
+    parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure this one only, in this process")
+    return parser
+
+
+def _sizes(text: str) -> list[int]:
+    return [int(size) for size in text.split(",")]
+
+
+def _all(sizes: Sequence[int], timeout_s: float) -> Iterator[dict[str, object]]:
+    """Yield a row for each size, each measured in a process of its own; a method that stops is not tried with more."""
+    program = [sys.executable, "-m", "skill_language.prove.bench", "--timeout", str(timeout_s), "--one"]
     for family in FAMILIES:
         for method in METHODS:
             for size in sizes:
-                command = [
-                    sys.executable,
-                    "-m",
-                    "skill_language.prove.bench",
-                    "--timeout",
-                    str(timeout_s),
-                    "--one",
-                    family,
-                    str(size),
-                    method,
-                ]
-                rows.append(json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout))
-                if not rows[-1]["proved"]:
+                done = subprocess.run([*program, family, str(size), method], check=True, capture_output=True, text=True)
+                row: dict[str, object] = json.loads(done.stdout)
+                yield row
+                if not row["proved"]:
                     break
-    return rows
 
 
-def _table(rows: Sequence[dict[str, object]]) -> str:
-    lines = [f"{'family':<12}{'method':<12}{'size':>6}{'seconds':>10}{'peak MB':>10}  proved"]
-    lines += [
-        f"{r['family']:<12}{r['method']:<12}{r['size']:>6}{r['seconds']:>10}{r['peak_mb']:>10}  {'yes' if r['proved'] else 'no'}"
-        for r in rows
-    ]
-    return "\n".join(lines)
+_HEAD = f"{'family':<12}{'method':<12}{'size':>6}{'seconds':>10}{'CPU s':>10}{'peak MB':>10}  proved"
+_ROW = "{family:<12}{method:<12}{size:>6}{seconds:>10}{cpu_s:>10}{peak_mb:>10}  {proved}"
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
 
 
 if __name__ == "__main__":

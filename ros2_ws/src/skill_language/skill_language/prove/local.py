@@ -32,7 +32,7 @@ from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
 
-EFFECT_HINT = "a change must be an arrow from the state that the resource is in; a resource that is there already has none to itself"
+EFFECT_HINT = "a change must be an arrow from the state that the resource is in, unless it is in the wanted state already"
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 import z3
 
+from skill_language.arrows import origins, targets_of
 from skill_language.model import (
     And,
     Comparison,
@@ -19,7 +20,6 @@ from skill_language.model import (
     Implies,
     Not,
     Or,
-    Resource,
     ResourceIs,
     SkillRuns,
     Skillset,
@@ -107,17 +107,13 @@ class Solver:
         return z3.Not(term, ctx=self._context)
 
     def applies(self, effect: Effect, *, by_event: bool = False) -> Any:
-        """Return that every change of an effect is an arrow now."""
-        changes = [
-            z3.Or(
-                self.constant(value=False),
-                *(self.state_is(change.resource, source) for source in sources(resource, change.target, by_event)),
-            )
-            for change in effect.assignments
-            for resource in [self._resources[change.resource]]
+        """Return that every change of an effect is possible now."""
+        possible = [
+            z3.Or(self.constant(value=False), *(self.state_is(name, source) for source in origins(resource, targets, any_arrow=by_event)))
+            for name, targets in targets_of(effect).items()
+            for resource in [self._resources[name]]
         ]
-        names = [change.resource for change in effect.assignments]
-        return z3.And(self.constant(value=len(set(names)) == len(names)), *changes)
+        return z3.And(self.constant(value=True), *possible)
 
     def _data(self, atom: DataIs) -> Any:
         name = ".".join(("data", atom.data, *atom.path))
@@ -162,11 +158,6 @@ class Solver:
                 yield f"{name} == {value.as_decimal(6).rstrip('?')}"
             else:
                 yield f"{name} == {str(value).lower()}"
-
-
-def sources(resource: Resource, target: str, any_arrow: bool) -> list[str]:  # noqa: FBT001 - the two callers name it by their own
-    """Return the states from which a skill (or with ``any_arrow`` an event) may take a resource to ``target``."""
-    return [arrow.source for arrow in resource.transitions if arrow.target == target and (any_arrow or not arrow.extern)]
 
 
 _COMPARE: Mapping[Comparison, Callable[[Any, Any], Any]] = {

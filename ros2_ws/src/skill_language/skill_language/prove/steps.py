@@ -21,7 +21,7 @@ from skill_runtime.core.conditions import holds
 from skill_runtime.core.effects import effect_changes
 from skill_runtime.core.errors import EffectError
 from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
+from skill_runtime.core.situation import Entered, Running, Situation, Step
 
 Key = tuple[str, ...]
 """What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""
@@ -172,18 +172,11 @@ class World:
         entered = next(h for h in step.happenings if isinstance(h, Entered) and h.execution == execution)
         return (("post", *key),) if entered.state is ExecutionState.FAILED else ()
 
-    def _violation_faults(self, step: Step) -> tuple[Key, ...]:
-        """Find violations whose effect was no transition: it is not among what happened just before."""
-        faults: list[Key] = []
-        for index, entered in enumerate(step.happenings):
-            if isinstance(entered, Entered) and entered.state is ExecutionState.RESOURCE_INVARIANT_VIOLATED:
-                skill = self.skillset.skill(entered.execution.skill)
-                effect = next(one.effect for one in skill.invariants if one.name == entered.result)
-                wanted, by = len(effect.assignments), f"{skill.name} {entered.execution.id} "
-                before = step.happenings[index - wanted : index] if index >= wanted else ()
-                if wanted and not (before and all(isinstance(h, Change) and h.cause.startswith(by) for h in before)):
-                    faults.append(("effect", "invariant", skill.name, entered.result))
-        return tuple(faults)
+    @staticmethod
+    def _violation_faults(step: Step) -> tuple[Key, ...]:
+        """Find violations whose effect was not possible."""
+        failed = [entered for entered in step.happenings if isinstance(entered, Entered) and entered.effect_failed]
+        return tuple(("effect", "invariant", entered.execution.skill, entered.result) for entered in failed)
 
     @staticmethod
     def _broken_at_birth(skill: Skill, step: Step) -> tuple[Key, ...]:

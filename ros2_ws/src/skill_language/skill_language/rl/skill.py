@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from skill_language.errors import nearest
 from skill_language.lexer import Kind, Token
 from skill_language.model import (
     NO_EFFECT,
@@ -28,9 +27,9 @@ from skill_language.model import (
 from skill_language.rl.bodies import outside, read_body, read_effect
 from skill_language.syntax.conditions import bare_condition
 from skill_language.syntax.cursor import Cursor
-from skill_language.syntax.elements import one_or_block, read_change, read_parameter
+from skill_language.syntax.elements import one_or_block, read_parameter
 from skill_language.syntax.quantities import duration, hold, setting
-from skill_language.syntax.skill_parts import SkillParts
+from skill_language.syntax.skill_reader import SkillReader
 
 BLOCKS = (
     "parameter",
@@ -56,20 +55,18 @@ def read_skill(cursor: Cursor) -> Skill:
     return reader.parts.build(name, cursor.source)
 
 
-class _SkillReader:
+class _SkillReader(SkillReader):
     """Reads the blocks of one skill in any order."""
 
     def __init__(self, cursor: Cursor) -> None:
-        self.cursor = cursor
-        self.parts = SkillParts()
-        self._seen: set[str] = set()
+        super().__init__(cursor, lambda: outside(cursor))
         self._nameless: Counter[str] = Counter()
 
     def member(self) -> None:
         """Read one block, or one entry without braces."""
         word, parts = self.cursor.here, self.parts
         if word.text in {"start", "progress", "interrupt"} and word.kind is Kind.NAME:
-            self._once(word)
+            self.once(word)
         match word.text:
             case "parameter":
                 self._several(lambda: parts.parameters.append(read_parameter(self.cursor, "a parameter")))
@@ -78,7 +75,7 @@ class _SkillReader:
             case "output":
                 self._several(lambda: parts.outputs.append(read_parameter(self.cursor, "an output")))
             case "effect":
-                self._named_effects()
+                self.named_effects(self._several)
             case "precondition":
                 self._several(self._precondition)
             case "start":
@@ -93,36 +90,12 @@ class _SkillReader:
                 kind = ResultKind(word.text)
                 self._several(lambda: self._result(kind))
             case _:
-                hint = nearest(word.text, BLOCKS) if word.kind is Kind.NAME else ""
-                raise self.cursor.fail(*(f"`{block}`" for block in BLOCKS), "`}`", hint=hint if hint.startswith("did") else "")
-
-    def _once(self, word: Token) -> None:
-        if word.text in self._seen:
-            hint = "a skill has one of each; put the entries together"
-            self.cursor.source.report("ALU106", f"`{word.text}` is given twice in this skill", self.cursor.span(word), hint=hint)
-        self._seen.add(word.text)
+                raise self.unknown(word, BLOCKS)
 
     def _several(self, entry: Callable[[], None]) -> None:
-        one_or_block(self.cursor, entry, lambda: outside(self.cursor))
+        one_or_block(self.cursor, entry, self.outside)
 
     # --- blocks ---------------------------------------------------------------------------------------------------
-
-    def _named_effects(self) -> None:
-        before = len(self.cursor.source.diagnostics)
-        self._several(self._named_effect)
-        self.parts.effects_complete &= len(self.cursor.source.diagnostics) == before
-
-    def _named_effect(self) -> None:
-        """Read `name: r -> S` or `name { r -> S  q -> T }`."""
-        name = self.cursor.name("the name of an effect")
-        changes: list[Assignment] = []
-        if self.cursor.accept(":"):
-            changes.append(read_change(self.cursor))
-        elif self.cursor.at("{"):
-            self.cursor.block(lambda: changes.append(read_change(self.cursor)), lambda: outside(self.cursor))
-        else:
-            raise self.cursor.fail("`:`", "`{`", hint=f"write `{name.text}: resource -> STATE` or `{name.text} {{}}`")
-        self.parts.effects.append(Effect(name.text, tuple(changes), span=self.cursor.span(name)))
 
     def _precondition(self) -> None:
         """Read `name: condition`, or a condition alone, which is given a name."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from skill_language.arrows import may_go
 from skill_language.model import Effect, Event, Skillset
 from skill_runtime.core.conditions import States
 from skill_runtime.core.errors import EffectError
@@ -14,11 +15,11 @@ from skill_runtime.core.situation import Change, Running, Situation
 def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place: str, states: States) -> tuple[Change, ...]:
     """Return what an effect of a skill changes from these states; ``place`` names it where the model does not.
 
-    Every assignment must be an arrow for skills from the resource's present state, also one to the state that it is in:
-    who releases what nobody holds has lost count.
+    Every assignment, one after another, must be an arrow for skills from the state that its resource is in then; one to that
+    very state is possible, too, and changes nothing.
 
     Raises:
-        EffectError: one is not; then none may be applied.
+        EffectError: one is neither; then none may be applied.
     """
     name = effect.name or place
     return _changes(skillset, effect, states, f"skill {execution.skill}, effect {name}", f"{execution.skill} {execution.id} {name}")
@@ -38,16 +39,17 @@ def given_back(skillset: Skillset, execution: Running, states: States) -> tuple[
 
 
 def _changes(skillset: Skillset, effect: Effect, states: States, where: str, cause: str, *, any_arrow: bool = False) -> tuple[Change, ...]:
-    changes: dict[str, Change] = {}
+    changes: list[Change] = []
+    present = dict(states)
     for assignment in effect.assignments:
-        resource, source, target = skillset.resource(assignment.resource), states[assignment.resource], assignment.target
-        if resource.name in changes:
-            raise EffectError(f"{where}: resource {resource.name} is assigned twice")
-        if not (resource.has_arrow(source, target, extern=False) or (any_arrow and resource.has_arrow(source, target, extern=True))):
+        resource, source, target = skillset.resource(assignment.resource), present[assignment.resource], assignment.target
+        if not may_go(resource, source, target, any_arrow=any_arrow):
             whose = "" if any_arrow else " for skills"
             raise EffectError(f"{where}: resource {resource.name} is {source} and has no transition {source} -> {target}{whose}")
-        changes[resource.name] = Change(resource.name, source, target, cause)
-    return tuple(changes.values())
+        if source != target:
+            changes.append(Change(resource.name, source, target, cause))
+            present[resource.name] = target
+    return tuple(changes)
 
 
 def after(states: States, changes: tuple[Change, ...]) -> Mapping[str, str]:

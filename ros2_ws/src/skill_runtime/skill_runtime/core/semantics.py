@@ -62,7 +62,8 @@ def check_supported(skillset: Skillset) -> None:
         UnsupportedModelError: names the place.
     """
     for skill in skillset.skills:
-        for condition in (*(p.condition for p in skill.preconditions), *(i.condition for i in skill.invariants)):
+        kept = [condition for one in skill.invariants for condition in (one.condition, one.recovered)]
+        for condition in (*(p.condition for p in skill.preconditions), *kept):
             for atom in data_of(condition):
                 in_si(atom)
         pure = [(f"{skill.name}, postcondition of {r.name}", r.postcondition) for r in skill.results]

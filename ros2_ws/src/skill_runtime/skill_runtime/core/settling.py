@@ -29,12 +29,12 @@ def settle(skillset: Skillset, step: Step) -> Step:
 
 def violate(skillset: Skillset, step: Step, execution: Running, invariant: Invariant, message: str) -> Step:
     """End one execution by its broken invariant; an effect that is no transition is told in the message and not applied."""
-    states = step.situation.states
+    states, effect_failed = step.situation.states, False
     try:
         changes = effect_changes(skillset, execution, invariant.effect, invariant.name, states)
     except EffectError as error:
-        changes, message = (), f"{message}; {error}"
-    entered = Entered(execution, ExecutionState.RESOURCE_INVARIANT_VIOLATED, invariant.name, message)
+        changes, message, effect_failed = (), f"{message}; {error}", True
+    entered = Entered(execution, ExecutionState.RESOURCE_INVARIANT_VIOLATED, invariant.name, message, effect_failed)
     return step.then(*changes, entered, situation=without(step.situation, execution, after(states, changes)))
 
 

@@ -47,12 +47,13 @@ class Change:
 
 @dataclass(frozen=True)
 class Entered:
-    """An execution entered a state; ``result`` as in ``Execution``."""
+    """An execution entered a state; ``result`` as in ``Execution``; ``effect_failed`` when a violation's effect was not possible."""
 
     execution: Running
     state: ExecutionState
     result: str = ""
     message: str = ""
+    effect_failed: bool = False
 
 
 @dataclass(frozen=True)

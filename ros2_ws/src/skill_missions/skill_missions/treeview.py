@@ -10,7 +10,7 @@ from py_trees.common import Status
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
-from uav_missions.leaves import Check, SkillLeaf, Stays
+from skill_missions.leaves import Check, SkillLeaf, Stays
 
 INTERRUPTED = "INTERRUPTED"
 KINDS: tuple[tuple[type[Behaviour], str], ...] = (

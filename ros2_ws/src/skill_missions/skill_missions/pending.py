@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uav_missions.skillset import NANOSECONDS, Clock, Handle
+from skill_missions.skillset import NANOSECONDS, Clock, Handle
 
 
 @dataclass(frozen=True)

@@ -6,21 +6,23 @@ A leaf does no work itself and never waits: it starts, looks, and stops.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from typing import Generic, TypeVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from uav_missions.blackboard import Blackboard, Failure
-from uav_missions.skillset import Client, Handle
+from skill_missions.blackboard import Blackboard, Failure
+from skill_missions.skillset import Client, Handle
 
-Inputs = Mapping[str, object] | Callable[[Blackboard], Mapping[str, object]]
+Board = TypeVar("Board", bound=Blackboard)
+Inputs = Mapping[str, object] | Callable[[Board], Mapping[str, object]]
 
 
 def nothing_more(_blackboard: Blackboard) -> None:
     """Do nothing after a success."""
 
 
-class SkillLeaf(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
     """One skill: started when the leaf is first ticked, watched, interrupted when the tree leaves it.
 
     RUNNING until the execution has ended; SUCCESS when it TERMINATED with a result in ``success``; else FAILURE, with a
@@ -34,11 +36,11 @@ class SkillLeaf(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         name: str,
         client: Client,
         skill: str,
-        inputs: Inputs,
+        inputs: Inputs[Board],
         *,
-        blackboard: Blackboard,
+        blackboard: Board,
         success: Collection[str] = (),
-        on_success: Callable[[Blackboard], None] = nothing_more,
+        on_success: Callable[[Board], None] = nothing_more,
     ) -> None:
         super().__init__(name)
         self.client = client
@@ -95,33 +97,10 @@ class SkillLeaf(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         return True
 
 
-class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
-    """Writes the next waypoint of the route onto the blackboard (paper, Figure 10): SUCCESS while there are some.
-
-    It writes the same one until it was reached, whichever branch flies there: a leg that one branch was interrupted on is
-    finished by the other.
-    """
-
-    def __init__(self, name: str, *, blackboard: Blackboard) -> None:
-        super().__init__(name)
-        self._blackboard = blackboard
-
-    def update(self) -> Status:
-        """Write."""
-        route = self._blackboard.route
-        self._blackboard.waypoint = route.current
-        if self._blackboard.waypoint is None:
-            self.feedback_message = "no more waypoints"
-            return Status.FAILURE
-        x, y, z = self._blackboard.waypoint
-        self.feedback_message = f"{route.reached + 1} of {len(route.waypoints)}: ({x:g}, {y:g}, {z:g})"
-        return Status.SUCCESS
-
-
-class Do(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+class Do(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
     """Does something to the blackboard at once, and succeeds."""
 
-    def __init__(self, name: str, action: Callable[[Blackboard], None], *, blackboard: Blackboard) -> None:
+    def __init__(self, name: str, action: Callable[[Board], None], *, blackboard: Board) -> None:
         super().__init__(name)
         self._blackboard = blackboard
         self._action = action

@@ -1,17 +1,17 @@
-"""From waiting for the vehicle to the outcome of the mission: what happens around the tree. No ROS."""
+"""From waiting for the robot to the outcome of the mission: what happens around the tree. No ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from uav_missions.blackboard import Blackboard
-from uav_missions.mapping import Clients, MappingMission
-from uav_missions.treeview import NodeView, TreeWatch
+from skill_missions.blackboard import Blackboard
+from skill_missions.treeview import NodeView, TreeWatch
 
 
 class Outcome(Enum):
@@ -42,39 +42,47 @@ class End:
     reason: str = ""
 
 
-def unmet_conditions(clients: Clients) -> list[str]:
-    """Return what keeps the mission from starting, in words."""
-    navigation, perception = clients.navigation.resources, clients.perception.resources
-    unmet = [f"the skillset {client.skillset} can't be called" for client in vars(clients).values() if not client.ready]
-    if navigation.get("SDK_authority") != "AVAILABLE":
-        unmet.append("the autopilot is not ours to command (SDK_authority)")
-    if navigation.get("homepoint_status") != "VALID":
-        unmet.append("the home point is not valid")
-    if navigation.get("flight_status") != "ON_GROUND":
-        unmet.append("the vehicle is not on the ground")
-    for sensor, name in (("zed_status", "ZED"), ("lidar_status", "LiDAR")):
-        if perception.get(sensor, "UNKNOWN") == "UNKNOWN":
-            unmet.append(f"nothing is known of the {name}")
-    if perception.get("lidar_status") == "BROKEN":
-        unmet.append("the LiDAR is broken: there is nothing to map with")
-    return unmet
+class Mission(Protocol):
+    """A tree, and what its end means."""
+
+    @property
+    def root(self) -> Behaviour:
+        """The tree; SUCCESS means that the mission was accomplished."""
+        ...
+
+    @property
+    def degraded(self) -> bool:
+        """Tell whether it was accomplished in another way than the best."""
+        ...
+
+    @property
+    def stopping(self) -> bool:
+        """Tell whether the tree has the robot brought to rest by now, so that an abort has nothing to add."""
+        ...
+
+    def unmet_conditions(self) -> list[str]:
+        """Return what keeps the mission from starting, in words."""
+        ...
+
+    def stop_here(self) -> Behaviour:
+        """Make a tree that brings the robot to rest where it is; ticked after an abort."""
+        ...
 
 
 class Director:
-    """Waits for the vehicle, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event."""
+    """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event."""
 
-    def __init__(self, mission: MappingMission, clients: Clients, blackboard: Blackboard, *, start_timeout_s: float = 60.0) -> None:
+    def __init__(self, mission: Mission, blackboard: Blackboard, *, start_timeout_s: float = 60.0) -> None:
         self.end: End | None = None
         self.start_s: float | None = None
         self._mission = mission
-        self._clients = clients
         self._blackboard = blackboard
         self._start_timeout_s = start_timeout_s
         self._wait_until_s: float | None = None
         self._watch = TreeWatch(mission.root)
         self._abort_reason = ""
-        self._landing: Behaviour | None = None
-        self._landing_watch: TreeWatch | None = None
+        self._stop: Behaviour | None = None
+        self._stop_watch: TreeWatch | None = None
         self._phase: Callable[[], None] = self._wait
 
     def step(self) -> None:
@@ -83,50 +91,50 @@ class Director:
             self._phase()
 
     def abort(self, reason: str) -> str:
-        """Stop what runs and land where the vehicle is; return what happens, in words."""
+        """Stop what runs and bring the robot to rest where it is; return what happens, in words."""
         if self.end is not None:
             return "the mission is over already"
         if self.start_s is None:
             self.end = End(Outcome.ABORTED, reason)
             return "the mission does not start"
-        if self._landing is not None or Status.RUNNING in {self._mission.land.status, self._mission.giving_up.status}:
-            return "the vehicle is landing already"
+        if self._stop is not None or self._mission.stopping:
+            return "the robot is being stopped already"
         self._abort_reason = reason
         self._mission.root.stop(Status.INVALID)
-        self._landing = self._mission.landing_here()
-        self._landing_watch = TreeWatch(self._landing)
-        self._phase = self._land
-        return "the vehicle stops and lands where it is"
+        self._stop = self._mission.stop_here()
+        self._stop_watch = TreeWatch(self._stop)
+        self._phase = self._halt
+        return "the robot stops where it is"
 
     def view(self) -> NodeView:
-        """Return the tree as it is now; after an abort with the landing beside it."""
-        flight = self._watch.look()
-        if self._landing_watch is None:
-            return flight
-        landing = self._landing_watch.look()
-        return NodeView("aborted mission", "sequence", landing.status, self._abort_reason, "", (flight, landing))
+        """Return the tree as it is now; after an abort with what stops the robot beside it."""
+        tree = self._watch.look()
+        if self._stop_watch is None:
+            return tree
+        stop = self._stop_watch.look()
+        return NodeView("aborted mission", "sequence", stop.status, self._abort_reason, "", (tree, stop))
 
     # --- phases ------------------------------------------------------------------------------------------------------
 
     def _wait(self) -> None:
-        unmet, now_s = unmet_conditions(self._clients), self._blackboard.now_s
+        unmet, now_s = self._mission.unmet_conditions(), self._blackboard.now_s
         if self._wait_until_s is None and now_s > 0.0:  # zero: the mission clock was not heard yet
             self._wait_until_s = now_s + self._start_timeout_s
         if not unmet:
             self.start_s = now_s
-            self._phase = self._fly
+            self._phase = self._run
         elif self._wait_until_s is not None and now_s > self._wait_until_s:
             self.end = End(Outcome.NOT_STARTED, "; ".join(unmet))
 
-    def _fly(self) -> None:
+    def _run(self) -> None:
         self._mission.root.tick_once()
         if self._mission.root.status is not Status.RUNNING:
             self._phase = self._settle
 
-    def _land(self) -> None:
-        if self._landing is not None:
-            self._landing.tick_once()
-            if self._landing.status is not Status.RUNNING:
+    def _halt(self) -> None:
+        if self._stop is not None:
+            self._stop.tick_once()
+            if self._stop.status is not Status.RUNNING:
                 self._phase = self._settle
 
     def _settle(self) -> None:
@@ -135,7 +143,7 @@ class Director:
             self.end = self._judge()
 
     def _judge(self) -> End:
-        if self._landing is not None:
+        if self._stop is not None:
             return End(Outcome.ABORTED, self._abort_reason)
         if self._mission.root.status is not Status.SUCCESS:
             return End(Outcome.GIVEN_UP, self._blackboard.reason)

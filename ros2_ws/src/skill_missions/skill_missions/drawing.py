@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from html import escape
 
-from uav_missions.treeview import NodeView
+from skill_missions.treeview import NodeView
 
 ROW_PX = 31
 BOX_PX = 24

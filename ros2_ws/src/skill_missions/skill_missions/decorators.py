@@ -8,7 +8,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
-from uav_missions.blackboard import Blackboard
+from skill_missions.blackboard import Blackboard
 
 
 class Until(Decorator):  # type: ignore[misc]  # py_trees is seen untyped

@@ -1,0 +1,17 @@
+from setuptools import find_packages, setup
+
+setup(
+    name="skill_missions",
+    version="0.1.0",
+    packages=find_packages(exclude=["test"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/skill_missions"]),
+        ("share/skill_missions", ["package.xml"]),
+    ],
+    install_requires=["setuptools"],
+    zip_safe=True,
+    maintainer="The Alula developers",
+    maintainer_email="alula@alula-robotics.org",
+    description="What missions are made of: Behaviour Trees whose leaves are skills",
+    license="Apache-2.0",
+)

@@ -1,0 +1,1 @@
+"""Missions as Behaviour Trees whose leaves are skills: what every robot's mission is made of."""

@@ -1,0 +1,49 @@
+"""What the nodes of one tree share.
+
+py_trees' own blackboard is one for the whole process, so two trees (or two tests) would write into each other's; this one is
+typed, and each mission has its own: derive from it to add what the leaves of a mission tell one another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from skill_missions.pending import PendingInterrupts
+from skill_missions.skillset import NANOSECONDS, Clock
+
+
+@dataclass(frozen=True)
+class Failure:
+    """How a skill ended that should have succeeded; ``result`` names a result, a precondition or an invariant."""
+
+    leaf: str
+    skill: str
+    outcome: str
+    result: str
+    message: str
+
+    def sentence(self) -> str:
+        """Return what a person wants to read."""
+        what = self.result if self.outcome == "TERMINATED" else " ".join(filter(None, (self.outcome, self.result)))
+        why = self.message.removeprefix(f"{self.result}: ") if self.result else self.message
+        return f"{self.skill}: {what}" + (f" ({why})" if why else "")
+
+
+@dataclass(kw_only=True)
+class Blackboard:
+    """The mission's memory."""
+
+    clock_ns: Clock
+    pending: PendingInterrupts
+    failures: list[Failure] = field(default_factory=list)
+    reason: str = ""
+
+    @property
+    def now_s(self) -> float:
+        """Mission clock."""
+        return self.clock_ns() / NANOSECONDS
+
+    def note_reason(self) -> None:
+        """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""
+        sentences = dict.fromkeys(failure.sentence() for failure in self.failures)
+        self.reason = "; then ".join(sentences)
