@@ -18,6 +18,8 @@ SKILLSET = importlib.import_module(f"{NAME}_managers.model").SKILLSET
 
 class Telling(SkillHooks):
     def on_dispatch(self, execution):
+        sys.stdout.write(f"started {execution.skill} {execution.id}\n")
+        sys.stdout.flush()
         if LASTS_S:
             result = SKILLSET.skill(execution.skill).results[0].name
             threading.Timer(LASTS_S, execution.terminate, (result,)).start()

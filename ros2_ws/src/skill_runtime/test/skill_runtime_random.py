@@ -204,16 +204,16 @@ def check_executions(bench):
     return told
 
 
-def called_for(skill, event, states_before):
-    """Return the effect that an execution's new state calls for; ``states_before`` are those it was in."""
+def called_for(skill, event, before):
+    """Return the effect that an execution's new state calls for; ``before`` are the states it was in."""
     match event.state:
-        case S.RUNNING if S.RUNNING not in states_before:  # RUNNING again comes after a pause
+        case S.RUNNING if S.RUNNING not in before:  # again after a pause
             return skill.start
         case S.TERMINATED:
             return skill.result(event.result).effect
         case S.RESOURCE_INVARIANT_VIOLATED:
             return next(i.effect for i in skill.invariants if i.name == event.result)
-        case S.INTERRUPTED | S.FAILED if S.RUNNING in states_before:
+        case S.INTERRUPTED | S.FAILED if S.RUNNING in before:
             return skill.interrupt.effect
     return Effect()
 
@@ -233,12 +233,12 @@ def check_effects(bench):
         own = [change for change in pending if change.cause.startswith(f"{event.skill} {event.id} ")]
         states |= {change.resource: change.to_state for change in pending if change not in own}
         effect = called_for(bench.skillset.skill(event.skill), event, before[event.id])
-        before[event.id].append(event.state)
         wanted = [(a.resource, a.target) for a in effect.assignments if states[a.resource] != a.target]
         found = [(change.resource, change.to_state) for change in own]
         impossible = event.state is S.RESOURCE_INVARIANT_VIOLATED and "has no transition" in event.message
         assert found == ([] if impossible or (event.state is S.FAILED and not own) else wanted)
         states |= {change.resource: change.to_state for change in own}
+        before[event.id].append(event.state)
         pending = []
 
 

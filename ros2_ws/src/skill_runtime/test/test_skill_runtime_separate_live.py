@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -32,7 +33,16 @@ def running(mission):
     handle = mission.client.start(SKILL)
     until(lambda: handle.state is S.RUNNING, f"{handle} runs", END_S)
     until(lambda: mission.client.resources["mapping_process"] == "RUNNING", "the resource follows")
+    until(lambda: any(handle.id in line for line in mission.told), "the hook was called", END_S)
     return handle
+
+
+def alive(pid: int) -> bool:
+    """Tell whether a process has not ended; who ended without a parent that asks stays as a zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def runs(mission):
@@ -81,7 +91,7 @@ def test_the_processes_end_with_their_supervisor_and_tell_why(mission):
 def test_a_supervisor_that_is_killed_leaves_no_process_behind(mission):
     pids = [mission.pid("resources"), mission.pid(SKILL)]
     mission.supervisor.kill()
-    until(lambda: not any(os.path.exists(f"/proc/{pid}") for pid in pids), "all processes end", END_S)  # noqa: PTH110
+    until(lambda: not any(alive(pid) for pid in pids), "all processes end", END_S)
 
 
 @pytest.mark.parametrize("words", [["--processes", "both"], ["--part", "nosuch"], ["nosuch"]])

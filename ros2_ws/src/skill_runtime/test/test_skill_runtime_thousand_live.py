@@ -53,7 +53,7 @@ def test_a_thousand_executions_leave_nothing_behind(navigation):
 
     run(WARM)
     files, memory_kb, objects = open_files(), rss_kb(), own_objects()
-    assert objects["SkillManager"] == len(navigation.hooks)  # they are found at all
+    assert objects["SkillManager"] >= len(navigation.hooks)  # they are found at all
     run(MEASURED)
     growth_kb, more = rss_kb() - memory_kb, own_objects() - objects
     assert open_files() <= files

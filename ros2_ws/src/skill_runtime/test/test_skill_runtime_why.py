@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 from skill_runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
 
-from skill_language.model import And, Comparison, Data, DataIs, Invariant, Not, Precondition
+from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Invariant, Not, Precondition
 from skill_runtime.core import ExecutionState
 
 S = ExecutionState
+FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))
+"""An arrow that is for the functional layer only."""
 
 
 def test_a_skill_that_is_ready_says_so_and_nothing_is_changed():
@@ -60,9 +62,9 @@ def test_data_start_effects_invariants_and_validate_count_too():
     assert bench.engine.why("takeoff").unmet[0].data == {"battery.level": None}
     bench.engine.update_data("battery", type("Battery", (), {"level": 0.1}))
     assert bench.engine.why("takeoff").unmet[0].data == {"battery.level": 0.1}
-    bench = Bench(flying_skillset(flying_skill("takeoff", preconditions=(), start=RELEASE)))
+    bench = Bench(flying_skillset(flying_skill("takeoff", preconditions=(), start=FORBIDDEN)))
     assert [one.name for one in bench.engine.why("takeoff").unmet] == ["start effect"]
-    assert "AVAILABLE -> AVAILABLE" in bench.engine.why("takeoff").reason
+    assert "AVAILABLE -> UNAVAILABLE" in bench.engine.why("takeoff").reason
     bench = Bench(flying_skillset(flying_skill("takeoff", invariants=(Invariant("free", And((SDK, AXES_FREE)), RELEASE),))))
     assert [one.name for one in bench.engine.why("takeoff").unmet] == ["free"]
     bench = Bench()
