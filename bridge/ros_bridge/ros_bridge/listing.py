@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig, Spec
     from ros_bridge.conversion import Types
 
-QUIET_S = 0.7
-AT_MOST_S = 4.0
+QUIET_S = 1.0
+AT_MOST_S = 5.0
 
 
 def list_routes(config: BridgeConfig, types: Types, master_uri: str) -> str:

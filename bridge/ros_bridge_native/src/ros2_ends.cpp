@@ -89,6 +89,8 @@ void Ros2Subscription::take(Incoming & incoming, Sender & sender) {
   rmw_message_info_t info = rmw_get_zero_initialized_message_info();
   const rcl_ret_t code = rcl_take(&subscription_, &incoming, &info, nullptr);
   if (code != RCL_RET_OK && code != RCL_RET_SUBSCRIPTION_TAKE_FAILED) rcl_reset_error();
+  // rmw converts a message before it looks whether it is one of our own and drops it; with those it goes on until none is left.
+  if (code == RCL_RET_SUBSCRIPTION_TAKE_FAILED && incoming.good) incoming.touched = false;
   std::memcpy(sender.gid.data(), info.publisher_gid.data, sender.gid.size());
   sender.sequence = info.publication_sequence_number;
 }
