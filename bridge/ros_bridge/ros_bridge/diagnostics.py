@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ros_bridge import raw, topics
 from ros_bridge.config import Direction, Spec, TopicRoute
+from ros_bridge.errors import BridgeError
 from ros_bridge.rows import SECTION_OF, quality_text, type_text, up
 from ros_bridge.stats import Figures
 from ros_bridge.wanted import Decision, Refused
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from ros_bridge.conversion import Types
+
+logger = logging.getLogger("ros_bridge")
 
 TOPIC = "/diagnostics"
 TYPE = "diagnostic_msgs/DiagnosticArray"
@@ -83,3 +87,12 @@ class Diagnostics:
             hardware_id="ros_bridge",
             values=[self._item(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def open_diagnostics(node: Node, types: Types) -> Diagnostics | None:
+    """Return the publishers, or None where diagnostic_msgs is not installed: bridging does not depend on them."""
+    try:
+        return Diagnostics(node, types)
+    except BridgeError as error:
+        logger.warning("there are no diagnostics: %s", error)
+        return None

@@ -167,7 +167,7 @@ class GoalsToRos1:
         """Take the server's list of its goals; a goal that was in it and no longer is has been lost with a server's restart."""
         with self.lock:
             by_name = {status.goal_id.name: status for status in statuses}
-            for goal in [goal for goal in self._goals.values() if goal.open]:
+            for goal in [goal for goal in self._goals.values() if goal.open and goal.sent_s is not None]:
                 status = by_name.get(goal.name)
                 if status is not None:
                     self._on_goal_status(goal, status, now_s)
@@ -261,9 +261,10 @@ class GoalsToRos1:
 
     def _find(self, status: GoalStatus) -> Goal | None:
         try:
-            return self._goals.get(uuid.UUID(status.goal_id.name).bytes)
+            goal = self._goals.get(uuid.UUID(status.goal_id.name).bytes)
         except ValueError:
             return None  # a goal of a client in ROS 1
+        return None if goal is None or (goal.open and goal.sent_s is None) else goal
 
     def _accept(self, goal: Goal) -> None:
         if goal.status is Ros2Status.UNKNOWN:

@@ -171,6 +171,8 @@ class GoalsToRos2:
             if goal is None or not goal.open:
                 if accepted:
                     self._server.send_cancel(goal_uuid)
+            elif goal.sent_s is None:
+                return  # nobody was asked
             elif accepted:
                 goal.stamp_ns = goal.stamp_ns or stamp_ns
                 self._accept(goal)
@@ -190,7 +192,7 @@ class GoalsToRos2:
         with self.lock:
             for goal_uuid, status in statuses:
                 goal = self._by_uuid.get(goal_uuid)
-                if goal is None or not goal.open:
+                if goal is None or not goal.open or goal.sent_s is None:
                     continue
                 self._accept(goal)  # if the answer was lost
                 if status in (Ros2Status.EXECUTING, Ros2Status.CANCELING):

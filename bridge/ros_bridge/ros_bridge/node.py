@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from ros_bridge import actions, services, topics
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
-from ros_bridge.diagnostics import Diagnostics
+from ros_bridge.diagnostics import open_diagnostics
 from ros_bridge.discovery import Discovery, GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.heartbeat import Heartbeat
@@ -78,7 +78,7 @@ class Bridge:
         self._executor.add_node(self._node)
         if self._parameters is not None:
             self._executor.add_node(self._parameters.node)
-        self._diagnostics = Diagnostics(self._node, types)
+        self._diagnostics = open_diagnostics(self._node, types)
         self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
         self._watch = MasterWatch(master, caller_id, self._register_again, self._heartbeat.changed)
 
@@ -130,8 +130,9 @@ class Bridge:
         """Publish the diagnostics, and draw the live view where somebody looks."""
         figures = self.table.figures()
         self._rates_hz = self._rates.update(figures, time.monotonic())
-        decisions = self._discovery.decisions if self._discovery is not None else []
-        self._diagnostics.publish(figures, self._rates_hz, self.table.failed, decisions)
+        if self._diagnostics is not None:
+            decisions = self._discovery.decisions if self._discovery is not None else []
+            self._diagnostics.publish(figures, self._rates_hz, self.table.failed, decisions)
         if sys.stdout.isatty():
             rows = live_table(figures, self._rates_hz)[: shutil.get_terminal_size().lines - 2]
             sys.stdout.write(CLEAR_SCREEN + render(rows))

@@ -29,7 +29,7 @@ logger = logging.getLogger("ros_bridge")
 
 NODE_SUFFIX = "_topics"
 ASKING_THREADS = 4
-LISTEN_MS = 1000
+LISTEN_MS = 250
 RETRY_MS = 100
 TOLD_ONCE = 100
 FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 1.0, 5.0

@@ -74,7 +74,7 @@ class Ros1Node:
         self._server = _Server((bind_address, 0), _Handler, logRequests=False, allow_none=True)
         self._server.register_instance(_Answers(self))
         self.uri = f"http://{host}:{self._server.server_address[1]}/"
-        threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 1.0}, name="ros1_node", daemon=True).start()
+        threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.2}, name="ros1_node", daemon=True).start()
 
     @property
     def master_uri(self) -> str:

@@ -15,7 +15,6 @@ NEVER = (
     "/rosout",
     "/rosout_agg",
     "/parameter_events",
-    "/bridge/*",
     "/ros_bridge/*",
     "/ros1_parameters/*",
     "*/_action/*",

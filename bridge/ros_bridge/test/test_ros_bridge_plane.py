@@ -24,6 +24,7 @@ topics:
   - {name: /bp/down, direction: ros2_to_ros1, type: std_msgs/String, depth: 100}
   - {name: /bp/up_latched, direction: ros1_to_ros2, type: std_msgs/String, latched: true, depth: 1}
   - {name: /bp/down_latched, direction: ros2_to_ros1, type: std_msgs/String, latched: true, depth: 1}
+  - {name: /bp/flood, direction: ros1_to_ros2, type: std_msgs/String, depth: 10}
   - {name: /bp/fake, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {ros1_name: /bp/fake, ros2_name: /bp/fake_too, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
 """
@@ -239,9 +240,10 @@ def test_garbage_on_the_listening_socket_harms_nobody(node, master, bridge):
 
 
 class FakePublisher:
-    """A ROS 1 publisher of /bp/fake that answers each connection with given bytes and closes it."""
+    """A ROS 1 publisher that answers each connection with given bytes and closes it."""
 
-    def __init__(self, master, replies):
+    def __init__(self, master, replies, topic="/bp/fake"):
+        self.topic = topic
         self.socket = socket.create_server(("127.0.0.1", 0))
         self.replies = list(replies)
         self.answered = 0
@@ -251,7 +253,7 @@ class FakePublisher:
         threading.Thread(target=self.server.serve_forever, daemon=True).start()
         threading.Thread(target=self.serve, daemon=True).start()
         self.proxy = ServerProxy(master.uri)
-        self.proxy.registerPublisher("/fake", "/bp/fake", "std_msgs/String", self.uri)
+        self.proxy.registerPublisher("/fake", topic, "std_msgs/String", self.uri)
 
     def request_topic(self, _caller, _topic, _protocols):
         return [1, "", ["TCPROS", "127.0.0.1", self.socket.getsockname()[1]]]
@@ -270,7 +272,7 @@ class FakePublisher:
                 connection.recv(1)
 
     def close(self):
-        self.proxy.unregisterPublisher("/fake", "/bp/fake", self.uri)
+        self.proxy.unregisterPublisher("/fake", self.topic, self.uri)
         self.server.shutdown()
         self.server.server_close()
         self.socket.close()
@@ -314,4 +316,27 @@ def test_lost_publisher_is_found_again_within_two_seconds(node, master, bridge):
     start = time.monotonic()
     wait_until(lambda: "again" in received, "it is tried again", LIMIT_S)
     assert time.monotonic() - start < 10.0  # 0.1 s, 0.2 s, 0.4 s of waiting, and a loaded machine
+    fake.close()
+
+
+def test_flood_crosses_in_order_and_what_has_to_go_is_counted(node, master, bridge):
+    """20000 messages at once on a route of depth 10: the newest get through, and each is either counted as crossed or as dropped."""
+    received = texts(node, "/bp/flood", 20_000)
+    greeting = header(callerid="/fake", type="std_msgs/String", md5sum=SUM, latching="0", topic="/bp/flood")
+    probe = FakePublisher(master, [greeting + message("(probe)")], "/bp/flood")
+    wait_until(lambda: received, "a probe arrives: the ends in ROS 2 know each other", LIMIT_S)
+    probe.close()
+    fake = FakePublisher(master, [greeting + b"".join(message(f"{number:05}") for number in range(20_000)), greeting], "/bp/flood")
+    wait_until(lambda: received[-1] == "19999", "the last one arrives", LIMIT_S)
+    assert received == sorted(received)
+    figures = {}
+    sent = 20_000 + probe.answered
+
+    def counted():
+        figures.update(json.loads(bridge.stats_file.read_text())["topics"]["/bp/flood"])
+        return figures["count"] + figures["dropped"] >= sent
+
+    wait_until(counted, f"all are counted: {figures}", LIMIT_S)
+    assert figures["count"] + figures["dropped"] == sent
+    assert len(received) <= figures["count"]
     fake.close()

@@ -3,12 +3,14 @@
 #include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/timerfd.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <future>
 #include <system_error>
+#include <utility>
 
 #include "counters.hpp"
 
@@ -17,17 +19,23 @@ namespace {
 
 constexpr int kTickMs = 500;
 constexpr int kEventsAtOnce = 64;
+constexpr long kRestNs = 1'000'000;
+constexpr Key kWakeKey = 0, kTimerKey = UINT64_MAX;
 
 [[noreturn]] void fail(const char * what) { throw std::system_error(errno, std::generic_category(), what); }
 
 }  // namespace
 
-Loop::Loop() : epoll_(epoll_create1(EPOLL_CLOEXEC)), wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-  if (epoll_ < 0 || wake_ < 0) fail("epoll");
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = 0;
-  if (epoll_ctl(epoll_, EPOLL_CTL_ADD, wake_, &event) != 0) fail("epoll_ctl");
+Loop::Loop()
+: epoll_(epoll_create1(EPOLL_CLOEXEC)), wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+  timer_(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
+  if (epoll_ < 0 || wake_ < 0 || timer_ < 0) fail("epoll");
+  for (const auto & [fd, key] : {std::pair{wake_, kWakeKey}, std::pair{timer_, kTimerKey}}) {
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = key;
+    if (epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) fail("epoll_ctl");
+  }
   thread_ = std::thread([this] { run(); });
 }
 
@@ -38,6 +46,7 @@ Loop::~Loop() {
   handlers_.clear();
   close(epoll_);
   close(wake_);
+  close(timer_);
 }
 
 Key Loop::add(int fd, std::shared_ptr<Handler> handler, uint32_t epoll_events, bool ticks) {
@@ -106,8 +115,10 @@ void Loop::run() {
     }
     const int number = epoll_wait(epoll_, events, kEventsAtOnce, ticks ? kTickMs : -1);
     for (int i = 0; i < number; ++i) {
-      if (events[i].data.u64 == 0) {
+      if (events[i].data.u64 == kWakeKey) {
         run_tasks();
+      } else if (events[i].data.u64 == kTimerKey) {
+        end_rest();
       } else if (const auto handler = find(events[i].data.u64)) {
         handler->on_ready(events[i].events);
       }
@@ -129,6 +140,23 @@ void Loop::run_tasks() {
     tasks.swap(tasks_);
   }
   for (const auto & task : tasks) task();
+}
+
+void Loop::rest(std::shared_ptr<Handler> handler) {
+  if (resting_.empty()) {
+    itimerspec soon{};
+    soon.it_value.tv_nsec = kRestNs;
+    timerfd_settime(timer_, 0, &soon, nullptr);
+  }
+  resting_.push_back(std::move(handler));
+}
+
+void Loop::end_rest() {
+  uint64_t number;
+  (void)!read(timer_, &number, sizeof number);
+  std::vector<std::shared_ptr<Handler>> rested;
+  rested.swap(resting_);
+  for (const auto & handler : rested) handler->on_rested();
 }
 
 void Loop::tick() {

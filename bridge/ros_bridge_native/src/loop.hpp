@@ -19,6 +19,8 @@ class Handler {
   virtual void on_ready(uint32_t epoll_events) = 0;
   // Return whether the handler still has to be asked again; called about every half second while it is.
   virtual bool on_tick(int64_t /*now_ns*/) { return false; }
+  // Called once, a millisecond after rest() was asked for.
+  virtual void on_rested() {}
 };
 
 using Key = uint64_t;
@@ -34,20 +36,25 @@ class Loop {
   void remove(Key key, int fd);
   void post(std::function<void()> task);
   void run_and_wait(const std::function<void()> & task);
+  // The loop's thread only:
+  void rest(std::shared_ptr<Handler> handler);
 
  private:
   void run();
   void run_tasks();
   void tick();
+  void end_rest();
   std::shared_ptr<Handler> find(Key key);
 
   int epoll_;
   int wake_;
+  int timer_;
   std::atomic<bool> ended_{false};
   std::mutex mutex_;
   Key next_key_ = 1;
   std::unordered_map<Key, std::shared_ptr<Handler>> handlers_;
   std::vector<Key> ticking_;
+  std::vector<std::shared_ptr<Handler>> resting_;
   std::vector<std::function<void()>> tasks_;
   std::thread thread_;
 };

@@ -81,11 +81,16 @@ void InConnection::receive() {
     room = large_bytes_ - large_->size();
   } else {
     received_.reserve(kReadBytes);
+    if (received_.size() == received_.capacity() && !skip_oldest()) return loop_.change(key_, fd_, 0);  // until it has rested
     to = received_.data() + received_.size();
     room = received_.capacity() - received_.size();
   }
   const ssize_t number = recv(fd_, to, room, MSG_DONTWAIT);
   if (number < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  if (number <= 0 && rests_) {
+    ends_ = true;  // what the publisher has sent before it went does not wait
+    take_messages();
+  }
   if (number <= 0) return shut(number == 0 ? "the publisher has closed the connection" : std::strerror(errno));
   if (large_) {
     large_->set_size(large_->size() + number);
@@ -94,7 +99,22 @@ void InConnection::receive() {
   }
   received_.set_size(received_.size() + number);
   if (state_ == State::kHeader) take_header();
-  if (state_ == State::kOpen) take_messages();
+  if (state_ == State::kOpen && !rests_) take_messages();
+}
+
+// Make room among what waits. Returns false if that is a message that is not here as a whole.
+bool InConnection::skip_oldest() {
+  size_t done = 0, number = 0;
+  while (received_.size() - done > received_.size() / 2) {
+    const size_t rest = received_.size() - done;
+    if (rest < sizeof(uint32_t) || rest - sizeof(uint32_t) < length_at(received_.data() + done)) break;
+    done += sizeof(uint32_t) + length_at(received_.data() + done);
+    ++number;
+  }
+  std::memmove(received_.data(), received_.data() + done, received_.size() - done);
+  received_.set_size(received_.size() - done);
+  inbox_.on_skipped(number);
+  return number > 0;
 }
 
 void InConnection::take_header() {
@@ -146,12 +166,24 @@ void InConnection::take_messages() {
       continue;
     }
     if (received_.size() - done < sizeof(uint32_t) + length) break;
+    if (!ends_ && !inbox_.ready()) {
+      rests_ = true;
+      loop_.rest(shared_from_this());
+      break;
+    }
     inbox_.on_small(*this, message + sizeof(uint32_t), length);
     done += sizeof(uint32_t) + length;
   }
   if (done == 0) return;
   std::memmove(received_.data(), received_.data() + done, received_.size() - done);
   received_.set_size(received_.size() - done);
+}
+
+void InConnection::on_rested() {
+  rests_ = false;
+  if (state_ != State::kOpen) return;
+  take_messages();
+  if (!rests_ && state_ == State::kOpen) loop_.change(key_, fd_, EPOLLIN);
 }
 
 // The received bytes begin with a large message: move it to a buffer of its own. Returns whether it was there as a whole.

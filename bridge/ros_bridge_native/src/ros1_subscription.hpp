@@ -22,6 +22,10 @@ class Inbox {
   virtual ~Inbox() = default;
   // The headers fit. Return whether messages may come at once; if not, resume() has to be called.
   virtual bool on_open(InConnection & connection) = 0;
+  // Return whether another small message may come now; if not, the connection rests for a millisecond.
+  virtual bool ready() = 0;
+  // That many messages had to go while the connection rested.
+  virtual void on_skipped(size_t number) = 0;
   virtual void on_small(InConnection & connection, const uint8_t * message, size_t size) = 0;
   virtual Frame buffer() = 0;
   virtual void on_large(InConnection & connection, Frame message) = 0;
@@ -41,6 +45,7 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
 
   void on_ready(uint32_t epoll_events) override;
   bool on_tick(int64_t now_ns) override;
+  void on_rested() override;
 
   const uint64_t token;
   std::string peer;
@@ -54,6 +59,7 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   void receive();
   void take_messages();
   void take_header();
+  bool skip_oldest();
   bool begin_large();
   void end_large();
 
@@ -63,6 +69,8 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   const std::string greeting_;
   const TopicIdentity & identity_;
   State state_ = State::kConnecting;
+  bool ends_ = false;
+  bool rests_ = false;  // what comes waits in received_, of which the oldest goes when it is full
   int fd_ = -1;
   Key key_ = 0;
   int64_t born_ns_;

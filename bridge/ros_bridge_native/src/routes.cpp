@@ -18,7 +18,7 @@ void Route::count_bad(Events & events, uint64_t token, const std::string & from)
 }
 
 UpRoute::UpRoute(Machinery & machinery, Specification specification)
-: machinery_(machinery), specification_(std::move(specification)) {
+: machinery_(machinery), specification_(std::move(specification)), tokens_(static_cast<double>(specification_.quality.depth)) {
   writers_.push_back({make_writer(), "", false});
 }
 
@@ -89,6 +89,18 @@ void UpRoute::grant(uint64_t token) {
 size_t UpRoute::target_peers() {
   std::lock_guard<std::mutex> lock(writers_mutex_);
   return writers_.front().publisher->peers();
+}
+
+// At most `depth` messages a millisecond go out. A burst, such as what has piled up while this process had no processor, would push older
+// messages out of the queues of ROS 2's subscribers, which are mostly as deep, before they are scheduled to take them.
+bool UpRoute::ready() {
+  const auto most = static_cast<double>(specification_.quality.depth);
+  const int64_t now = now_ns();
+  tokens_ = std::min(most, tokens_ + static_cast<double>(now - tokens_at_ns_) * 1e-6 * most);
+  tokens_at_ns_ = now;
+  if (tokens_ < 1.0) return false;
+  tokens_ -= 1.0;
+  return true;
 }
 
 void UpRoute::on_small(InConnection & connection, const uint8_t * message, size_t size) {

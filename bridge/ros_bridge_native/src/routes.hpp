@@ -79,6 +79,8 @@ class UpRoute : public Route, public Inbox, public Job {
   };
 
   bool on_open(InConnection & connection) override;
+  bool ready() override;
+  void on_skipped(size_t number) override { counters.dropped_overrun.fetch_add(number); }
   void on_small(InConnection & connection, const uint8_t * message, size_t size) override;
   Frame buffer() override { return pool_->get(); }
   void on_large(InConnection & connection, Frame message) override;
@@ -91,6 +93,8 @@ class UpRoute : public Route, public Inbox, public Job {
   Machinery & machinery_;
   const Specification specification_;
   std::map<uint64_t, std::shared_ptr<InConnection>> connections_;  // the loop's thread only
+  double tokens_;                                                  // the loop's thread only
+  int64_t tokens_at_ns_ = 0;
   std::mutex writers_mutex_;
   std::vector<Writer> writers_;
   std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
