@@ -11,6 +11,7 @@ from typing import Any
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
@@ -100,7 +101,7 @@ def _spin(node: Node) -> None:
 def main() -> None:
     """Do what the order says."""
     order = protocol.read_order()
-    rclpy.init(args=[])
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)  # the bench ends us by SIGTERM, without ado
     node = rclpy.create_node(f"bench_end_{os.getpid()}")
     {"send": send, "receive": receive, "serve": serve, "call": call}[order["do"]](order, node)
     sys.stdout.flush()
