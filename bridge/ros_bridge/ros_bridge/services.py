@@ -75,6 +75,7 @@ class Ros2Server:
         self._wait_for_server(deadline)
         answered = threading.Event()
         future = self._client.call_async(request)
+        future._set_executor = lambda _: None  # noqa: SLF001 - else its callback waits for another round of the executor
         future.add_done_callback(lambda _: answered.set())
         try:
             while not answered.wait(min(POLL_S, deadline.remaining_s("the server in ROS 2 has not answered"))):
