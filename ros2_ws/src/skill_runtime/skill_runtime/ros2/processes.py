@@ -16,6 +16,7 @@ RESTART_S = 0.2
 CONVINCING_S = 5.0
 """A process that ends by itself within so long has something that a new start does not mend."""
 END_S = 15.0
+LOOK_S = 0.5
 PR_SET_PDEATHSIG = 1
 
 
@@ -30,6 +31,16 @@ def end_with(parent: int) -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def wait_for(stop: threading.Event) -> None:
+    """Wait in the main thread for what a signal's handler sets.
+
+    A signal that comes just before the wait begins interrupts nothing, and its handler would not run before the wait ends; so
+    no wait is for ever.
+    """
+    while not stop.wait(LOOK_S):
+        pass
 
 
 class Part:
@@ -96,7 +107,7 @@ def supervise(skillset: str, skills: Sequence[str], words: Sequence[str], stop: 
     parts = [Part(f"{skillset} {name}", own_command(["--part", name, *words]), stop) for name in names]
     for part in parts:
         part.start()
-    stop.wait()
+    wait_for(stop)
     # The skill managers first: their functions are stopped through the resource manager.
     for group in (parts[1:], parts[:1]):
         for part in group:

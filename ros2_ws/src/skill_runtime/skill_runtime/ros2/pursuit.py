@@ -25,6 +25,8 @@ from skill_runtime.waiting import Host, Pending
 
 ACKNOWLEDGE_TIMEOUT_S = 5.0
 """Managers acknowledge any goal at once; no sign for so long (wall clock) means that there will be none."""
+SILENCE_LIMIT_S = 10.0
+"""A skill manager in a process of its own may die between taking a goal and asking for it: then no event ever tells of it."""
 RESULT_GRACE_S = 0.5
 """The event of an end waits so long for the result: who has it has seen the resources after the step, too."""
 
@@ -57,6 +59,7 @@ class Pursuit:
         self._lock = threading.Lock()
         self._sent_s = time.monotonic()
         self._acknowledged = False
+        self._heard = False
         self._interrupt_wanted = False
         self._last_event: tuple[float, Any] | None = None
 
@@ -68,7 +71,7 @@ class Pursuit:
     @property
     def restless(self) -> bool:
         """Tell whether ``tick`` has to be called."""
-        return not self._acknowledged or self._last_event is not None
+        return not (self._acknowledged and self._heard) or self._last_event is not None
 
     def tick(self) -> None:
         """End what did not get its answer in time."""
@@ -77,6 +80,9 @@ class Pursuit:
             self._end_by_event(self._last_event[1])
         elif not self._acknowledged and now - self._sent_s > ACKNOWLEDGE_TIMEOUT_S:
             self.handle.fail(f"the managers of {self._skillset} did not answer within {ACKNOWLEDGE_TIMEOUT_S:g} s")
+        elif not self._heard and now - self._sent_s > SILENCE_LIMIT_S:
+            self._goal.cancel_goal_async()
+            self.handle.fail(f"the managers of {self._skillset} took the goal, and told nothing of it within {SILENCE_LIMIT_S:g} s")
 
     def ask_again(self) -> None:
         """Ask for the result once more; who does not know the goal answers at once."""
@@ -91,6 +97,7 @@ class Pursuit:
 
     def on_event(self, event: Any) -> None:
         """Take an event of this execution."""
+        self._heard = True
         self._acknowledge()
         state = ExecutionState(event.state)
         if state.terminal:
@@ -125,6 +132,7 @@ class Pursuit:
 
     def _on_feedback(self, message: Any) -> None:
         feedback = message.feedback
+        self._heard = True
         self._acknowledge()
         self.handle.run(feedback.progress, {name: getattr(feedback, name) for name in fields_of(feedback) if name not in _FEEDBACK_FIELDS})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import signal
 import sys
 import threading
@@ -17,10 +18,12 @@ from rclpy.signals import SignalHandlerOptions
 from skill_language.model import Skillset
 from skill_runtime.ros2.data_manager import DataBindings
 from skill_runtime.ros2.manager_node import HooksFactory, SkillsetNode
-from skill_runtime.ros2.processes import RESOURCES, end_with, supervise
+from skill_runtime.ros2.processes import RESOURCES, end_with, supervise, wait_for
 from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode
 
 END_S = 2.0
+END_LIMIT_S = 30.0
+"""Wall clock; hooks may take some seconds to stop their functions."""
 ROS_ARGUMENTS = "--ros-args"
 ALL = "all"
 
@@ -67,6 +70,7 @@ def run_skillset(
         node.destroy_node()
     finally:
         rclpy.try_shutdown()
+        faulthandler.cancel_dump_traceback_later()
 
 
 def make_part(
@@ -121,7 +125,9 @@ def spin_until(node: SkillsetNode | SeparateResourceNode | SkillNode, stop: thre
 
     thread = threading.Thread(target=spin, name="executor")
     thread.start()
-    stop.wait()
+    wait_for(stop)
+    # Whatever hangs from here on (a hook, the middleware): tell where, and end all the same.
+    faulthandler.dump_traceback_later(END_LIMIT_S, exit=True)
     node.close("the managers were shut down")
     # In the executor's own queue, so after the results of what was failed.
     executor.create_task(end)
