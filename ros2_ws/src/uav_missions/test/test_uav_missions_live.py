@@ -14,6 +14,8 @@ pytest.importorskip("rclpy")
 
 from uav_skills_rig import Rig
 
+CLOCKS_APART_S = 0.1
+"""Managers under load stamp by a clock message that is some ticks old."""
 ROUTE = {"route": [[0.0, 0.0, 3.0], [8.0, 0.0, 3.0], [8.0, 6.0, 3.0]]}
 
 
@@ -101,13 +103,13 @@ def test_losing_the_zed_is_survived_within_a_second(mission):
     record = mission.read("mission.json")
     assert record["outcome"] == "degraded"
     assert "zed_ok" in record["reason"]
-    after = [event for event in mission.events() if event["kind"] == "EXECUTION" and event["stamp_s"] >= failure_s - 0.1]
+    after = [event for event in mission.events() if event["kind"] == "EXECUTION" and event["stamp_s"] >= failure_s - CLOCKS_APART_S]
     ends = {(event["skill"], event["state"]) for event in after}
     assert ("zed_depthmap", "RESOURCE_INVARIANT_VIOLATED") in ends
     assert ("goto_straight", "INTERRUPTED") in ends
     (lidar,) = [event for event in after if (event["skill"], event["state"]) == ("lidar_depthmap", "RUNNING")]
     assert lidar["stamp_s"] - failure_s < 1.0
-    skills = starts_since(mission, failure_s)
+    skills = starts_since(mission, failure_s - CLOCKS_APART_S)
     assert skills == ["lidar_depthmap", "rotate_head", "lock_head", "goto", "rotate_head", "lock_head", "goto", "land"]
 
 

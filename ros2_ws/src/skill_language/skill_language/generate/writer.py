@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -61,8 +62,13 @@ def _replace(new: Path, place: Path, aside: Path) -> None:
 
 
 def _move(source: Path, target: Path) -> None:
-    """Rename; copy where the system can't rename: a folder of a lower layer, in containers."""
-    shutil.move(source, target)
+    """Rename; copy what the system can't rename: a folder of a lower layer, in containers."""
+    try:
+        source.rename(target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        shutil.move(source, target)
 
 
 def _holds(out: Path, entry: str, texts: Mapping[str, str]) -> bool:
