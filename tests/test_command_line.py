@@ -38,7 +38,7 @@ def test_skillset_with_a_syntax_error_shows_where(tmp_path: Path) -> None:
     broken.write_text("skillset broken {\n  resource door {\n    initial SHUT\n    SHUT -> -> OPEN\n  }\n}\n", encoding="utf-8")
     done = alula("check", str(broken))
     said = done.stdout + done.stderr
-    assert done.returncode == 2
+    assert done.returncode == 1
     assert f"{broken}:4:" in said
     assert "SHUT -> -> OPEN" in said
     assert "^" in said

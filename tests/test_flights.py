@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from alula_testing.flights import Flight, start_flight, story
+from skill_runtime.core import ExecutionState
 
 pytestmark = [pytest.mark.flight, pytest.mark.timeout(1200)]
 Summary = dict[str, Any]
@@ -65,7 +66,7 @@ def test_nominal_map_is_true_and_complete(nominal: Summary) -> None:
 
 def test_every_execution_of_a_flight_ends_exactly_once(pair: tuple[Flight, Flight], nominal: Summary, failing: Summary) -> None:
     for flight, summary in zip(pair, (nominal, failing), strict=True):
-        terminal = [e["id"] for e in flight.events() if e.get("skill") and e["state"] not in {"REQUESTED", "RUNNING"}]
+        terminal = [e["id"] for e in flight.events() if e.get("skill") and ExecutionState(e["state"]).terminal]
         assert len(terminal) == len(set(terminal))
         assert set(terminal) == {e["id"] for e in summary["skills"]}
 

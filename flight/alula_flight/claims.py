@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import socket
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,6 +11,8 @@ from dataclasses import dataclass
 # into Linux's ephemeral range. 0 is everybody's default and left alone.
 DOMAINS = range(1, 102)
 RTPS_PORT, RTPS_PORTS_PER_DOMAIN = 7400, 250
+# Linux takes outgoing connections' ports from 32768 up; the claims of domains lie among these.
+PORTS = [port for port in range(20_000, 32_700) if (port - RTPS_PORT) % RTPS_PORTS_PER_DOMAIN]
 
 
 class NoFreeDomainError(Exception):
@@ -17,10 +20,18 @@ class NoFreeDomainError(Exception):
 
 
 def free_port() -> int:
-    """Return a TCP port on loopback that nobody listens on at this moment."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
+    """Return a TCP port on loopback that nobody listens on at this moment.
+
+    Below the range that the system takes ports of outgoing connections from: any process could be given a port of that range
+    between this look and the moment when our own process listens.
+    """
+    while True:
+        port = secrets.choice(PORTS)
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
         return port
 
 

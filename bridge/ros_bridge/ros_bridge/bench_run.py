@@ -7,7 +7,6 @@ import json
 import os
 import queue
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from alula_flight.claims import free_port
 from ros_bridge.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Master
@@ -220,13 +220,6 @@ def _configuration(case: Case, names: list[str]) -> dict[str, list[dict[str, Any
         return {"services": [{"name": name, "server": server, "type": "std_srvs/SetBool"} for name in names]}
     direction = "ros1_to_ros2" if case.way is Way.UP else "ros2_to_ros1"
     return {"topics": [{"name": name, "direction": direction, "type": ROS1_TYPES[case.kind]} for name in names]}
-
-
-def free_port() -> int:
-    """Return a port that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @contextlib.contextmanager

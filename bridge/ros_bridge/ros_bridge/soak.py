@@ -24,6 +24,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from alula_flight.claims import free_port
 from ros_bridge import two_worlds
 from ros_bridge.fuzz import memory_mb
 
@@ -78,12 +79,6 @@ class SoakFigures:
         """Tell whether nothing was lost and nothing grew."""
         lost = self.up.lost + self.down.lost + self.up.disorder + self.down.disorder + self.calls_failed
         return lost == 0 and self.up.sent > 0 and self.calls > 0 and self.grown_mb < GROWTH_LIMIT_MB
-
-
-def free_port() -> int:
-    """Return a port that nobody uses now."""
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
 
 
 class Master:

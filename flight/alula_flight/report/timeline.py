@@ -16,6 +16,8 @@ _COLOURS = {
     "INTERRUPTED": "interrupted",
     "RUNNING": "running",
     "REQUESTED": "running",
+    "PAUSED": "running",
+    "INTERRUPTING": "running",
     "NOT_VALIDATED": "failure",
     "NOT_READY": "failure",
     "FAILED": "failure",
