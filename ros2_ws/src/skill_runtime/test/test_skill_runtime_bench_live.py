@@ -16,13 +16,12 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("navigation_interfaces.action")
 
-from alula_flight.claims import is_claimed  # noqa: E402
-
-from skill_runtime.bench.cases import CASES  # noqa: E402
-from skill_runtime.bench.clients import States  # noqa: E402
-from skill_runtime.bench.run import LEAST, open_bench  # noqa: E402
-from skill_runtime.core import ExecutionState  # noqa: E402
-from skill_runtime.handle import SkillHandle  # noqa: E402
+from alula_flight.claims import is_claimed
+from skill_runtime.bench.cases import CASES
+from skill_runtime.bench.clients import States
+from skill_runtime.bench.run import LEAST, open_bench
+from skill_runtime.core import ExecutionState
+from skill_runtime.handle import SkillHandle
 
 LIMIT_S = 60.0
 
