@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType, ModuleType
 
 import rclpy
@@ -66,7 +66,7 @@ def run_skillset(
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings)
-        spin_until(node, stop)
+        spin_until(node, stop, at_stop=_limit_the_end)
         node.destroy_node()
     finally:
         rclpy.try_shutdown()
@@ -96,7 +96,18 @@ def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Nam
     return parser.parse_args(words[:split]), words[split:]
 
 
-def spin_until(node: SkillsetNode | SeparateResourceNode | SkillNode, stop: threading.Event) -> None:
+def _limit_the_end() -> None:
+    """Have this process say where it hangs, and end all the same, when its end takes too long: a hook, the middleware."""
+    faulthandler.dump_traceback_later(END_LIMIT_S, exit=True)
+
+
+def nothing_more() -> None:
+    """Do nothing more at the stop."""
+
+
+def spin_until(
+    node: SkillsetNode | SeparateResourceNode | SkillNode, stop: threading.Event, *, at_stop: Callable[[], None] = nothing_more
+) -> None:
     """Spin a node in a thread of its own until ``stop``; then end its executions while it still spins.
 
     A callback that raises (most are of hooks) fails what runs, for nobody knows whose function is without its watch now;
@@ -126,8 +137,7 @@ def spin_until(node: SkillsetNode | SeparateResourceNode | SkillNode, stop: thre
     thread = threading.Thread(target=spin, name="executor")
     thread.start()
     wait_for(stop)
-    # Whatever hangs from here on (a hook, the middleware): tell where, and end all the same.
-    faulthandler.dump_traceback_later(END_LIMIT_S, exit=True)
+    at_stop()
     node.close("the managers were shut down")
     # In the executor's own queue, so after the results of what was failed.
     executor.create_task(end)
