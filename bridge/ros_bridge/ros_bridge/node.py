@@ -27,7 +27,9 @@ from ros_bridge.stats import write_json
 
 import rclpy  # isort: skip
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # isort: skip
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor  # isort: skip
+from rclpy.exceptions import InvalidHandle
+
 from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager  # isort: skip
 
 if TYPE_CHECKING:
@@ -100,10 +102,19 @@ class Bridge:
             self.table.start(spec)
 
     def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            logger.info("ROS 2 was shut down")
+        while True:
+            try:
+                self._executor.spin()
+            except ExternalShutdownException:
+                logger.info("ROS 2 was shut down")
+            except ShutdownException:
+                return
+            except InvalidHandle:
+                continue  # rclpy 7.1.6: an end was closed by another thread while the executor was about to look at it
+            except Exception:
+                logger.exception("a callback of ROS 2 raised")
+                continue
+            return
 
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
         """Bridge until asked to stop; figures are this thread's."""

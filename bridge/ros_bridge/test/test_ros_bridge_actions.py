@@ -18,6 +18,7 @@ from rclpy.qos import qos_profile_action_status_default
 from ros_bridge_harness import RUNNING, BridgeProcess, Master, Ros1Peer, wait_until
 
 from alula_flight.claims import free_port
+from alula_testing.ros2 import spin
 
 CONFIG = """
 topics: []
@@ -70,7 +71,7 @@ class Node2:
         self.group = ReentrantCallbackGroup()
         self.executor = MultiThreadedExecutor(4)
         self.executor.add_node(self.node)
-        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread = threading.Thread(target=spin, args=(self.executor,), daemon=True)
         self.clients: dict[str, ActionClient] = {}
         self.servers: list[ActionServer] = []
         self.started: list[Node2] = []

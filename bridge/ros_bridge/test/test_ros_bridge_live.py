@@ -21,6 +21,7 @@ from std_srvs.srv import Empty, SetBool
 from uav_msgs.msg import GuidanceState
 
 from alula_flight.claims import free_port
+from alula_testing.ros2 import spin
 from ros_bridge.conversion import Types, ament_prefixes
 
 CONFIG = """
@@ -60,7 +61,7 @@ class Ros2Peer:
         self.node = rclpy.create_node("bridge_test_peer")
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
-        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread = threading.Thread(target=spin, args=(self.executor,), daemon=True)
         self.thread.start()
         self.ends: list[tuple[Callable, object]] = []
 

@@ -17,6 +17,7 @@ from ros_bridge_harness import RUNNING, BridgeProcess, Master, Ros1Peer, wait_un
 from std_msgs.msg import String
 
 from alula_flight.claims import free_port
+from alula_testing.ros2 import spin
 
 CONFIG = """
 topics:
@@ -54,7 +55,7 @@ def node(bridge):
     node = rclpy.create_node("plane_test_peer")
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread = threading.Thread(target=spin, args=(executor,), daemon=True)
     thread.start()
     yield node
     executor.shutdown(timeout_sec=2.0)

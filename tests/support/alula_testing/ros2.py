@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -21,3 +22,22 @@ def ros2_domain() -> Iterator[int]:
     yield claim.domain
     rclpy.try_shutdown()
     claim.release()
+
+
+def spin(executor: Any) -> None:
+    """Spin until the executor is shut down, in a thread of its own.
+
+    rclpy 7.1.6 raises InvalidHandle where another thread destroys a subscription or a client that the executor is about to look at;
+    it can go on afterwards, so tests may destroy what they made.
+    """
+    from rclpy.exceptions import InvalidHandle
+    from rclpy.executors import ExternalShutdownException, ShutdownException
+
+    while True:
+        try:
+            executor.spin()
+        except InvalidHandle:
+            continue
+        except (ExternalShutdownException, ShutdownException):
+            return
+        return

@@ -11,6 +11,7 @@ from navigation_managers.model import SKILLSET
 from rclpy.executors import SingleThreadedExecutor
 from skill_runtime_models import Recorder
 
+from alula_testing.ros2 import spin
 from skill_runtime.ros2 import SkillsetNode
 
 SOON_S = 10.0
@@ -33,7 +34,7 @@ class Spun:
         self.node = node
         self.executor = executor or SingleThreadedExecutor()
         self.executor.add_node(node)
-        self._thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self._thread = threading.Thread(target=spin, args=(self.executor,), daemon=True)
         self._thread.start()
 
     def close(self) -> None:

@@ -15,6 +15,7 @@ from skill_runtime_models import Recorder
 from skillset_interfaces.msg import Event
 from skillset_interfaces.srv import Transition
 
+from alula_testing.ros2 import spin
 from skill_runtime.core import ExecutionState
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 from skill_runtime.ros2.names import EVENTS
@@ -63,7 +64,7 @@ class Spinning:
     def spin(self, node):
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        thread = threading.Thread(target=executor.spin, daemon=True)
+        thread = threading.Thread(target=spin, args=(executor,), daemon=True)
         thread.start()
         self.running.append((node, executor, thread))
         return node
