@@ -222,8 +222,9 @@ class Panel(App[None]):
     def action_resources(self) -> None:
         """Go to the first extern transition that is possible."""
         for one in self.query("ResourceLine Button"):
-            one.focus()
-            return
+            if one.display:
+                one.focus()
+                return
 
     def action_skillset(self, step: int) -> None:
         """Show the next or the previous skillset."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
-from skill_language.model import Skillset
+from skill_language.model import Resource, Skillset
 from skill_runtime.core.situation import Situation
 from skill_runtime.core.why import unmet
 
@@ -21,11 +21,12 @@ VALUE_WIDTH = 60
 
 @dataclass(frozen=True)
 class ResourceRow:
-    """A resource; ``targets`` are the states that an extern transition leads to from here."""
+    """A resource; ``targets`` are the states that an extern transition leads to from here, ``every_target`` those from anywhere."""
 
     name: str
     state: str
     targets: tuple[str, ...]
+    every_target: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -147,11 +148,13 @@ class SkillsetView:
     def resource_rows(self) -> list[ResourceRow]:
         """Return the resources in the model's order."""
         with self._lock:
-            return [ResourceRow(r.name, self._states.get(r.name, "?"), self._targets(r.name)) for r in self.model.resources]
+            return [self._resource_row(resource) for resource in self.model.resources]
 
-    def _targets(self, resource: str) -> tuple[str, ...]:
-        state = self._states.get(resource)
-        return tuple(arrow.target for arrow in self.model.resource(resource).transitions if arrow.extern and arrow.source == state)
+    def _resource_row(self, resource: Resource) -> ResourceRow:
+        state = self._states.get(resource.name, "?")
+        arrows = [arrow for arrow in resource.transitions if arrow.extern]
+        here = tuple(arrow.target for arrow in arrows if arrow.source == state)
+        return ResourceRow(resource.name, state, here, tuple(dict.fromkeys(arrow.target for arrow in arrows)))
 
     def data_rows(self, now_ns: int) -> list[DataRow]:
         """Return the data in the model's order; ``now_ns`` is the mission clock."""

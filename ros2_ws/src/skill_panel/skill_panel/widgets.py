@@ -115,13 +115,33 @@ class ResourceLine(Horizontal):
     def __init__(self, row: ResourceRow) -> None:
         super().__init__(classes="resource")
         self.row = row
+        self._state = Label(row.state, classes="resource-state")
+        self._buttons = [Button(f"→ {to}", name=to, compact=True, classes="transition") for to in row.every_target]
 
     def compose(self) -> ComposeResult:
         """Lay out the line."""
         yield Label(self.row.name, classes="resource-name")
-        yield Label(self.row.state, classes="resource-state")
-        for target in self.row.targets:
-            yield Button(f"→ {target}", name=target, compact=True, classes="transition")
+        yield self._state
+        yield from self._buttons
+
+    def on_mount(self) -> None:
+        """Show what is possible now."""
+        self.show(self.row)
+
+    def show(self, row: ResourceRow) -> None:
+        """Show the state and its buttons at once; where one that goes had the focus, the line's first one takes it.
+
+        The buttons of all states stay mounted: making them anew takes several turns of the event loop, and a focus that is set
+        after those would take the keys from where the user has gone meanwhile.
+        """
+        focused = self.screen.focused
+        self.row = row
+        self._state.update(row.state)
+        for button in self._buttons:
+            button.display = button.name in row.targets
+        shown = [button for button in self._buttons if button.display]
+        if isinstance(focused, Button) and focused in self._buttons and not focused.display:
+            self.screen.set_focus(shown[0] if shown else None)
 
     def on_button_pressed(self, event: Button.Pressed) -> None:
         """Ask for the transition of the button."""
@@ -130,28 +150,20 @@ class ResourceLine(Horizontal):
 
 
 class ResourceList(VerticalScroll):
-    """All resources; a line is made anew when its state changes, and its first button keeps the focus."""
+    """All resources."""
 
     can_focus = False
 
     def show(self, rows: Sequence[ResourceRow]) -> None:
-        """Show the rows."""
+        """Show the rows; lines stay while the resources are the same."""
         lines = list(self.query(ResourceLine))
-        if [line.row.name for line in lines] != [row.name for row in rows]:
+        if [(line.row.name, line.row.every_target) for line in lines] != [(row.name, row.every_target) for row in rows]:
             self.remove_children()
             self.mount_all(ResourceLine(row) for row in rows)
             return
         for line, row in zip(lines, rows, strict=True):
             if line.row != row:
-                focused = self.screen.focused in list(line.query(Button))
-                line.row = row
-                self.call_later(self._renew, line, focus=focused)
-
-    async def _renew(self, line: ResourceLine, *, focus: bool) -> None:
-        await line.recompose()
-        buttons = list(line.query(Button))
-        if focus and buttons:
-            buttons[0].focus()
+                line.show(row)
 
 
 class SkillForm(VerticalScroll):

@@ -71,14 +71,20 @@ class Screen:
     def line(self, resource: str) -> ResourceLine:
         return next(line for line in self.app.query(ResourceLine) if line.row.name == resource)
 
+    async def go_to_table(self) -> None:
+        """Leave the input; the focus follows some turns of the event loop later."""
+        await self.pilot.press("escape")
+        await self.until(lambda: self.app.query_one(SkillTable).has_focus, "the table has the focus")
+
     async def press_transition(self, resource: str, to: str) -> None:
         """Take an extern transition by its button, once that is there."""
 
         def button() -> Button | None:
-            return next((one for one in self.line(resource).query(Button) if one.name == to), None)
+            return next((one for one in self.line(resource).query(Button) if one.name == to and one.display), None)
 
         await self.until(lambda: button() is not None, f"{resource} has a button for {to}")
         button().focus()
+        await self.until(lambda: button().has_focus, f"the button for {to} has the focus")
         await self.pilot.press("enter")
         await self.until(lambda: self.line(resource).row.state == to, f"{resource} is {to}")
 
@@ -113,7 +119,8 @@ async def why_not_is_live(screen: Screen) -> None:
 
 async def start_pause_interrupt(screen: Screen) -> None:
     pilot = screen.pilot
-    await pilot.press("escape", "enter")  # from the table to the first input
+    await screen.go_to_table()
+    await pilot.press("enter")  # from the table to the first input
     height, speed = screen.app.query_one(SkillForm).query(Input)
     await screen.until(lambda: height.has_focus, "the first input has the focus")
     height.value = "high"
@@ -139,7 +146,8 @@ async def refusals_are_shown(screen: Screen) -> None:
     await screen.pilot.press("f5")
     await screen.until(lambda: screen.cell("takeoff", "last end") == "NOT_VALIDATED", "the hook refuses")
     await screen.until(lambda: "too high" in screen.log, "and says why")
-    await screen.pilot.press("escape", *["down"] * 6)
+    await screen.go_to_table()
+    await screen.pilot.press(*["down"] * 6)
     await screen.until(lambda: screen.app.query_one(SkillForm).skill == "land", "the form follows the cursor")
     await screen.pilot.press("enter")  # no inputs: starts at once
     await screen.until(lambda: screen.cell("land", "last end") == "NOT_READY in_air", "the managers refuse")

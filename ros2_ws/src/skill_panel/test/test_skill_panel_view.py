@@ -49,11 +49,11 @@ def skills(**states):
 
 
 def test_resources_have_the_extern_transitions_that_are_possible(view):
-    assert view.resource_rows() == [ResourceRow("door", "?", ())]
+    assert view.resource_rows() == [ResourceRow("door", "?", (), ("OPEN",))]
     view.heard_states({"door": "SHUT"})
-    assert view.resource_rows() == [ResourceRow("door", "SHUT", ("OPEN",))]
+    assert view.resource_rows() == [ResourceRow("door", "SHUT", ("OPEN",), ("OPEN",))]
     view.heard_states({"door": "OPEN"})
-    assert view.resource_rows() == [ResourceRow("door", "OPEN", ())]  # SHUT is for skills
+    assert view.resource_rows() == [ResourceRow("door", "OPEN", (), ("OPEN",))]  # SHUT is for skills
 
 
 def test_data_have_an_age_on_the_mission_clock(view):
