@@ -23,6 +23,11 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["fly", "mapping", "--seed", "x"], "--seed"),
         (["check", "no/such/file.skill"], "no/such/file.skill"),
         (["setup", "now"], "now"),
+        (["bench", "nosuch"], "nosuch"),
+        (["mock", "no/such/folder"], "no/such/folder"),
+        (["panel", "--run", "no/such/run"], "no/such/run"),
+        (["new", "robot", "Small-Rover"], "Small-Rover"),
+        (["bridge", "--config", "no/such/file.yaml"], "no/such/file.yaml"),
     ],
 )
 def test_wrong_input_is_exit_code_2_and_names_it(arguments: list[str], named: str) -> None:

@@ -74,10 +74,6 @@ class FastTopic:
         with self._lock:
             return 0 if self._route is None else int(self._native.route_source_peers(self._route))
 
-    def latching_peers(self) -> int:
-        """Return how many connected ROS 1 publishers latch."""
-        return int(self._counters().latching)
-
     def figures(self) -> Figures:
         """Return what has crossed."""
         counters = self._counters()

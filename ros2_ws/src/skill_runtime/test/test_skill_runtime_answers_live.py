@@ -26,7 +26,7 @@ from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
 from skill_runtime.hooks import SkillHooks  # noqa: E402
 from skill_runtime.ros2 import SkillsetNode  # noqa: E402
 from skill_runtime.ros2.names import LATCHED  # noqa: E402
-from skill_runtime.ros2.workers import Workers  # noqa: E402
+from skill_runtime.workers import Workers  # noqa: E402
 
 S = ExecutionState
 

@@ -13,7 +13,7 @@ from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.pauses import PauseReply
 from skill_runtime.messages import fill_why
 from skill_runtime.ros2.deferred import Deferral
-from skill_runtime.ros2.workers import Workers
+from skill_runtime.workers import Workers
 
 HOOK_ANSWERS_S = 10.0
 """A hook that has not answered after so long (wall clock) is said to be silent."""

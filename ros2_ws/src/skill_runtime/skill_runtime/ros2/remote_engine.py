@@ -21,7 +21,7 @@ from skill_runtime.core.hook_calls import HookAnswer, call_hook
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.plain import to_plain
 from skill_runtime.ros2.resource_link import ResourceLink
-from skill_runtime.ros2.workers import Workers
+from skill_runtime.workers import Workers
 
 STOPS = frozenset({"on_interrupt", "on_violation", "on_failure"})
 KEPT = 256

@@ -26,7 +26,7 @@ from skill_runtime.ros2.data_manager import DataBindings, DataManager
 from skill_runtime.ros2.due import DueTimer
 from skill_runtime.ros2.resource_manager import EventPublisher, ResourceManager
 from skill_runtime.ros2.skill_states import SkillStatesPublisher
-from skill_runtime.ros2.workers import Workers
+from skill_runtime.workers import Workers
 
 FLUSH_S = 1.0
 HOOKS_RETURN_S = 5.0

@@ -27,7 +27,7 @@ from skill_runtime.ros2.resource_link import ResourceLink
 from skill_runtime.ros2.resource_node import HOOKS_RETURN_S, ResourceNode
 from skill_runtime.ros2.skill_link import LinkedHooks, SkillLink
 from skill_runtime.ros2.skill_manager import SkillManager
-from skill_runtime.ros2.workers import Workers
+from skill_runtime.workers import Workers
 
 
 class SeparateResourceNode(ResourceNode):

@@ -14,11 +14,6 @@ def multiply(p: Quat, q: Quat) -> Quat:
     return (a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y, a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w)
 
 
-def conjugate(q: Quat) -> Quat:
-    """Return the inverse rotation of a unit quaternion."""
-    return q[0], -q[1], -q[2], -q[3]
-
-
 def rotate(q: Quat, v: Vec3) -> Vec3:
     """Turn a vector by a unit quaternion (body to world for an attitude)."""
     w, x, y, z = q
