@@ -14,10 +14,9 @@ from skillset_interfaces.srv import GetData, GetDataResponse
 from skill_language.model import Data, Skillset
 from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.plain import to_plain
+from skill_runtime.plain import message_class, to_plain
 from skill_runtime.staleness import STALE_PERIODS, is_stale
 from skillset_ros1.alarms import Alarms
-from skillset_ros1.convert import message_class
 from skillset_ros1.names import now_ns
 
 QUEUE = 10

@@ -15,8 +15,7 @@ from skillset_interfaces.srv import GetData
 from skill_language.model import Data, Skillset
 from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.plain import to_plain
-from skill_runtime.ros2.convert import message_class
+from skill_runtime.plain import message_class, to_plain
 from skill_runtime.ros2.names import LATCHED
 from skill_runtime.staleness import STALE_PERIODS, is_stale
 

@@ -12,7 +12,7 @@ from skillset_interfaces.srv import GetData
 
 from skill_language.model import Data
 from skill_language.ros_types import PRIMITIVES
-from skill_runtime.ros2.convert import message_class
+from skill_runtime.plain import message_class
 from skill_runtime.ros2.names import LATCHED
 from skill_runtime.ros2.questions import Questions
 from skill_runtime.staleness import is_stale
