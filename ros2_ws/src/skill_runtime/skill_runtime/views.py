@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from skill_language.model import Skillset
+from skill_runtime.callbacks import Forget
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, Handle, OutputsT, ResultT
 from skill_runtime.waiting import Pending
@@ -17,8 +18,6 @@ from skill_runtime.waiting import Pending
 StateT = TypeVar("StateT", bound=str)
 ValueT = TypeVar("ValueT")
 NANOSECONDS = 1e9
-Forget = Callable[[], None]
-"""Ends a subscription."""
 
 
 @dataclass(frozen=True)

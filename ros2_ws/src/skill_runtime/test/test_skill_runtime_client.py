@@ -64,7 +64,7 @@ def arrive(managers):
 
 
 def test_actions_rest_unless_an_answer_is_due(managers, uav):
-    clients = uav.navigation.client._presence.clients
+    clients = uav.navigation.client._tracker.presence.clients
     waited_for = lambda: [skill for skill, client in clients.items() if client.callback_group.can_execute(client)]  # noqa: E731
     until(lambda: waited_for() == [], "nothing is due of earlier goals")
     known = []

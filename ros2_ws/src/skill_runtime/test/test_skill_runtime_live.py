@@ -351,7 +351,7 @@ def test_the_loss_of_others_leaves_executions_alone_and_a_restart_does_not(spinn
     navigation = Navigation(spinning)
     navigation.bring(FLYING)
     handle = navigation.fly_straight()
-    presence = navigation.client._presence
+    presence = navigation.client._tracker.presence
     lost = SimpleNamespace(alive_count_change=-1, not_alive_count_change=1)
     asked = threading.Event()
     presence._on_answer, before = lambda: (before(), asked.set()), presence._on_answer
