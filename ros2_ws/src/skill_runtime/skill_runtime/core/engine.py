@@ -373,8 +373,9 @@ class SkillsetEngine:
         return stops, started
 
     def _paused(self, execution_id: str, *, paused: bool) -> PauseReply:
+        self.tick()
         replies: list[PauseReply] = []
-        self.set_paused(execution_id, replies.append, paused=paused)
+        self._pauses.set_paused(execution_id, paused=paused, reply=replies.append, wait=False)
         return replies[0]
 
     def _unknown_output(self, entry: Entry, outputs: Mapping[str, object]) -> str:
