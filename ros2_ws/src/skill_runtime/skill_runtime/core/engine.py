@@ -285,6 +285,7 @@ class SkillsetEngine:
     # --- parts -------------------------------------------------------------------------------------------------------
 
     def _paused(self, execution_id: str, *, paused: bool) -> PauseReply:
+        self.tick()
         replies: list[PauseReply] = []
-        self.set_paused(execution_id, replies.append, paused=paused)
+        self._pauses.set_paused(execution_id, paused=paused, reply=replies.append, wait=False)
         return replies[0]
