@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 from skill_runtime_local_rig import Timed, make
-from skill_runtime_models import Recorder, flying_skill, flying_skillset
+from skill_runtime_models import flying_skill, flying_skillset
 
+from alula_testing.recorder import Recorder
 from skill_language.model import Progress
 from skill_runtime.core import ExecutionEvent, ExecutionState
 from skill_runtime.local import LocalWorld

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 from skill_runtime_local_rig import make
-from skill_runtime_models import Recorder, flying_skill, flying_skillset
+from skill_runtime_models import flying_skill, flying_skillset
 
+from alula_testing.recorder import Recorder
 from skill_runtime.core import ExecutionState
 from skill_runtime.local import LocalWorld, VirtualClock, WorldError
 from skill_runtime.waiting import CannotWaitError
