@@ -162,7 +162,7 @@ class ResourceView(Generic[StateT]):
         return cast("StateT", state)
 
     def on_change(self, callback: Callable[[StateT], None]) -> Forget:
-        """Have ``callback(state)`` called after each change, on the thread that spins the node; the return value ends that."""
+        """Have ``callback(state)`` called after each change, on the thread that brings it; the return value ends that."""
         known = [self._client.resources.get(self.name)]
 
         def look(states: dict[str, str]) -> None:
@@ -217,7 +217,7 @@ class DataView(Generic[ValueT]):
         return self._client.data_feed(self.name).stale
 
     def on_change(self, callback: Callable[[ValueT], None]) -> Forget:
-        """Have ``callback(value)`` called for each value, on the thread that spins the node; the return value ends that."""
+        """Have ``callback(value)`` called for each value, on the thread that brings it; the return value ends that."""
         return self._client.data_feed(self.name).on_sample(lambda sample: callback(cast("ValueT", sample.value)))
 
     def next(self) -> Pending[ValueT]:
