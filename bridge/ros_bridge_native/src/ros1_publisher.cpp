@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 #include "sockets.hpp"
 
@@ -21,11 +22,13 @@ constexpr size_t kMostSenders = 256;  // of latched messages that are kept
 
 }  // namespace
 
-// One subscriber: first its connection header is read and answered, then it is sent to.
+// One subscriber: first its connection header is read and answered, then it is sent to. A service's client gets another connection then.
 class OutConnection : public Handler, public std::enable_shared_from_this<OutConnection> {
  public:
   OutConnection(std::shared_ptr<Server> server, int fd) : server_(std::move(server)), fd_(fd), born_ns_(now_ns()) {}
-  ~OutConnection() override { ::close(fd_); }
+  ~OutConnection() override {
+    if (fd_ >= 0) ::close(fd_);
+  }
 
   void begin() { key_ = server_->loop_.add(fd_, shared_from_this(), EPOLLIN, true); }
 
@@ -87,11 +90,27 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     if (!decode(reinterpret_cast<const uint8_t *>(header_.data()) + sizeof length, length, fields)) {
       return turn_away("what it sent is no connection header");
     }
+    if (fields.count("service")) return hand_over(fields, sizeof length + length);
     const auto publisher = server_->find(fields["topic"]);
     if (!publisher) return turn_away("topic [" + fields["topic"] + "] is not published here");
     const std::string reason = mismatch(fields, publisher->identity);
     if (!reason.empty()) return turn_away(fields["callerid"] + " on " + fields["topic"] + ": " + reason);
     accept(publisher);
+  }
+
+  // It is a client, not a subscriber.
+  void hand_over(const Fields & fields, size_t header_bytes) {
+    const std::string & service = fields.at("service");
+    ServiceDesk * desk = server_->find_desk(service);
+    if (desk == nullptr) return turn_away("service [" + service + "] is not provided here");
+    const std::string reason = mismatch(fields, desk->identity());
+    const auto caller = fields.find("callerid");
+    if (!reason.empty()) return turn_away((caller == fields.end() ? "?" : caller->second) + " on " + service + ": " + reason);
+    server_->loop_.remove(key_, fd_);
+    closed_ = true;
+    const auto connection = std::make_shared<ServiceConnection>(server_->loop_, *desk, std::exchange(fd_, -1), fields);
+    connection->begin(server_->caller_id_, fields, reinterpret_cast<const uint8_t *>(header_.data()) + header_bytes,
+      header_.size() - header_bytes);
   }
 
   void accept(const std::shared_ptr<Ros1Publisher> & publisher) {
@@ -158,7 +177,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   }
 
   const std::shared_ptr<Server> server_;
-  const int fd_;
+  int fd_;
   const int64_t born_ns_;
   Key key_ = 0;
   bool closed_ = false;
@@ -270,6 +289,23 @@ void Server::withdraw(const std::shared_ptr<Ros1Publisher> & publisher) {
   loop_.run_and_wait([&] {
     for (const auto & connection : publisher->connections()) connection->shut();
   });
+}
+
+ServiceDesk * Server::find_desk(const std::string & service) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = desks_.find(service);
+  return found == desks_.end() ? nullptr : found->second;
+}
+
+void Server::open_desk(ServiceDesk & desk) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  desks_[desk.identity().service] = &desk;
+}
+
+void Server::close_desk(ServiceDesk & desk) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = desks_.find(desk.identity().service);
+  if (found != desks_.end() && found->second == &desk) desks_.erase(found);
 }
 
 }  // namespace plane

@@ -1,4 +1,4 @@
-// TCPROS, the sending side: one listening socket for all topics, a connection with a bounded queue for each subscriber.
+// TCPROS, the sending side: a connection with a bounded queue for each subscriber; and the listening socket of all topics and services.
 #pragma once
 
 #include <deque>
@@ -13,6 +13,7 @@
 #include "counters.hpp"
 #include "events.hpp"
 #include "loop.hpp"
+#include "ros1_service_server.hpp"
 
 namespace plane {
 
@@ -57,12 +58,15 @@ class Server : public Handler, public std::enable_shared_from_this<Server> {
 
   void offer(const std::shared_ptr<Ros1Publisher> & publisher);
   void withdraw(const std::shared_ptr<Ros1Publisher> & publisher);  // returns when no connection is left
+  void open_desk(ServiceDesk & desk);
+  void close_desk(ServiceDesk & desk);  // in the loop's thread; who is connected stays so
 
   void on_ready(uint32_t epoll_events) override;
 
  private:
   friend class OutConnection;
   std::shared_ptr<Ros1Publisher> find(const std::string & topic);
+  ServiceDesk * find_desk(const std::string & service);
 
   Loop & loop_;
   Events & events_;
@@ -73,6 +77,7 @@ class Server : public Handler, public std::enable_shared_from_this<Server> {
   uint16_t port_ = 0;
   std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Ros1Publisher>> publishers_;
+  std::map<std::string, ServiceDesk *> desks_;
 };
 
 }  // namespace plane

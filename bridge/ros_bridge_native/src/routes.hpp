@@ -1,4 +1,4 @@
-// A topic from one world to the other.
+// What crosses: the base of all routes, and topics. Services are in services_in_ros1.hpp and services_in_ros2.hpp.
 #pragma once
 
 #include <deque>
@@ -44,8 +44,8 @@ class Route {
  public:
   virtual ~Route() = default;
   // How many peers the end has that messages go out of, and the one that they come from.
-  virtual size_t target_peers() = 0;
-  virtual size_t source_peers() = 0;
+  virtual size_t target_peers() { return 0; }
+  virtual size_t source_peers() { return 0; }
   Counters counters;
 
  protected:
