@@ -185,10 +185,8 @@ void ServiceInRos1::on_lost(const std::shared_ptr<CallConnection> & connection, 
     connections->erase(std::remove(connections->begin(), connections->end(), connection), connections->end());
   }
   if (closed_) return;
-  if (loss == Loss::kUnreachable || loss == Loss::kRefused) {
-    place_until_ns_ = 0;
-    ask_after_ns_ = now_ns() + kLookEveryNs;
-  }
+  if (loss != Loss::kIdle) place_until_ns_ = 0;  // the server may be gone from there
+  if (loss == Loss::kUnreachable || loss == Loss::kRefused) ask_after_ns_ = now_ns() + kLookEveryNs;
   if (loss == Loss::kUnreachable) problem_ = "no server can be reached: " + reason;
   if (loss == Loss::kRefused && !waiting_.empty()) fail(calls_.find(waiting_.front()), reason);
   const auto call = loss == Loss::kInCall ? of(*connection) : calls_.end();
