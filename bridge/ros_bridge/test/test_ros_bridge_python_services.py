@@ -18,7 +18,6 @@ from test_ros_bridge_live import (  # noqa: F401 - pytest finds tests and fixtur
     test_ros2_client_calls_a_ros1_server_until_it_goes_and_its_successor_comes,
     test_ros2_client_gets_a_refusal_when_the_ros1_server_fails,
     test_ros2_client_gets_a_refusal_when_there_is_no_ros1_server,
-    test_slow_services_stall_no_topic,
 )
 
 

@@ -162,6 +162,30 @@ def serve_echo(world):
     """Serve in ROS 2, and return when the bridge reaches the server."""
     server = world.ros2.node.create_service(SetSensor, "/bv/in_ros2", echo)
     world.ros2.ends.append((world.ros2.node.destroy_service, server))
+    wait_until(lambda: answers(world, "/bv/in_ros2", sensor_request("")), "the service answers", LIMIT_S)
+
+
+def answers(world, service, body):
+    """Call once, not waiting long: a server that is new to its client drops responses until DDS has connected it both ways."""
+    with Client(world, service) as client:
+        client.socket.settimeout(1.0)
+        try:
+            return client.call(body)[0]
+        except TimeoutError:
+            return False
+
+
+class HeldService:
+    """A service in ROS 2 that answers at once until it is told to keep what comes."""
+
+    def __init__(self, world, name):
+        self.taken, self.holds = [], False
+        self.service = LaterService(world.ros2.node, SetBool, name, self.take)
+        wait_until(lambda: answers(world, name, b"\0"), "the service answers", LIMIT_S)
+        self.holds = True
+
+    def take(self, request, asker):
+        self.taken.append((request, asker)) if self.holds else self.service.reply(SetBool.Response(success=True), asker)
 
 
 def echoed(words):
@@ -233,22 +257,21 @@ def test_big_requests_and_responses_cross_both_ways(world):
 @PATHS
 def test_calls_that_are_held_hold_up_no_others(world):
     """Three calls under way in ROS 2, of which one's client leaves: others are answered meanwhile, and each of the rest gets its own answer."""
-    taken = []
-    server = LaterService(world.ros2.node, SetBool, "/bv/held_in_ros2", lambda request, asker: taken.append((request, asker)))
+    held = HeldService(world, "/bv/held_in_ros2")
     serve_echo(world)
     clients = [Client(world, "/bv/held_in_ros2", persistent="1") for _ in range(3)]
     for number, client in enumerate(clients):
         client.send(b"\1" if number % 2 else b"\0")
-        wait_until(lambda number=number: len(taken) == number + 1, "the request arrives in ROS 2", LIMIT_S)
+        wait_until(lambda number=number: len(held.taken) == number + 1, "the request arrives in ROS 2", LIMIT_S)
     with Client(world, "/bv/in_ros2") as quick:
         assert quick.call(sensor_request("quick")) == echoed("quick")
     clients[0].socket.close()
-    for request, asker in reversed(taken):
-        server.reply(SetBool.Response(success=request.data, message="held"), asker)
+    for request, asker in reversed(held.taken):
+        held.service.reply(SetBool.Response(success=request.data, message="held"), asker)
     assert [client.receive() for client in clients[1:]] == [(True, b"\1" + text("held")), (True, b"\0" + text("held"))]
     for client in clients[1:]:
         client.socket.close()
-    server.close()
+    held.service.close()
 
 
 def hang_up(connection):
@@ -412,35 +435,34 @@ def test_end_of_the_bridge_answers_every_call_under_way_and_unregisters(world, t
     lines = [f"  - {{name: {name}, server: {where}, type: std_srvs/SetBool, timeout_s: 30.0}}" for name, where in names.items()]
     bridge = BridgeProcess(world.master, tmp_path, "services:\n" + "\n".join(lines) + "\n", "__name:=ros_bridge_that_ends")
     bridge.wait_running()
-    taken, replies = [], []
-    server = LaterService(world.ros2.node, SetBool, "/bv_end/in_ros2", lambda *request: taken.append(request))
-    with Client(world, "/bv_end/in_ros2") as client:
+    held = HeldService(world, "/bv_end/in_ros2")
+    arrived = []
+
+    def talk(connection):
+        greet(connection)
+        while True:
+            arrived.append(request_from(connection))
+            if len(arrived) == 1:
+                answer(connection, b"\1" + text(""))
+
+    in_ros1 = world.ros2.node.create_client(SetBool, "/bv_end/in_ros1")
+    with Client(world, "/bv_end/in_ros2") as client, Server(world, "/bv_end/in_ros1", talk):
+        assert in_ros1.wait_for_service(LIMIT_S)
+        assert in_ros1.call(SetBool.Request(), timeout_sec=LIMIT_S).success
+        future = in_ros1.call_async(SetBool.Request())
         client.send(b"\1")
-        call = threading.Thread(
-            target=lambda: replies.append(world.ros2.call("/bv_end/in_ros1", SetBool, SetBool.Request(), within_s=LIMIT_S))
-        )
-        call.start()
-        arrived = threading.Event()
-
-        def talk(connection):
-            greet(connection)
-            request_from(connection)
-            arrived.set()
-            connection.recv(1)
-
-        with Server(world, "/bv_end/in_ros1", talk):
-            assert arrived.wait(LIMIT_S)
-            wait_until(lambda: taken, "the call arrives in ROS 2", LIMIT_S)
-            start = time.monotonic()
-            bridge.process.send_signal(signal.SIGINT)
-            good, reason = client.receive()
-            assert (good, b"the bridge is shutting down" in reason) == (False, True)
-            call.join(LIMIT_S)
-            assert "the bridge is shutting down" in replies[0][0].message
-            assert bridge.process.wait(LIMIT_S) == 0
-            assert time.monotonic() - start < LIMIT_S / 2
+        wait_until(lambda: len(arrived) == 2 and held.taken, "both calls arrive", LIMIT_S)
+        start = time.monotonic()
+        bridge.process.send_signal(signal.SIGINT)
+        good, reason = client.receive()
+        assert (good, b"the bridge is shutting down" in reason) == (False, True)
+        wait_until(future.done, "the call from ROS 2 ends", LIMIT_S)
+        assert "the bridge is shutting down" in future.result().message
+        assert bridge.process.wait(LIMIT_S) == 0
+        assert time.monotonic() - start < LIMIT_S / 2
     assert world.proxy.lookupService("/t", "/bv_end/in_ros2")[0] == -1
-    server.close()
+    world.ros2.node.destroy_client(in_ros1)
+    held.service.close()
 
 
 @given(st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=300))

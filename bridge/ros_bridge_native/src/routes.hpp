@@ -12,6 +12,7 @@
 #include "events.hpp"
 #include "loop.hpp"
 #include "ros1_publisher.hpp"
+#include "ros1_server.hpp"
 #include "ros1_subscription.hpp"
 #include "ros2_ends.hpp"
 #include "worker.hpp"
@@ -27,6 +28,7 @@ struct Machinery {
   Loop loop;
   Worker upward{"plane_to_ros2"};
   Worker downward{"plane_to_ros1"};
+  Worker calls{"plane_calls"};
   std::shared_ptr<Server> server;
 };
 

@@ -1,10 +1,7 @@
 #include "services_in_ros1.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
-
-#include "ros2_ends.hpp"
 
 namespace plane {
 namespace {
@@ -12,23 +9,16 @@ namespace {
 constexpr size_t kConcurrentCalls = 16;
 constexpr size_t kWaitingCalls = 32;
 constexpr size_t kMostPosted = 256;
-constexpr size_t kMostKnown = 256;
 // After that the master is asked again: the service may have moved to another node.
 constexpr int64_t kReuseWithinNs = 2'000'000'000;
 constexpr const char * kNotAsked = "the ROS master has not answered, asked";
-
-Gid gid_of(const rmw_request_id_t & who) {
-  Gid gid{};
-  static_assert(sizeof who.writer_guid <= sizeof gid);
-  std::memcpy(gid.data(), who.writer_guid, sizeof who.writer_guid);
-  return gid;
-}
 
 }  // namespace
 
 ServiceInRos1::ServiceInRos1(Machinery & machinery, ServiceSpecification specification)
 : machinery_(machinery), specification_(std::move(specification)), timer_(std::make_shared<Timer>(machinery.loop, [this] { look(); })),
-  service_(std::make_unique<Ros2Service>(specification_.node, specification_.type, specification_.ros2_service)) {
+  service_(std::make_unique<Ros2Service>(specification_.node, specification_.type, specification_.ros2_service)),
+  replies_(machinery, specification_, *service_, counters) {
   timer_->begin();
   try {
     service_->listen([this](size_t) { take_requests(); });
@@ -42,14 +32,14 @@ ServiceInRos1::~ServiceInRos1() {
   service_->stop_listening();
   machinery_.loop.run_and_wait([this] {
     closed_ = true;
+    replies_.stop_deferring();
     timer_->end();
     while (!calls_.empty()) fail(calls_.begin(), kBridgeEnds);
     for (const auto & connections : {idle_, attempts_}) {
       for (const auto & connection : connections) connection->drop();
     }
   });
-  machinery_.upward.forget(this);
-  work();                               // what the worker had not come to
+  replies_.finish();
   machinery_.loop.run_and_wait([] {});  // what was posted meanwhile
 }
 
@@ -77,10 +67,10 @@ void ServiceInRos1::take_requests() {
 }
 
 void ServiceInRos1::on_request(const rmw_request_id_t & who, Frame request, int64_t start_ns) {
-  if (closed_) return refuse(who, kBridgeEnds);
-  if (!request) return refuse(who, "the request is none of " + specification_.ros1.type);
+  if (closed_) return replies_.refuse(who, kBridgeEnds);
+  if (!request) return replies_.refuse(who, "the request is none of " + specification_.ros1.type);
   if (calls_.size() >= kConcurrentCalls + kWaitingCalls) {
-    return refuse(who, "the bridge has " + std::to_string(kConcurrentCalls + kWaitingCalls) + " calls of this service waiting");
+    return replies_.refuse(who, "the bridge has " + std::to_string(kConcurrentCalls + kWaitingCalls) + " calls of this service waiting");
   }
   if (calls_.empty()) problem_ = kNotAsked;
   calls_.emplace_hint(calls_.end(), next_number_, Call{who, std::move(request), start_ns, start_ns + specification_.timeout_ns, nullptr});
@@ -171,9 +161,9 @@ void ServiceInRos1::on_answer(const std::shared_ptr<CallConnection> & connection
     } else if (cdr_size(specification_.response, payload, size) == SIZE_MAX) {
       fail(call, "the answer is none of " + specification_.ros1.type);
     } else {
-      const Reply response{call->second.who, std::move(answer), kAnswerHeadBytes, call->second.start_ns};
+      const Call done = std::move(call->second);
       calls_.erase(call);
-      reply(response);
+      replies_.answer(done.who, std::move(answer), kAnswerHeadBytes, done.start_ns);
     }
   }
   begin_waiting();
@@ -201,7 +191,7 @@ void ServiceInRos1::fail(Calls::iterator call, const std::string & reason) {
   calls_.erase(call);
   if (failed.connection && failed.connection->calling()) failed.connection->drop();  // whose answer nobody waits for any more
   end_spare_attempts();
-  refuse(failed.who, reason);
+  replies_.refuse(failed.who, reason);
 }
 
 void ServiceInRos1::end_spare_attempts() {
@@ -209,47 +199,6 @@ void ServiceInRos1::end_spare_attempts() {
     attempts_.front()->drop();
     attempts_.erase(attempts_.begin());
   }
-}
-
-void ServiceInRos1::refuse(const rmw_request_id_t & who, const std::string & reason) {
-  counters.errors.fetch_add(1);
-  const std::string text = specification_.ros2_service + " by the bridge: " + reason;
-  machinery_.events.put(EventKind::kCallFailed, specification_.token, text);
-  if (specification_.refusal.has_flag) reply({who, refusal_frame(specification_.refusal, text), sizeof(uint32_t), 0});
-}
-
-// What may take long is the worker's: large responses, and the first one to a client, which DDS may still be connecting to.
-void ServiceInRos1::reply(Reply reply) {
-  if (closed_ || (reply.bytes->size() <= kLargeBytes && known_.count(gid_of(reply.who)))) return send(reply);
-  if (known_.size() >= kMostKnown) known_.clear();
-  known_.insert(gid_of(reply.who));
-  {
-    std::lock_guard<std::mutex> lock(slow_mutex_);
-    slow_.push_back(std::move(reply));
-  }
-  machinery_.upward.schedule(this);
-}
-
-void ServiceInRos1::work() {
-  while (true) {
-    Reply next;
-    {
-      std::lock_guard<std::mutex> lock(slow_mutex_);
-      if (slow_.empty()) return;
-      next = std::move(slow_.front());
-      slow_.pop_front();
-    }
-    send(next);
-  }
-}
-
-void ServiceInRos1::send(const Reply & reply) {
-  const uint8_t * bytes = reply.bytes->data() + reply.offset;
-  const size_t size = reply.bytes->size() - reply.offset;
-  const bool sent = service_->answer({&specification_.response, bytes, size, cdr_size(specification_.response, bytes, size)}, reply.who);
-  if (reply.start_ns == 0) return;
-  if (sent) counters.crossed(reply.start_ns, size);
-  else counters.errors.fetch_add(1);
 }
 
 std::string ServiceInRos1::why_late(const Call & call) const {

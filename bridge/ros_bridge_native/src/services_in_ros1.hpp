@@ -5,11 +5,10 @@
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
+#include "replies.hpp"
 #include "ros1_service_client.hpp"
 #include "ros2_services.hpp"
 #include "service_route.hpp"
@@ -17,9 +16,9 @@
 
 namespace plane {
 
-// Calls live in the loop's thread. Threads of DDS take the requests and post them to it; a worker sends what may take long.
+// Calls live in the loop's thread. Threads of DDS take the requests and post them to it.
 // A request is sent once: whether a server that died in a call had carried it out nobody knows, so it is not repeated.
-class ServiceInRos1 : public Route, public CallDesk, public Job {
+class ServiceInRos1 : public Route, public CallDesk {
  public:
   ServiceInRos1(Machinery & machinery, ServiceSpecification specification);
   ~ServiceInRos1() override;
@@ -37,17 +36,10 @@ class ServiceInRos1 : public Route, public CallDesk, public Job {
     std::shared_ptr<CallConnection> connection;
   };
   using Calls = std::map<uint64_t, Call>;  // by their numbers, so in the order of their deadlines
-  struct Reply {
-    rmw_request_id_t who;
-    Frame bytes;
-    size_t offset;     // of the response in the bytes
-    int64_t start_ns;  // 0: a refusal
-  };
 
   void on_open(const std::shared_ptr<CallConnection> & connection) override;
   void on_answer(const std::shared_ptr<CallConnection> & connection, bool good, Frame answer) override;
   void on_lost(const std::shared_ptr<CallConnection> & connection, Loss loss, const std::string & reason) override;
-  void work() override;
 
   void take_requests();
   void on_request(const rmw_request_id_t & who, Frame request, int64_t start_ns);
@@ -58,9 +50,6 @@ class ServiceInRos1 : public Route, public CallDesk, public Job {
   void end_spare_attempts();
   Calls::iterator of(const CallConnection & connection);
   void fail(Calls::iterator call, const std::string & reason);
-  void refuse(const rmw_request_id_t & who, const std::string & reason);
-  void reply(Reply reply);
-  void send(const Reply & reply);
   std::string why_late(const Call & call) const;
   void look();
   void look_again();
@@ -70,6 +59,7 @@ class ServiceInRos1 : public Route, public CallDesk, public Job {
   std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
   std::shared_ptr<Timer> timer_;
   std::unique_ptr<Ros2Service> service_;
+  Replies replies_;
   std::atomic<size_t> posted_{0};       // requests that the loop has not seen yet
   std::atomic<bool> left_over_{false};  // DDS has more of them
   std::atomic<uint32_t> sequence_{0};
@@ -87,10 +77,6 @@ class ServiceInRos1 : public Route, public CallDesk, public Job {
   uint16_t port_ = 0;
   int64_t place_until_ns_ = 0;
   std::string problem_;  // why there is no connection
-  std::set<Gid> known_;  // clients that have been answered: DDS is connected to them
-
-  std::mutex slow_mutex_;
-  std::deque<Reply> slow_;  // for the worker
 };
 
 }  // namespace plane

@@ -30,7 +30,7 @@ ServiceInRos2::~ServiceInRos2() {
     const auto connections = connections_;
     for (const auto & connection : connections) connection->shut();
   });
-  machinery_.upward.forget(this);
+  machinery_.calls.forget(this);
   machinery_.loop.run_and_wait([] {});  // what the worker has posted before
 }
 
@@ -70,7 +70,7 @@ void ServiceInRos2::hand_on(Calls::iterator call) {
     std::lock_guard<std::mutex> lock(large_mutex_);
     large_.emplace_back(call->first, request);
   }
-  machinery_.upward.schedule(this);
+  machinery_.calls.schedule(this);
 }
 
 void ServiceInRos2::work() {
