@@ -256,7 +256,7 @@ def test_big_requests_and_responses_cross_both_ways(world):
 
 @PATHS
 def test_calls_that_are_held_hold_up_no_others(world):
-    """Three calls under way in ROS 2, of which one's client leaves: others are answered meanwhile, and each of the rest gets its own answer."""
+    """Of three calls under way in ROS 2 one's client leaves: others are answered meanwhile, and the two that stay get their own answers."""
     held = HeldService(world, "/bv/held_in_ros2")
     serve_echo(world)
     clients = [Client(world, "/bv/held_in_ros2", persistent="1") for _ in range(3)]
