@@ -1,4 +1,4 @@
-"""Services among peers of every kind, by the data plane and by the path through Python: raw TCPROS clients and servers on the ROS 1 side."""
+"""Services among peers of every kind, by the data plane and through Python: raw TCPROS clients and servers on the ROS 1 side."""
 
 import contextlib
 import random
