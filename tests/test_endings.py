@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from alula_testing.flights import Flight, start_flight
+from alula_testing.waits import until
 
 pytestmark = [pytest.mark.flight, pytest.mark.timeout(600)]
 StartFlight = Callable[..., Flight]
@@ -74,12 +75,7 @@ def test_killed_front_leaves_nothing_and_the_vehicle_lands(fly: StartFlight) -> 
     def over() -> bool:
         return end_seen.exists() and not flight.left_over()
 
-    import time
-
-    end = time.monotonic() + 300
-    while not over() and time.monotonic() < end:
-        time.sleep(0.2)
-    assert over()
+    until(over, "the vehicle is down and nothing is left over", 300.0)
     assert flight.summary["landed"] is True
     assert "front" in died(flight)
 

@@ -4,66 +4,37 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 
 import navigation_interfaces.msg
+import rospy
 from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 
+from alula_testing import waits
+from alula_testing.recorder import Recorder
 from skill_runtime.hooks import SkillHooks
 from skillset_ros1 import SkillsetClient, SkillsetManagers
 
 SOON_S = 30.0
-FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
 NUMBERS = itertools.count()
 
 
 def until(condition, what: str, timeout_s: float = SOON_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, f"not within {timeout_s} s: {what}"
-        time.sleep(0.005)
+    waits.until(condition, what, timeout_s)
 
 
-class Recorder(SkillHooks):
-    """Writes down the calls; ``acts`` maps a hook's name to what it does with the execution."""
+class Pausing(Recorder):
+    """Can be paused only where ``acts`` says so."""
 
     def __init__(self, skill: str) -> None:
+        super().__init__()
         self.inputs_type = ABSTRACT_HOOKS[skill].inputs_type
-        self.calls: list[str] = []
-        self.acts: dict = {}
-
-    def _note(self, name: str, value: object) -> object:
-        self.calls.append(name)
-        return self.acts[name](value) if name in self.acts else None
-
-    def validate(self, inputs: object) -> str:
-        return self._note("validate", inputs) or ""
-
-    def on_dispatch(self, execution) -> None:
-        self._note("on_dispatch", execution)
-
-    def progress(self, execution) -> float:
-        value = self._note("progress", execution)
-        return 0.5 if value is None else value
-
-    def on_interrupt(self, execution) -> bool | None:
-        return self._note("on_interrupt", execution)
-
-    def on_emergency(self, execution) -> None:
-        self._note("on_emergency", execution)
 
     def on_pause(self, execution) -> str | None:
-        return self.acts["on_pause"](execution) if "on_pause" in self.acts else super().on_pause(execution)
+        return self.acts["on_pause"](execution) if "on_pause" in self.acts else SkillHooks.on_pause(self, execution)
 
     def on_resume(self, execution) -> str | None:
-        return self.acts["on_resume"](execution) if "on_resume" in self.acts else super().on_resume(execution)
-
-    def on_violation(self, execution) -> None:
-        self._note("on_violation", execution)
-
-    def on_failure(self, execution) -> None:
-        self._note("on_failure", execution)
+        return self.acts["on_resume"](execution) if "on_resume" in self.acts else SkillHooks.on_resume(self, execution)
 
 
 class Navigation:
@@ -71,7 +42,7 @@ class Navigation:
 
     def __init__(self) -> None:
         self.namespace = f"/n{next(NUMBERS)}"
-        self.hooks = {skill.name: Recorder(skill.name) for skill in SKILLSET.skills}
+        self.hooks = {skill.name: Pausing(skill.name) for skill in SKILLSET.skills}
         self.clients: list[SkillsetClient] = []
         self.managers = SkillsetManagers(SKILLSET, navigation_interfaces.msg, lambda _: self.hooks, namespace=self.namespace)
         self.client = self.another_client()
@@ -84,6 +55,9 @@ class Navigation:
 
     def name(self, topic: str) -> str:
         return f"{self.namespace}/navigation/{topic}"
+
+    def service(self, kind, name: str, /, **request: object):
+        return rospy.ServiceProxy(self.name(name), kind)(**request)
 
     def bring(self, states: dict[str, str]) -> None:
         """Take extern transitions, as the functional layer does."""

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState, JointState
 from std_msgs.msg import Bool, Header, Int8, UInt16, UInt64
 
-from skill_runtime.plain import to_plain
-from skillset_ros1.convert import fields_of, fill, message_class, values_of
+from skill_runtime.plain import message_class, to_plain
+from skillset_ros1.convert import fields_of, fill, values_of
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -43,7 +43,7 @@ def test_lists(positions, names):
         (UInt16(), {"data": -1}, "a goal, data takes a whole number from 0 to 65535"),
         (UInt64(), {"data": 1.5}, "a goal, data takes a whole number from 0 to 18446744073709551615"),
         (Bool(), {"data": 1}, "a goal, data takes a bool, not 1"),
-        (JointState(), {"name": "one"}, r"a goal, name takes a list \(string\), not 'one'"),
+        (JointState(), {"name": "one"}, r"a goal, name takes a list \(string\[\]\), not 'one'"),
         (JointState(), {"position": [0, "x"]}, r"a goal, position\[1\] takes a number"),
         (Header(), {"stamp": 3}, "a goal, stamp takes a time, not 3"),
         (PoseStamped().pose, {"position": (1, 2)}, "a goal, position takes a geometry_msgs/Point or three numbers"),

@@ -14,10 +14,11 @@ from navigation_interfaces.msg import TakeoffAction, TakeoffActionGoal, TakeoffA
 from navigation_managers.client import NavigationClient
 from navigation_managers.inputs import GotoStraightInputs
 from skillset_interfaces.msg import Event
-from skillset_interfaces.srv import Describe, GetData, Transition, TriggerEvent, Why
-from skillset_ros1_bench import FLYING, SOON_S, Navigation, on_thread, until
+from skillset_interfaces.srv import Describe, GetData, TriggerEvent, Why
+from skillset_ros1_bench import SOON_S, Navigation, on_thread, until
 from uav_msgs.msg import GuidanceState
 
+from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals
 from skill_language.json_form import from_json
 from skill_runtime.core import ExecutionState
 from skill_runtime.waiting import CannotWaitError
@@ -30,11 +31,6 @@ def navigation(ros_master):
     bench = Navigation()
     yield bench
     bench.close()
-
-
-def service(navigation, kind, name: str, /, **request: object):
-    proxy = rospy.ServiceProxy(navigation.name(name), kind)
-    return proxy(**request)
 
 
 def test_an_execution_from_request_to_result(navigation):
@@ -56,17 +52,7 @@ def test_an_execution_from_request_to_result(navigation):
 
 
 def test_refusals_reach_the_one_who_asked(navigation):
-    handle = navigation.client.start("goto_straight", target=Point(), speed=1.0)
-    assert handle.wait(SOON_S)
-    assert (handle.state, handle.result) == (S.NOT_READY, "sdk_authority")
-    assert "SDK_authority is UNAVAILABLE" in handle.message
-    navigation.hooks["takeoff"].acts["validate"] = lambda inputs: f"{inputs.height} m is too high"
-    handle = navigation.client.start("takeoff", height=300, speed=1)
-    assert handle.wait(SOON_S)
-    assert (handle.state, handle.message) == (S.NOT_VALIDATED, "300.0 m is too high")
-    answer = service(navigation, Transition, "transition", resource="axes_authority", to="USED")
-    assert (answer.accepted, answer.state) == (False, "AVAILABLE")
-    assert "for skills only" in answer.reason
+    check_refusals(navigation, SOON_S)
 
 
 def test_a_second_caller_is_refused_while_the_first_goes_on(navigation):
@@ -82,21 +68,7 @@ def test_a_second_caller_is_refused_while_the_first_goes_on(navigation):
 
 
 def test_interrupt_and_violation_reach_client_and_function(navigation):
-    navigation.bring(FLYING)
-    handle = navigation.fly()
-    handle.interrupt()
-    assert handle.wait(SOON_S)
-    assert handle.state is S.INTERRUPTED
-    assert navigation.hooks["goto_straight"].calls.count("on_interrupt") == 1
-    early = navigation.client.start("goto_straight", target=(0, 0, 0), speed=1)
-    early.interrupt()
-    assert early.wait(SOON_S)
-    assert early.state is S.INTERRUPTED
-    handle = navigation.fly()
-    navigation.bring({"SDK_authority": "UNAVAILABLE"})
-    assert handle.wait(SOON_S)
-    assert (handle.state, handle.result) == (S.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")
-    until(lambda: "on_violation" in navigation.hooks["goto_straight"].calls, "the function is stopped")
+    check_interrupt_and_violation(navigation, SOON_S)
 
 
 def test_a_hook_that_waits_holds_up_nobody(navigation):
@@ -190,15 +162,15 @@ def test_who_subscribes_late_hears_all_events(navigation):
 
 
 def test_description_and_data(navigation):
-    assert from_json(service(navigation, Describe, "describe").model_json) == navigation.managers.engine.skillset
+    assert from_json(navigation.service(Describe, "describe").model_json) == navigation.managers.engine.skillset
     assert navigation.client.model == navigation.managers.engine.skillset
-    assert not service(navigation, GetData, "get_data", name="nonsense").known
-    answer = service(navigation, GetData, "get_data", name="guidance_state")
+    assert not navigation.service(GetData, "get_data", name="nonsense").known
+    answer = navigation.service(GetData, "get_data", name="guidance_state")
     assert (answer.known, answer.received) == (True, False)
     source = rospy.Publisher("/uav_guidance/state", GuidanceState, queue_size=1, latch=True)
     source.publish(GuidanceState())
-    until(lambda: service(navigation, GetData, "get_data", name="guidance_state").received, "the data manager hears it")
-    answer = service(navigation, GetData, "get_data", name="guidance_state")
+    until(lambda: navigation.service(GetData, "get_data", name="guidance_state").received, "the data manager hears it")
+    answer = navigation.service(GetData, "get_data", name="guidance_state")
     assert json.loads(answer.value_json)["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
     passed_on = rospy.wait_for_message(navigation.name("data/guidance_state"), GuidanceState, timeout=SOON_S)
     assert isinstance(passed_on, GuidanceState)
@@ -230,9 +202,9 @@ def test_questions_are_answered(navigation):
     taken = client.transition("SDK_authority", "UNAVAILABLE").get(SOON_S)
     assert (taken.accepted, taken.state) == (True, "UNAVAILABLE")
     assert client.input_types("hover") == {"duration": "float64"}
-    answer = service(navigation, Why, "why", skill="hover", inputs_json="3")
+    answer = navigation.service(Why, "why", skill="hover", inputs_json="3")
     assert (answer.known, answer.reason) == (False, "inputs of hover are a JSON object, not 3")
-    answer = service(navigation, TriggerEvent, "trigger", event="storm")
+    answer = navigation.service(TriggerEvent, "trigger", event="storm")
     assert (answer.accepted, "storm" in answer.reason) == (False, True)
 
 

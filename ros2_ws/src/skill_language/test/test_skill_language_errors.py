@@ -1,4 +1,4 @@
-"""Every finding: its code, its place, its words and its hint."""
+"""Every finding about a model: its code, its place, its words and its hint."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ import pytest
 
 from skill_language.check import check
 from skill_language.codes import CODES, PROOF_CODES
-from skill_language.errors import Diagnostic, LanguageError, Severity, nearest
-from skill_language.load import FOR_GENERATOR, check_file, load_robot, load_skillset
-from skill_language.model import Span
-from skill_language.models import read_text
+from skill_language.errors import LanguageError, Severity
+from skill_language.load import FOR_GENERATOR, check_file, load_robot
 from skill_language.paper import parse
 
 AXES = "resource axes { initial FREE FREE -> USED USED -> FREE }\n"
+
+
 LINK = "resource link { initial DOWN extern DOWN -> UP extern UP -> DOWN }\n"
+
+
 TAKE = "effect { take: axes -> USED give: axes -> FREE }"
+
+
 END = "result { DONE: apply = give }"
 
 
@@ -63,6 +67,7 @@ SYNTAX = [
     ("ALU204", "skillset s { skill f { effect { take {} } precondition { success ^tale } } }", "no effect `tale`", "`take`?"),
     ("ALU204", "skillset s { skill f { result { R: apply = ^give } } }", "skill `f` has no effect `give`", "`effect` block"),
 ]
+
 
 SEMANTICS = [
     ("ALU201", AXES + "^resource axes { initial A A -> B B -> A }", "resource `axes` is defined twice", "line 2 first"),
@@ -222,183 +227,6 @@ def test_the_name_of_a_package():
     (finding,) = check(parse("skillset My_Skills { }", "x"))
     assert finding.code == "ALU216"
     assert "name of a ROS package" in finding.message
-
-
-def test_several_errors_of_one_file_are_told_in_order():
-    text = """skillset s {
-  resource r { initial A  A > B }
-  skill f {
-    input { height float64 }
-    effect { take: r -> B
-    precondition { p: r == A }
-  }
-  skill g { progress 3 }
-}"""
-    with pytest.raises(LanguageError) as caught:
-        parse(text, "x.skill")
-    assert [(d.code, d.span.line) for d in caught.value.diagnostics] == [
-        ("ALU103", 2),
-        ("ALU103", 4),
-        ("ALU104", 6),
-        ("ALU103", 6),
-        ("ALU103", 8),
-    ]
-
-
-def test_an_error_in_the_effects_does_not_make_more_of_their_users():
-    with pytest.raises(LanguageError) as caught:
-        parse("skillset s { skill f { effect { a: r = B  b: r -> A } result { R: apply = b } } }")
-    assert [d.code for d in caught.value.diagnostics] == ["ALU103"]
-
-
-def test_too_many_errors():
-    text = "skillset s {\n" + "$\n" * 60 + "}"
-    with pytest.raises(LanguageError) as caught:
-        parse(text)
-    assert [d.code for d in caught.value.diagnostics] == ["ALU100"] * 40 + ["ALU107"]
-
-
-def test_rendering():
-    text = "skillset s {\n\tskill f { precondition { p: resource = (a = B) } }\n}"
-    with pytest.raises(LanguageError) as caught:
-        parse(text, "models/x.skill")
-    assert str(caught.value) == (
-        "models/x.skill:2:44: error ALU103: expected `==` or `!=`, found `=`\n"
-        "    2 | \tskill f { precondition { p: resource = (a = B) } }\n"
-        "      | \t                                          ^\n"
-        "      = expected one of `==`, `!=`\n"
-        "      = hint: states are compared with `==`"
-    )
-
-
-def test_rendering_of_a_long_line_shows_its_place():
-    line = "x" * 500 + "HERE" + "y" * 500
-    lines = Diagnostic("ALU100", "m", Span("f", 1, 501, 505), source_line=line).render().split("\n")
-    assert max(len(shown) for shown in lines) < 140
-    assert lines[1][lines[2].index("^") :].startswith("HERE")
-    assert lines[2].count("^") == 4
-
-
-def test_rendering_without_a_place():
-    assert Diagnostic("ALU001", "m").render() == "error ALU001: m"
-    assert Diagnostic("ALU001", "m", Span("f.skill", 0, 0, 0)).render() == "f.skill: error ALU001: m"
-
-
-def test_nearest():
-    assert nearest("SDK_autority", ["SDK_authority", "axes_authority"]) == "did you mean `SDK_authority`?"
-    assert nearest("available", ["AVAILABLE", "USED"]) == "did you mean `AVAILABLE`?"
-    assert nearest("zzz", ["a", "b"]) == "there is `a`, `b`"
-    assert nearest("zzz", [f"state_{i}" for i in range(20)]) == ""
-    assert nearest("zzz", []) == ""
-
-
-# --- files -----------------------------------------------------------------------------------------------------------
-
-
-def codes(error) -> list[str]:
-    return [finding.code for finding in error.value.diagnostics]
-
-
-def test_files_that_are_no_text(tmp_path):
-    missing = tmp_path / "missing.skill"
-    with pytest.raises(LanguageError, match=r"missing\.skill: error ALU001: can't be read: No such file") as caught:
-        load_skillset(missing)
-    with pytest.raises(LanguageError, match="ALU001"):
-        load_skillset(tmp_path)
-    with pytest.raises(LanguageError, match="ALU001"):
-        load_skillset("a\0b")
-    latin = tmp_path / "latin.skill"
-    latin.write_bytes("skillset s { // \xe9\n}".encode("latin-1"))
-    with pytest.raises(LanguageError, match="ALU002: not UTF-8 text: byte 16 is 0xe9"):
-        load_skillset(latin)
-    large = tmp_path / "large.skill"
-    large.write_bytes(b" " * 1_200_001)
-    with pytest.raises(LanguageError, match="ALU003"):
-        load_skillset(large)
-    assert codes(caught) == ["ALU001"]
-
-
-def test_marks_and_line_ends_of_other_systems(tmp_path):
-    path = tmp_path / "dos.skill"
-    path.write_bytes("\ufeffskillset s {\r\n  skill f { input { a: bool // yes\r\n } result { R } }\r\n}\r\n".encode())
-    assert "\r" not in read_text(path)
-    assert load_skillset(path).skill("f").inputs[0].comment == "yes"
-
-
-def test_warnings_do_not_keep_a_model_from_being_loaded(tmp_path):
-    path = tmp_path / "x.skill"
-    path.write_text("skillset s { type P }")
-    assert load_skillset(path).name == "s"
-    assert [d.code for d in check_file(path)[1]] == ["ALU303"]
-
-
-def test_findings_of_the_check_carry_their_line(tmp_path):
-    path = tmp_path / "x.skill"
-    path.write_text(f"skillset s {{\n  {LINK}  skill f {{ progress = 0 result {{ R }} }}\n}}")
-    with pytest.raises(LanguageError, match=r"x\.skill:3:13: error ALU211") as caught:
-        load_skillset(path)
-    assert "    3 |   skill f { progress = 0 result { R } }" in str(caught.value)
-
-
-def robot(folder, skill="skillset s { }", types=None, bindings=None):
-    (folder / "s.skill").write_text(skill)
-    for name, text in (("types.yaml", types), ("bindings.yaml", bindings)):
-        if text is not None:
-            (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
-    return folder
-
-
-def test_a_folder_without_skillsets(tmp_path):
-    with pytest.raises(LanguageError, match=r"ALU006: no \*\.skill or \*\.rl file in it"):
-        load_robot(tmp_path)
-    with pytest.raises(LanguageError, match="ALU006: is no folder"):
-        load_robot(tmp_path / "none")
-
-
-def test_a_robot_with_all_that_can_be_wrong_tells_all(tmp_path):
-    robot(tmp_path, "skillset s { type Lost data d: Lost }", "Lst: nosuch", "data: {s.e: /x}\ncolour: red")
-    (tmp_path / "t.skill").write_text("skillset s { }")
-    with pytest.raises(LanguageError) as caught:
-        load_robot(tmp_path)
-    assert sorted(codes(caught)) == ["ALU005", "ALU005", "ALU401", "ALU402", "ALU403", "ALU404"]
-    assert "did you mean `s.d`?" in str(caught.value)
-
-
-def test_data_that_no_topic_can_carry(tmp_path):
-    robot(tmp_path, "skillset s { type Path data d: Path }", "Path: geometry_msgs/Point[]", "data: {s.d: /d}")
-    with pytest.raises(LanguageError, match="ALU405: data `d` is a list"):
-        load_robot(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("types", "bindings", "message"),
-    [
-        ("[1, 2]", "", "should be a mapping at its top"),
-        ("a: [", "", "can't be read"),
-        (b"\xff\xfe\x00", "", "can't be read"),
-        ("Point: 3", "", "type `Point` is 3"),
-        ("Point: geometry_msgs", "", "type `Point` is 'geometry_msgs'"),
-        ("", "data: [1]", "`data` should map"),
-        ("", "data: {s.d: 1}", "data.s.d should be a mapping, not 1"),
-        ("", "data: {s.d: {topic: relative}}", "`topic` is 'relative'; it should be an absolute ROS name"),
-        ("", "data: {s.d: {}}", "data.s.d has no `topic`"),
-        ("", "topics: {}", "`topics` should be a list"),
-        ("", "topics: [{name: /a, direction: up, type: std_msgs/Header}]", "`direction` is 'up'; it should be ros1_to_ros2"),
-        ("", "topics: [{name: /a, direction: [], type: std_msgs/Header}]", "`direction` is []"),
-        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/msg/Header}]", "it should be package/Name"),
-        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, deph: 3}]", "unknown key `deph`"),
-        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, depth: 0}]", "`depth` is 0"),
-        ("", "services: [{name: /a, server: ros1, type: std_srvs/SetBool, timeout_s: -1}]", "`timeout_s` is -1"),
-        ("", "services: [{name: /a, type: std_srvs/SetBool}]", "services[0] has no `server`"),
-        ("", "service: []", "unknown section `service`; there are `data`, `topics`, `services`"),
-    ],
-)
-def test_side_files(tmp_path, types, bindings, message):
-    robot(tmp_path, types=types, bindings=bindings)
-    with pytest.raises(LanguageError) as caught:
-        load_robot(tmp_path)
-    assert "ALU005" in codes(caught)
-    assert message in str(caught.value)
 
 
 def test_every_code_has_a_test():

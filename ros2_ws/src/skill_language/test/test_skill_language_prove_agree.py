@@ -11,7 +11,7 @@ from skill_language_prove_models import VALUES, skillsets
 
 from skill_language.model import TRUE
 from skill_language.prove.abstract import without_data
-from skill_language.prove.bdd_model import encode
+from skill_language.prove.encoding import encode
 from skill_language.prove.explicit import search as one_by_one
 from skill_language.prove.explore import explore
 from skill_language.prove.limits import Deadline

@@ -139,11 +139,11 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         raise StillRunningError(f"{self.skill} is {self.state.value} and has not ended within {timeout_s:g} s")
 
     def add_done_callback(self, callback: Callable[[Self], None]) -> None:
-        """Have ``callback(handle)`` called once at the end, on the thread that spins the node; at once when it has ended."""
+        """Have ``callback(handle)`` called once at the end, on the thread that brings it; at once when it has ended."""
         self.call_at_end(lambda: callback(self))
 
     def on_report(self, callback: Callable[[Report[OutputsT]], None]) -> None:
-        """Have ``callback(report)`` called at each change of state, progress or outputs, on the thread that spins the node."""
+        """Have ``callback(report)`` called at each change of state, progress or outputs, on the thread that brings it."""
         with self._lock:
             self._listeners.append(callback)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from skill_language.model import Skillset
+from skill_runtime.callbacks import Forget
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, Handle, OutputsT, ResultT
 from skill_runtime.waiting import Pending
@@ -17,8 +18,6 @@ from skill_runtime.waiting import Pending
 StateT = TypeVar("StateT", bound=str)
 ValueT = TypeVar("ValueT")
 NANOSECONDS = 1e9
-Forget = Callable[[], None]
-"""Ends a subscription."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +162,7 @@ class ResourceView(Generic[StateT]):
         return cast("StateT", state)
 
     def on_change(self, callback: Callable[[StateT], None]) -> Forget:
-        """Have ``callback(state)`` called after each change, on the thread that spins the node; the return value ends that."""
+        """Have ``callback(state)`` called after each change, on the thread that brings it; the return value ends that."""
         known = [self._client.resources.get(self.name)]
 
         def look(states: dict[str, str]) -> None:
@@ -218,7 +217,7 @@ class DataView(Generic[ValueT]):
         return self._client.data_feed(self.name).stale
 
     def on_change(self, callback: Callable[[ValueT], None]) -> Forget:
-        """Have ``callback(value)`` called for each value, on the thread that spins the node; the return value ends that."""
+        """Have ``callback(value)`` called for each value, on the thread that brings it; the return value ends that."""
         return self._client.data_feed(self.name).on_sample(lambda sample: callback(cast("ValueT", sample.value)))
 
     def next(self) -> Pending[ValueT]:

@@ -50,12 +50,12 @@ class Waitable:
         self._after: list[Callable[[], None]] = []
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait (wall clock) for the end; tell whether it came within the time.
+        """Wait for the end; tell whether it came within the time (wall clock; mission clock where there is no middleware).
 
-        Spins the node when it has no executor.
+        Over rclpy, the node is spun when it has no executor; without middleware, the world runs.
 
         Raises:
-            CannotWaitError: this thread is the one that spins the node: ``await`` it there, or give it a callback.
+            CannotWaitError: this thread is the one that would bring the end: ``await`` it there, or give it a callback.
         """
         return self._ended.is_set() or self._host.wait(self._ended, timeout_s)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 
 import navigation_interfaces.action
 from navigation_managers.model import SKILLSET
 from rclpy.executors import SingleThreadedExecutor
-from skill_runtime_models import Recorder
 
+from alula_testing import waits
+from alula_testing.recorder import Recorder
 from alula_testing.ros2 import spin
 from skill_runtime.ros2 import SkillsetNode
 
@@ -21,10 +21,7 @@ READY_TO_TAKE_OFF = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID"}
 
 
 def until(condition, what: str, timeout_s: float = SOON_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, f"not within {timeout_s} s: {what}"
-        time.sleep(0.002)
+    waits.until(condition, what, timeout_s)
 
 
 class Spun:

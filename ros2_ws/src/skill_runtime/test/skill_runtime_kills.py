@@ -71,7 +71,7 @@ class Mission:
                 if b"--parent" in words and str(self.supervisor.pid).encode() in words and part.encode() in words:
                     return int(place.parent.name)
             assert time.monotonic() < end, f"no process of {part}"
-            time.sleep(0.02)
+            time.sleep(0.02)  # /proc tells nobody of new processes
 
     def run_until(self, moment_s: float):
         """Start one execution after another until this moment (monotonic); return the last."""
@@ -89,7 +89,7 @@ class Mission:
             assert handle.wait(END_S), f"{handle} hangs"
             if handle.state is ExecutionState.TERMINATED:
                 return time.monotonic() - begun_s
-            time.sleep(0.05)
+            time.sleep(0.05)  # managers that are not up yet refuse at once
         raise AssertionError(f"{SKILL} does not run again: {handle} {handle.message}")
 
     def kill(self, part: str, after_s: float) -> Kill:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-
+from alula_testing.recorder import Recorder
 from skill_language.model import (
     Assignment,
     Effect,
@@ -21,7 +20,6 @@ from skill_language.model import (
 )
 from skill_runtime.core import SkillsetEngine
 from skill_runtime.core.events import ExecutionEvent, TransitionEvent
-from skill_runtime.hooks import SkillHooks
 
 TAKE = Effect("take_control", (Assignment("axes", "USED"),))
 RELEASE = Effect("release_control", (Assignment("axes", "AVAILABLE"),))
@@ -62,48 +60,6 @@ def resources() -> tuple[Resource, ...]:
 
 def flying_skillset(*skills: Skill, **changes: object) -> Skillset:
     return Skillset(**{"name": "flying", "resources": resources(), "skills": skills or (flying_skill("takeoff"),), **changes})
-
-
-class Recorder(SkillHooks):
-    """Writes down the calls; ``acts`` maps a hook's name to what it does with the execution."""
-
-    def __init__(self) -> None:
-        self.calls: list[str] = []
-        self.acts: dict = {}
-        self.dispatched = threading.Event()
-
-    def _note(self, name: str, value: object) -> object:
-        self.calls.append(name)
-        return self.acts[name](value) if name in self.acts else None
-
-    def validate(self, inputs: object) -> str:
-        return self._note("validate", inputs) or ""
-
-    def on_dispatch(self, execution) -> None:
-        self._note("on_dispatch", execution)
-        self.dispatched.set()
-
-    def progress(self, execution) -> float:
-        value = self._note("progress", execution)
-        return 0.5 if value is None else value
-
-    def on_interrupt(self, execution) -> bool | None:
-        return self._note("on_interrupt", execution)
-
-    def on_emergency(self, execution) -> None:
-        self._note("on_emergency", execution)
-
-    def on_pause(self, execution) -> str | None:
-        return self._note("on_pause", execution)
-
-    def on_resume(self, execution) -> str | None:
-        return self._note("on_resume", execution)
-
-    def on_violation(self, execution) -> None:
-        self._note("on_violation", execution)
-
-    def on_failure(self, execution) -> None:
-        self._note("on_failure", execution)
 
 
 class Bench:

@@ -114,7 +114,7 @@ def act(bench, what, execution):
     elif what == "interrupt" and hasattr(execution, "id"):
         bench.engine.interrupt(execution.id)
     elif what == "slow":
-        time.sleep(0.001)
+        time.sleep(0.001)  # that it takes time is the subject: others come in between
     return {"refuse": "no", "terminate": 0.5, "later": False}.get(what)
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import itertools
 import threading
-import time
 
 import navigation_interfaces.action as navigation_actions
 from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from skill_runtime_models import Recorder
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from skillset_interfaces.msg import Event
 from skillset_interfaces.srv import Transition
 
+from alula_testing import waits
+from alula_testing.recorder import Recorder
 from alula_testing.ros2 import spin
 from skill_runtime.core import ExecutionState
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
@@ -25,14 +27,10 @@ S = ExecutionState
 SOON_S = 10.0
 READY_S = 30.0
 NUMBERS = itertools.count()
-FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}
 
 
 def until(condition, what: str, timeout_s: float = SOON_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, f"not within {timeout_s} s: {what}"
-        time.sleep(0.002)
+    waits.until(condition, what, timeout_s)
 
 
 def ask(node, kind, service: str, **request: object):
@@ -99,15 +97,28 @@ class Navigation:
         self.node.create_subscription(Event, "navigation/events", self.events.append, EVENTS)
         spinning.spin(self.node)
 
-    def service(self, kind, service: str, **request: object):
-        return ask(self.node, kind, f"navigation/{service}", **request)
+    def service(self, kind, name: str, /, **request: object):
+        return ask(self.node, kind, f"navigation/{name}", **request)
+
+    def mission_clock(self):
+        """Return a function that sets the mission clock, s, and waits until the managers, made with ``use_sim_time``, follow it."""
+        publisher = self.node.create_publisher(Clock, "/clock", 10)
+
+        def set_time(seconds: float) -> None:
+            def there() -> bool:
+                publisher.publish(Clock(clock=Time(seconds=seconds).to_msg()))
+                return self.managers.get_clock().now().nanoseconds == int(seconds * 1e9)
+
+            until(there, "the managers follow the clock")
+
+        return set_time
 
     def bring(self, states: dict[str, str]) -> None:
         """Take extern transitions, as the functional layer does."""
         for resource, state in states.items():
             take(self.node, resource, state)
 
-    def fly_straight(self):
+    def fly(self):
         handle = self.client.start("goto_straight", target=(1, 2.5, 3), speed=1)
         until(lambda: handle.state is S.RUNNING, f"goto_straight runs, it is {handle}")
         assert self.hooks["goto_straight"].dispatched.wait(SOON_S)

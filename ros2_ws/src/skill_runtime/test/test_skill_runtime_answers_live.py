@@ -15,12 +15,11 @@ from action_msgs.msg import GoalStatus  # noqa: E402
 from navigation_managers.model import SKILLSET  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.time import Time  # noqa: E402
-from rosgraph_msgs.msg import Clock  # noqa: E402
-from skill_runtime_rig import FLYING, SOON_S, Navigation, until  # noqa: E402
+from skill_runtime_rig import SOON_S, Navigation, until  # noqa: E402
 from skillset_interfaces.msg import SkillStates  # noqa: E402
 from skillset_interfaces.srv import SetPaused, Why  # noqa: E402
 
+from alula_testing.navigation import FLYING  # noqa: E402
 from skill_runtime.core import ExecutionState  # noqa: E402
 from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
 from skill_runtime.hooks import SkillHooks  # noqa: E402
@@ -43,7 +42,7 @@ def latest(navigation) -> dict[str, SimpleNamespace]:
 def test_a_late_client_learns_the_last_result_of_every_skill(anyhow):
     navigation = anyhow
     navigation.bring(FLYING)
-    handle = navigation.fly_straight()
+    handle = navigation.fly()
     until(lambda: [e.state for e in latest(navigation)["goto_straight"].open] == ["RUNNING"], "open")
     navigation.managers.engine.terminate(handle.id, "ARRIVED", "there")
     assert handle.wait(SOON_S)
@@ -106,18 +105,10 @@ def test_a_stop_has_two_phases_and_a_pause_is_seen(anyhow):
 def test_the_emergency_follows_the_mission_clock(spinning, separate):
     parameters = [Parameter("use_sim_time", value=True), Parameter("interrupt_timeout_s", value=3.0)]
     navigation = Navigation(spinning, separate=separate, parameter_overrides=parameters)
-    publisher = navigation.node.create_publisher(Clock, "/clock", 10)
-
-    def set_time(seconds: float) -> None:
-        def there() -> bool:
-            publisher.publish(Clock(clock=Time(seconds=seconds).to_msg()))
-            return navigation.managers.get_clock().now().nanoseconds == int(seconds * 1e9)
-
-        until(there, "the managers follow the clock")
-
+    set_time = navigation.mission_clock()
     set_time(100.0)
     navigation.bring(FLYING)
-    handle = navigation.fly_straight()
+    handle = navigation.fly()
     hooks = navigation.hooks["goto_straight"]
     release = threading.Event()
     hooks.acts["on_interrupt"] = lambda _: release.wait(60.0)
@@ -157,7 +148,7 @@ def test_inputs_that_cannot_be_made_end_their_request_only(anyhow):
         raise RuntimeError("no such frame")
 
     navigation.hooks["goto"].make_inputs = burst
-    running = navigation.fly_straight()
+    running = navigation.fly()
     handle = navigation.client.start("goto", target=(0, 0, 0), speed=1)
     assert handle.wait(SOON_S)
     assert handle.state is S.FAILED

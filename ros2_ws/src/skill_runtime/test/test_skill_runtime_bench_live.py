@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ pytest.importorskip("rclpy")
 pytest.importorskip("navigation_interfaces.action")
 
 from alula_flight.claims import is_claimed
+from alula_testing.waits import until
 from skill_runtime.bench.cases import CASES
 from skill_runtime.bench.clients import States
 from skill_runtime.bench.run import LEAST, open_bench
@@ -81,7 +81,4 @@ def test_an_interrupted_run_leaves_no_process():
     assert out == ""
     assert len(started) >= 3  # the bare server and client, the managers
     # The last of them ends when it notices that the first has.
-    end_s = time.monotonic() + LIMIT_S
-    while left := [pid for pid in started if Path(f"/proc/{pid}").exists()]:
-        assert time.monotonic() < end_s, left
-        time.sleep(0.01)
+    until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in started), f"all of {started} end", LIMIT_S)

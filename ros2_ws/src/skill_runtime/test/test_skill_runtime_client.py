@@ -16,6 +16,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy")
 pytest.importorskip("uav_client")
 
+from navigation_managers.model import SKILLSET  # noqa: E402
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from skill_runtime_client_rig import NUMBERS, READY_S, READY_TO_TAKE_OFF, SOON_S, Managers, Spun, until  # noqa: E402
@@ -26,6 +27,7 @@ from skill_runtime.core import ExecutionState  # noqa: E402
 from skill_runtime.handle import SkillFailedError  # noqa: E402
 from skill_runtime.ros2 import Robot  # noqa: E402
 from skill_runtime.ros2.robot import NotThereError  # noqa: E402
+from skill_runtime.staleness import STALE_PERIODS  # noqa: E402
 from skill_runtime.waiting import CannotWaitError, NoAnswerError  # noqa: E402
 
 S = ExecutionState
@@ -64,7 +66,7 @@ def arrive(managers):
 
 
 def test_actions_rest_unless_an_answer_is_due(managers, uav):
-    clients = uav.navigation.client._presence.clients
+    clients = uav.navigation.client._tracker.presence.clients
     waited_for = lambda: [skill for skill, client in clients.items() if client.callback_group.can_execute(client)]  # noqa: E731
     until(lambda: waited_for() == [], "nothing is due of earlier goals")
     known = []
@@ -281,12 +283,14 @@ def test_the_first_value_has_the_stamp_that_the_managers_gave_it(managers, ros2_
     until(lambda: publisher.get_subscription_count() > 0, "the managers listen")
     publisher.publish(GuidanceState(reference="hover"))
     sent_s = managers.node.get_clock().now().nanoseconds / 1e9
-    time.sleep(0.7)  # older than three periods before anybody asks
+    period_s = next(data.period_s for data in SKILLSET.data if data.name == "guidance_state")
+    too_old_s = sent_s + STALE_PERIODS * period_s
+    until(lambda: managers.node.get_clock().now().nanoseconds / 1e9 > too_old_s, "the value has grown stale before anybody asks")
     with Uav.connect(domain=ros2_domain, skillsets=NAVIGATION, timeout_s=READY_S) as late:
         data = late.navigation.data.guidance_state
         until(lambda: data.stamp is not None, "the value and its stamp arrive")
         assert data.value.reference == "hover"
-        assert abs(data.stamp - sent_s) < 0.6
+        assert abs(data.stamp - sent_s) < too_old_s - sent_s
         assert data.stale
 
 

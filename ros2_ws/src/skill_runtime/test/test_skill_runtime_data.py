@@ -6,16 +6,16 @@ from std_msgs.msg import Float64
 
 from skill_language.model import Comparison, Data, DataIs
 from skill_runtime.core.conditions import holds
-from skill_runtime.ros2.data_manager import plain_value
+from skill_runtime.plain import carried
 
 
 def test_a_primitive_is_compared_by_what_its_message_carries():
     charged = DataIs("battery", (), Comparison.GT, 20.0, "%")
     data = Data("battery", "float64", 1.0)
-    assert holds(charged, {}, {"battery": plain_value(data, Float64(data=0.3))})
-    assert not holds(charged, {}, {"battery": plain_value(data, Float64(data=0.1))})
+    assert holds(charged, {}, {"battery": carried(data, Float64(data=0.3))})
+    assert not holds(charged, {}, {"battery": carried(data, Float64(data=0.1))})
 
 
 def test_a_message_is_given_as_it_is():
     message = Float64(data=0.3)
-    assert plain_value(Data("battery", "BatteryState", 1.0), message) is message
+    assert carried(Data("battery", "BatteryState", 1.0), message) is message

@@ -6,8 +6,9 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, Recorder, flying_skill, flying_skillset
+from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
+from alula_testing.recorder import Recorder
 from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
 from skill_runtime.core import ExecutionState, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError, UnsupportedModelError

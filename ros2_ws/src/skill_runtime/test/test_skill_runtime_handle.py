@@ -98,7 +98,7 @@ def test_asyncio_awaits_and_iterates():
             return [report async for report in one]
 
         reading = asyncio.create_task(read())
-        await asyncio.sleep(0)
+        await asyncio.sleep(0)  # one turn of the loop: the reader waits now
         gate.set()
         ended = await asyncio.wait_for(one, SOON_S)
         assert ended.result == "DONE"
@@ -117,8 +117,7 @@ def test_an_await_that_is_cancelled_leaves_nothing_behind():
             await asyncio.wait_for(one, 0.01)
         assert one._after == []
         waiting = asyncio.ensure_future(asyncio.wait_for(one, SOON_S))
-        await asyncio.sleep(0)
-
+        await asyncio.sleep(0)  # one turn of the loop: it waits now
         waiting.cancel()
 
     asyncio.run(main())

@@ -24,11 +24,7 @@ from navigation_managers.model import SKILLSET  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.time import Time  # noqa: E402
-from rosgraph_msgs.msg import Clock  # noqa: E402
-from skill_runtime_models import Recorder  # noqa: E402
 from skill_runtime_rig import (  # noqa: E402
-    FLYING,
     NUMBERS,
     READY_S,
     SOON_S,
@@ -36,10 +32,12 @@ from skill_runtime_rig import (  # noqa: E402
     take,
     until,
 )
-from skillset_interfaces.srv import Describe, GetData, Transition  # noqa: E402
+from skillset_interfaces.srv import Describe, GetData  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from uav_msgs.msg import GuidanceState  # noqa: E402
 
+from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals  # noqa: E402
+from alula_testing.recorder import Recorder  # noqa: E402
 from skill_language.json_form import from_json  # noqa: E402
 from skill_runtime.core import ExecutionState  # noqa: E402
 from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
@@ -57,7 +55,7 @@ def test_an_execution_from_request_to_result(navigation):
     navigation.bring(FLYING)
     seen = []
     navigation.client.on_change(seen.append)
-    handle = navigation.fly_straight()
+    handle = navigation.fly()
     execution = navigation.managers.engine.executions[0]
     assert execution.id == handle.id
     assert execution.inputs == GotoStraightInputs(target=Point(x=1.0, y=2.5, z=3.0), speed=1.0)
@@ -79,35 +77,11 @@ def test_an_execution_from_request_to_result(navigation):
 
 
 def test_refusals_carry_their_reason(navigation):
-    handle = navigation.client.start("goto_straight", target=Point(), speed=1.0)
-    assert handle.wait(SOON_S)
-    assert (handle.state, handle.result) == (S.NOT_READY, "sdk_authority")
-    assert "SDK_authority is UNAVAILABLE" in handle.message
-    navigation.hooks["takeoff"].acts["validate"] = lambda inputs: f"{inputs.height} m is too high"
-    handle = navigation.client.start("takeoff", height=300, speed=1)
-    assert handle.wait(SOON_S)
-    assert (handle.state, handle.message) == (S.NOT_VALIDATED, "300.0 m is too high")
-    answer = navigation.service(Transition, "transition", resource="axes_authority", to="USED")
-    assert (answer.accepted, answer.state) == (False, "AVAILABLE")
-    assert "for skills only" in answer.reason
+    check_refusals(navigation, SOON_S)
 
 
 def test_interrupt_and_violation_reach_client_and_function(navigation):
-    navigation.bring(FLYING)
-    handle = navigation.fly_straight()
-    handle.interrupt()
-    assert handle.wait(SOON_S)
-    assert handle.state is S.INTERRUPTED
-    assert navigation.hooks["goto_straight"].calls.count("on_interrupt") == 1
-    early = navigation.client.start("goto_straight", target=(0, 0, 0), speed=1)
-    early.interrupt()
-    assert early.wait(SOON_S)
-    assert early.state is S.INTERRUPTED
-    handle = navigation.fly_straight()
-    navigation.bring({"SDK_authority": "UNAVAILABLE"})
-    assert handle.wait(SOON_S)
-    assert (handle.state, handle.result) == (S.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")
-    until(lambda: "on_violation" in navigation.hooks["goto_straight"].calls, "the function is told")
+    check_interrupt_and_violation(navigation, SOON_S)
 
 
 def test_a_hook_that_raises_fails_its_execution_only(navigation):
@@ -118,7 +92,7 @@ def test_a_hook_that_raises_fails_its_execution_only(navigation):
     assert handle.state is S.FAILED
     assert handle.message == "on_dispatch raised AttributeError: 'GotoStraightInputs' object has no attribute 'nosuch'"
     navigation.hooks["goto_straight"].acts.clear()
-    assert navigation.fly_straight().state is S.RUNNING
+    assert navigation.fly().state is S.RUNNING
 
 
 def test_wrong_inputs_are_refused_before_anything_is_sent(navigation):
@@ -190,18 +164,10 @@ def test_goals_have_the_right_states_for_plain_action_clients(navigation):
 def test_time_is_the_mission_clock_and_names_follow_the_namespace(spinning):
     parameters = [Parameter("use_sim_time", value=True)]
     navigation = Navigation(spinning, namespace="uav1", parameter_overrides=parameters)
-    publisher = navigation.node.create_publisher(Clock, "/clock", 10)
-
-    def set_time(seconds: float) -> None:
-        def there() -> bool:
-            publisher.publish(Clock(clock=Time(seconds=seconds).to_msg()))
-            return navigation.managers.get_clock().now().nanoseconds == int(seconds * 1e9)
-
-        until(there, "the managers follow the clock")
-
+    set_time = navigation.mission_clock()
     set_time(100.0)
     navigation.bring(FLYING)
-    handle = navigation.fly_straight()
+    handle = navigation.fly()
     until(lambda: len(navigation.events) >= 6, "events")
     assert {event.header.stamp.sec for event in navigation.events} == {100}
     calls = navigation.hooks["goto_straight"].calls
@@ -350,8 +316,8 @@ def test_the_loss_of_others_leaves_executions_alone_and_a_restart_does_not(spinn
     """Two managers at once, as DDS sees it for a while after a crash: the other's end is not this one's."""
     navigation = Navigation(spinning)
     navigation.bring(FLYING)
-    handle = navigation.fly_straight()
-    presence = navigation.client._presence
+    handle = navigation.fly()
+    presence = navigation.client._tracker.presence
     lost = SimpleNamespace(alive_count_change=-1, not_alive_count_change=1)
     asked = threading.Event()
     presence._on_answer, before = lambda: (before(), asked.set()), presence._on_answer

@@ -7,8 +7,9 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from skill_runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, Recorder, flying_skill, flying_skillset
+from skill_runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
+from alula_testing.recorder import Recorder
 from skill_language.model import Assignment, Comparison, Data, DataIs, Effect, Event, Hold, Implies, Interrupt, Invariant, Or, Progress
 from skill_runtime.core import ExecutionState, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError

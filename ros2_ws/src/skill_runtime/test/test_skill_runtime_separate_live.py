@@ -14,8 +14,9 @@ rclpy = pytest.importorskip("rclpy")
 pytest.importorskip("mapping_interfaces.action")
 
 from skill_runtime_kills import END_S, SKILL, Mission  # noqa: E402
-from skill_runtime_rig import FLYING, SOON_S, Navigation, until  # noqa: E402
+from skill_runtime_rig import SOON_S, Navigation, until  # noqa: E402
 
+from alula_testing.navigation import FLYING  # noqa: E402
 from skill_runtime.core import ExecutionState  # noqa: E402
 
 S = ExecutionState
@@ -106,7 +107,7 @@ def test_wrong_words_are_told_with_the_code_2(words):
 def test_robots_stand_side_by_side(spinning, separate):
     one, two = (Navigation(spinning, separate=separate, namespace=f"robot{number}_{separate}") for number in (1, 2))
     one.bring(FLYING)
-    handle = one.fly_straight()
+    handle = one.fly()
     assert two.client.resources["SDK_authority"] == "UNAVAILABLE"
     refused = two.client.start("goto_straight", target=(1, 2, 3), speed=1)
     assert refused.wait(SOON_S)
@@ -126,14 +127,14 @@ def test_violations_and_results_are_the_same_when_hooks_are_elsewhere(spinning):
     seen: list = []
     hooks.acts["on_dispatch"] = seen.append
     hooks.acts["on_violation"] = lambda execution: seen.append((execution.state, execution.result))
-    handle = navigation.fly_straight()
+    handle = navigation.fly()
     assert seen[0].inputs.speed == 1.0
     until(lambda: handle.progress == 0.5, "progress is reported every period")
     assert seen[0].terminate("ARRIVED", "there")
     assert not seen[0].terminate("ARRIVED")
     assert handle.wait(SOON_S)
     assert (handle.state, handle.result, handle.message) == (S.TERMINATED, "ARRIVED", "there")
-    handle = navigation.fly_straight()
+    handle = navigation.fly()
     navigation.bring({"SDK_authority": "UNAVAILABLE"})
     assert handle.wait(SOON_S)
     assert (handle.state, handle.result) == (S.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority")

@@ -12,8 +12,9 @@ import pytest
 rclpy = pytest.importorskip("rclpy")
 pytest.importorskip("navigation_interfaces.action")
 
-from skill_runtime_rig import FLYING, SOON_S  # noqa: E402
+from skill_runtime_rig import SOON_S  # noqa: E402
 
+from alula_testing.navigation import FLYING  # noqa: E402
 from skill_runtime.core import ExecutionState  # noqa: E402
 
 WARM, MEASURED = 300, 1000

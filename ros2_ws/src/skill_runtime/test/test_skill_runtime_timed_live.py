@@ -18,11 +18,12 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.time import Time  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
-from skill_runtime_models import Recorder  # noqa: E402
 from skillset_interfaces.msg import Event as EventMessage  # noqa: E402
 from skillset_interfaces.srv import TriggerEvent  # noqa: E402
 from std_msgs.msg import Float64  # noqa: E402
 
+from alula_testing import waits  # noqa: E402
+from alula_testing.recorder import Recorder  # noqa: E402
 from skill_language.model import (  # noqa: E402
     Assignment,
     Comparison,
@@ -49,10 +50,7 @@ IDLE = ResourceIs("mapping_process", "IDLE")
 
 
 def until(condition, what: str) -> None:
-    end = time.monotonic() + SOON_S
-    while not condition():
-        assert time.monotonic() < end, f"not within {SOON_S} s: {what}"
-        time.sleep(0.005)
+    waits.until(condition, what, SOON_S)
 
 
 class Managers:

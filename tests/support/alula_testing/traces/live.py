@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
+from alula_testing import waits
+
 PATIENCE_S = 90.0
-_STEP_S = 0.002
 
 
 def after(delay_s: float, job: Callable[[], object]) -> threading.Timer:
@@ -22,10 +22,27 @@ def after(delay_s: float, job: Callable[[], object]) -> threading.Timer:
 
 def until(condition: Callable[[], bool], what: str) -> None:
     """Wait until the condition holds."""
-    end = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end, f"not within {PATIENCE_S} s: {what}"
-        time.sleep(_STEP_S)
+    waits.until(condition, what, PATIENCE_S)
+
+
+class LiveStage:
+    """What the stages of both worlds do alike."""
+
+    def __init__(self) -> None:
+        self.listener = Listener()
+
+    def last(self, client: Any, skill: str) -> tuple[str, str, str, str] | None:
+        """Ask a ``SkillsetClient`` of either world."""
+        last = client.last(skill)
+        return None if last is None else (last.id, last.outcome, last.result, last.message)
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait."""
+        until(condition, what)
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return what was heard."""
+        return self.listener.events()
 
 
 class Listener:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable
 from typing import Any
 
 import navigation_interfaces.msg
@@ -20,15 +19,15 @@ from skillset_ros1 import SkillsetClient, SkillsetManagers, call_and_wait
 NUMBERS = itertools.count()
 
 
-class Ros1Stage:
+class Ros1Stage(live.LiveStage):
     """One namespace."""
 
     def __init__(self, make_hooks: HooksFactory) -> None:
+        super().__init__()
         self._namespace = f"/play{next(NUMBERS)}"
-        self._listener = live.Listener()
         self._managers = SkillsetManagers(SKILLSET, navigation_interfaces.msg, lambda _: make_hooks(live.after), namespace=self._namespace)
         self.engine = self._managers.engine
-        self._subscriber = rospy.Subscriber(f"{self._managers.place}/events", Event, self._listener.hear)
+        self._subscriber = rospy.Subscriber(f"{self._managers.place}/events", Event, self.listener.hear)
         self._clients: list[SkillsetClient] = []
 
     def client(self) -> Client:
@@ -55,20 +54,6 @@ class Ros1Stage:
         request = WhyRequest(skill=skill, inputs_json=json.dumps(inputs) if inputs else "")
         reply = call_and_wait(f"{self._managers.place}/why", Why, request, timeout_s=live.PATIENCE_S)
         return reply.ready, reply.reason, [transition.cause for transition in reply.history]
-
-    def last(self, client: Client, skill: str) -> tuple[str, str, str, str] | None:
-        """Ask the client."""
-        assert isinstance(client, SkillsetClient)
-        last = client.last(skill)
-        return None if last is None else (last.id, last.outcome, last.result, last.message)
-
-    def until(self, condition: Callable[[], bool], what: str) -> None:
-        """Wait."""
-        live.until(condition, what)
-
-    def events(self) -> list[dict[str, Any]]:
-        """Return what was heard."""
-        return self._listener.events()
 
     def close(self) -> None:
         """End the managers."""

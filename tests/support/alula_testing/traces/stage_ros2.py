@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import navigation_interfaces.action
@@ -23,18 +22,18 @@ from skill_runtime.ros2.names import EVENTS
 NUMBERS = itertools.count()
 
 
-class Ros2Stage:
+class Ros2Stage(live.LiveStage):
     """One namespace; each node is spun by a thread of its own."""
 
     def __init__(self, make_hooks: HooksFactory) -> None:
+        super().__init__()
         self._namespace = f"/play{next(NUMBERS)}"
-        self._listener = live.Listener()
         self._spun: list[tuple[Node, SingleThreadedExecutor, threading.Thread]] = []
         self._managers = SkillsetNode(SKILLSET, navigation_interfaces.action, lambda _: make_hooks(live.after), namespace=self._namespace)
         self.engine = self._managers.engine
         self._spin(self._managers)
         self._node = self._new_node()
-        self._node.create_subscription(Event, f"{SKILLSET.name}/events", self._listener.hear, EVENTS)
+        self._node.create_subscription(Event, f"{SKILLSET.name}/events", self.listener.hear, EVENTS)
         kinds = {"transition": Transition, "pause": SetPaused, "why": Why}
         self._services = {name: self._node.create_client(kind, f"{SKILLSET.name}/{name}") for name, kind in kinds.items()}
         self._spin(self._node)
@@ -61,20 +60,6 @@ class Ros2Stage:
         """Call the service."""
         reply = self._call("why", Why.Request(skill=skill, inputs_json=json.dumps(inputs) if inputs else ""))
         return reply.ready, reply.reason, [transition.cause for transition in reply.history]
-
-    def last(self, client: Client, skill: str) -> tuple[str, str, str, str] | None:
-        """Ask the client."""
-        assert isinstance(client, SkillsetClient)
-        last = client.last(skill)
-        return None if last is None else (last.id, last.outcome, last.result, last.message)
-
-    def until(self, condition: Callable[[], bool], what: str) -> None:
-        """Wait."""
-        live.until(condition, what)
-
-    def events(self) -> list[dict[str, Any]]:
-        """Return what was heard."""
-        return self._listener.events()
 
     def close(self) -> None:
         """End the managers."""

@@ -10,12 +10,14 @@ from skillset_interfaces.srv import GetData, GetDataRequest, SetPaused, SetPause
 from skillset_interfaces.srv import Why as WhyService
 
 from skill_language.model import Skillset
+from skill_runtime.callbacks import Forget
+from skill_runtime.client_base import ClientBase
 from skill_runtime.core.execution import ExecutionState
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
 from skill_runtime.messages import why_of
 from skill_runtime.plain import to_plain
-from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer
+from skill_runtime.views import DataReading, SkillsetView, TransitionAnswer
 from skill_runtime.waiting import Pending
 from skillset_ros1.convert import fields_of, fill
 from skillset_ros1.feed import TopicFeed
@@ -29,7 +31,7 @@ OnEvent = Callable[[Any], None]
 OnSkills = Callable[[dict[str, Any]], None]
 
 
-class SkillsetClient:
+class SkillsetClient(ClientBase):
     """Starts, watches and interrupts the skills of one skillset, and follows its resources, data and events.
 
     What the client of the ROS 2 world does, and the typed clients that are generated work on either. Nothing here waits but
@@ -41,9 +43,9 @@ class SkillsetClient:
     """
 
     def __init__(self, name: str, *, namespace: str = "") -> None:
-        self.skillset = name
         self.root = place(namespace, name)
         self._session = Session(self.root, name)
+        super().__init__(name, self._session)
         self._questions = self._session.questions
         self._feeds: dict[str, TopicFeed] = {}
 
@@ -61,10 +63,7 @@ class SkillsetClient:
         return self._session.reach.ready.is_set()
 
     @property
-    def model(self) -> Skillset:
-        """Return the model that the managers execute; raise RuntimeError before ``wait_ready``."""
-        if self._session.reach.model is None:
-            raise RuntimeError(f"the managers of {self.skillset} have not described themselves yet; call wait_ready first")
+    def _described(self) -> Skillset | None:
         return self._session.reach.model
 
     @property
@@ -80,11 +79,11 @@ class SkillsetClient:
 
     def on_change(self, callback: OnChange) -> Forget:
         """Have ``callback(resources)`` called after each step that changed a resource; the return value ends that."""
-        return self._subscribe(self._session.on_changes, callback)
+        return self._session.on_changes.add(callback)
 
     def on_event(self, callback: OnEvent) -> Forget:
         """Have ``callback(event)`` called for each skillset_interfaces/Event from now on; the return value ends that."""
-        return self._subscribe(self._session.on_events, callback)
+        return self._session.on_events.add(callback)
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
         """Ask for an execution; returns at once. When the managers can't be called, the handle has already FAILED.
@@ -118,7 +117,7 @@ class SkillsetClient:
 
     def on_skills(self, callback: OnSkills) -> Forget:
         """Have ``callback(skills)`` called after changes, with a skillset_interfaces/SkillState by skill; the return value ends that."""
-        return self._subscribe(self._session.on_skills, callback)
+        return self._session.on_skills.add(callback)
 
     @property
     def skills(self) -> dict[str, Any]:
@@ -152,12 +151,10 @@ class SkillsetClient:
         Raises:
             ValueError: there is no such data.
         """
-        known = {data.name: data for data in self.model.data}
-        if name not in known:
-            raise ValueError(f"skillset {self.skillset} has no data {name!r}; it has {', '.join(known) or 'none'}")
+        data = self._find_data(name)
         with self._session.lock:
             if name not in self._feeds:
-                self._feeds[name] = TopicFeed(self.root, known[name], self._questions, self._session.do)
+                self._feeds[name] = TopicFeed(self.root, data, self._questions, self._session.do)
             return self._feeds[name]
 
     def read_data(self, name: str) -> Pending[DataReading]:
@@ -197,34 +194,10 @@ class SkillsetClient:
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
-    def _subscribe(self, callbacks: list[Callable[[Any], None]], callback: Callable[[Any], None]) -> Forget:
-        with self._session.lock:
-            callbacks.append(callback)
-
-        def forget() -> None:
-            with self._session.lock:
-                if callback in callbacks:
-                    callbacks.remove(callback)
-
-        return forget
-
-    def _check_skill(self, skill: str) -> None:
-        known = [known.name for known in self.model.skills]
-        if skill not in known:
-            raise ValueError(f"skillset {self.skillset} has no skill {skill!r}; it has {', '.join(known)}")
-
     def _goal(self, skill: str, inputs: Mapping[str, object]) -> Any:
         """Make the goal message; raise ValueError when skill or inputs are wrong."""
         self._check_skill(skill)
         goal = self._session.reach.links[skill].types.goal()
-        where = f"inputs of {self.skillset}.{skill}"
-        fill(goal, inputs, where)
-        missing = [name for name in fields_of(goal) if name not in inputs]
-        if missing:
-            raise ValueError(f"{where}: {', '.join(missing)} missing")
+        fill(goal, inputs, self._place(skill))
+        self._check_complete(skill, fields_of(goal), inputs)
         return goal
-
-    def _stillborn(self, skill: str) -> SkillHandle:
-        handle = SkillHandle(skill, "", host=self._session)
-        handle.fail(f"the managers of {self.skillset} are not there")
-        return handle

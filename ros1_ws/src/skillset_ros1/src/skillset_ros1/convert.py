@@ -1,25 +1,16 @@
-"""Between ROS 1 messages and plain values; what fits into a field is as in the ROS 2 world (``skill_runtime.ros2.convert``)."""
+"""Fields of ROS 1 messages; what fits into them is as in the ROS 2 world (``skill_runtime.plain``)."""
 
 from __future__ import annotations
 
-import importlib
 import re
-from collections.abc import Mapping
 from typing import Any
 
 import genpy
 
-_FLOATS = {"float32", "float64"}
-_INTEGERS = {f"{sign}int{bits}": (sign, bits) for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte": ("", 8), "char": ("u", 8)}
-_VECTOR_FIELDS = ["x", "y", "z"]
+from skill_runtime.fitting import INTEGERS
+from skill_runtime.plain import FieldTypes
+
 _ARRAY = re.compile(r"\[\d*\]$")
-_TIMES = {"time": genpy.Time, "duration": genpy.Duration}
-
-
-def message_class(type_name: str) -> Any:
-    """Return the class of ``geometry_msgs/Point`` or ``geometry_msgs/msg/Point``; raise ImportError or AttributeError."""
-    package, name = type_name.split("/", maxsplit=1)[0], type_name.rsplit("/", maxsplit=1)[-1]
-    return getattr(importlib.import_module(f"{package}.msg"), name)
 
 
 def fields_of(message: Any) -> dict[str, str]:
@@ -27,83 +18,18 @@ def fields_of(message: Any) -> dict[str, str]:
     return dict(zip(message.__slots__, message._slot_types, strict=True))  # noqa: SLF001 - genpy's way to tell
 
 
-def values_of(message: Any) -> dict[str, object]:
-    """Return the values of a message's fields by name, not taken apart any further."""
-    return {name: getattr(message, name) for name in fields_of(message)}
+def _element_of(kind: str) -> str:
+    return _ARRAY.sub("", kind) if _ARRAY.search(kind) else ""
 
 
-def fill(message: Any, values: Mapping[str, object], place: str) -> Any:
-    """Set the named fields of a message from plain values; return it.
-
-    Numbers fit every numeric field that can hold them, a message or mapping fits a message, a sequence of three numbers
-    fits a message with x, y and z.
-
-    Raises:
-        ValueError: a name or a value does not fit; the message names ``place`` and the field.
-    """
-    fields = fields_of(message)
-    for name, value in values.items():
-        if name not in fields:
-            raise ValueError(f"{place} has no {name!r}; it has {', '.join(fields) or 'none'}")
-        setattr(message, name, _fitting(fields[name], value, f"{place}, {name}"))
-    return message
-
-
-def _fitting(kind: str, value: Any, place: str) -> Any:
-    """Return the value as the field's Python type."""
-    if _ARRAY.search(kind):
-        return _elements(_ARRAY.sub("", kind), value, place)
-    if kind in _FLOATS:
-        return float(_number(value, kind, place))
-    if kind in _INTEGERS:
-        return _integer(kind, value, place)
-    if kind in {"bool", "string"}:
-        return _of_type(bool if kind == "bool" else str, kind, value, place)
-    if kind in _TIMES:
-        return _time(kind, value, place)
-    return _message(kind, value, place)
-
-
-def _number(value: Any, kind: str, place: str) -> Any:
-    if isinstance(value, bool) or not hasattr(value, "__float__") or (hasattr(value, "shape") and value.shape):
-        raise ValueError(f"{place} takes a number ({kind}), not {value!r}")
-    return value
-
-
-def _integer(kind: str, value: Any, place: str) -> int:
-    sign, bits = _INTEGERS[kind]
-    low, high = (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    number = _number(value, kind, place)
-    if int(number) != number or not low <= number <= high:
-        raise ValueError(f"{place} takes a whole number from {low} to {high} ({kind}), not {value!r}")
-    return int(number)
-
-
-def _of_type(wanted: type, kind: str, value: Any, place: str) -> Any:
-    if isinstance(value, wanted):
-        return value
-    raise ValueError(f"{place} takes a {kind}, not {value!r}")
-
-
-def _elements(kind: str, value: Any, place: str) -> list[Any]:
-    if isinstance(value, str) or not hasattr(value, "__iter__"):
-        raise ValueError(f"{place} takes a list ({kind}), not {value!r}")
-    return [_fitting(kind, element, f"{place}[{index}]") for index, element in enumerate(value)]
-
-
-def _time(kind: str, value: Any, place: str) -> Any:
-    if isinstance(value, Mapping) and set(value) == {"sec", "nanosec"}:
-        return _TIMES[kind](value["sec"], value["nanosec"])
-    return _of_type(_TIMES[kind], kind, value, place)
-
-
-def _message(kind: str, value: Any, place: str) -> Any:
-    wanted = message_class(kind)
-    if isinstance(value, wanted):
-        return value
-    if isinstance(value, Mapping):
-        return fill(wanted(), value, place)
-    vector = list(fields_of(wanted)) == _VECTOR_FIELDS
-    if vector and not isinstance(value, str) and hasattr(value, "__len__") and len(value) == len(_VECTOR_FIELDS):
-        return fill(wanted(), dict(zip(_VECTOR_FIELDS, value, strict=True)), place)
-    raise ValueError(f"{place} takes a {kind}{' or three numbers' if vector else ''}, not {value!r}")
+_TYPES = FieldTypes(
+    fields_of,
+    _element_of,
+    floats={"float32", "float64"},
+    integers={**INTEGERS, "byte": INTEGERS["uint8"], "char": INTEGERS["uint8"]},
+    classes={"bool": bool, "string": str},
+    times={"time": genpy.Time, "duration": genpy.Duration},
+    no_lists=(str,),  # genpy gives uint8[] as bytes
+)
+fill = _TYPES.fill
+values_of = _TYPES.values_of

@@ -12,12 +12,10 @@ import rospy
 from skillset_interfaces.srv import GetData, GetDataResponse
 
 from skill_language.model import Data, Skillset
-from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.plain import to_plain
+from skill_runtime.plain import carried, message_class, to_plain
 from skill_runtime.staleness import STALE_PERIODS, is_stale
 from skillset_ros1.alarms import Alarms
-from skillset_ros1.convert import message_class
 from skillset_ros1.names import now_ns
 
 QUEUE = 10
@@ -71,8 +69,7 @@ class DataManager:
             if watch:
                 self._look_at(data, received.stamp_ns)
             publish(message)
-            # A primitive comes as std_msgs/Float64 and the like.
-            self._update(data.name, message.data if data.type in PRIMITIVES else message)
+            self._update(data.name, carried(data, message))
 
         return receive
 

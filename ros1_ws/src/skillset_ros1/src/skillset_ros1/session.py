@@ -6,7 +6,6 @@ with their states after which event these are; so whoever is told of an executio
 
 from __future__ import annotations
 
-import queue
 import threading
 import time
 from collections.abc import Callable
@@ -16,17 +15,13 @@ import rospy
 from skillset_interfaces.msg import Event, ResourceStates, SkillStates
 from std_msgs.msg import Header
 
+from skill_runtime.callbacks import Callbacks
 from skill_runtime.core.execution import ExecutionState
 from skill_runtime.handle import SkillHandle
-from skill_runtime.waiting import CannotWaitError
+from skillset_ros1.news_thread import Job, NewsThread
 from skillset_ros1.pursuit import Pursuit
 from skillset_ros1.questions import Questions
 from skillset_ros1.reach import Reach
-
-TICK_S = 0.02
-IDLE_S = 0.25
-END_S = 1.0
-Job = Callable[[], None]
 
 
 class Session:
@@ -37,22 +32,19 @@ class Session:
 
     def __init__(self, place: str, skillset: str) -> None:
         self.skillset = skillset
-        self.reach = Reach(place, skillset, self._on_thread, self._on_feedback, self._on_result)
+        self._thread = NewsThread(skillset, self)
+        self.reach = Reach(place, skillset, self._thread.handing_over, self._on_feedback, self._on_result)
         self.lock = threading.Lock()
         self.resources: dict[str, str] = {}
         self.last: dict[str, tuple[int, Any]] = {}
         self.skills: dict[str, Any] = {}
-        self.on_changes: list[Callable[[dict[str, str]], None]] = []
-        self.on_skills: list[Callable[[dict[str, Any]], None]] = []
-        self.on_events: list[Callable[[Any], None]] = []
+        self.on_changes: Callbacks[Callable[[dict[str, str]], None]] = Callbacks()
+        self.on_skills: Callbacks[Callable[[dict[str, Any]], None]] = Callbacks()
+        self.on_events: Callbacks[Callable[[Any], None]] = Callbacks()
         self.questions = Questions(place, self)
         self._open: dict[str, Pursuit] = {}
-        self._over = ""
         self._last_event = self._last_transition = 0
         self._states_after = -1
-        self._inbox: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=f"client_{skillset}", daemon=True)
-        self._thread.start()
         heard = (
             ("resource_states", ResourceStates, self._on_resources),
             ("skill_states", SkillStates, self._on_skills),
@@ -60,14 +52,16 @@ class Session:
             ("alive", Header, self._on_alive),
         )
         self._subscribers = [
-            rospy.Subscriber(f"{place}/{topic}", kind, self._on_thread(handler), tcp_nodelay=True) for topic, kind, handler in heard
+            rospy.Subscriber(f"{place}/{topic}", kind, self._thread.handing_over(handler), tcp_nodelay=True)
+            for topic, kind, handler in heard
         ]
+        self._thread.start()
 
     # --- for the client, from any thread -----------------------------------------------------------------------------
 
     def do(self, job: Job) -> None:
         """Run a job on the client's thread, soon."""
-        self._inbox.put(job)
+        self._thread.do(job)
 
     def pursue(self, pursuit: Pursuit, goal: Any) -> bool:
         """Send a goal and follow it to its end; False when the session is over."""
@@ -77,10 +71,7 @@ class Session:
             pursuit.handle.add_done_callback(self._forget)
             pursuit.send(goal)
 
-        with self.lock:
-            if not self._over:
-                self._inbox.put(send)
-        return not self._over
+        return self._thread.do_unless_over(send)
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
         """Wait for an event that the client's thread brings; None: until it comes or can't come any more.
@@ -88,25 +79,37 @@ class Session:
         Raises:
             CannotWaitError: this is that thread, or it has ended.
         """
-        if threading.current_thread() is self._thread:
-            raise CannotWaitError("this thread brings all news of the skillset and can't wait for them: use a callback, or another thread")
-        end_s = float("inf") if timeout_s is None else time.monotonic() + timeout_s
-        while not event.wait(min(IDLE_S, max(0.0, end_s - time.monotonic()))):
-            if time.monotonic() >= end_s:
-                return False
-            if timeout_s is None and not self._thread.is_alive():
-                raise CannotWaitError(f"the client of {self.skillset} was closed; nothing comes any more")
-        return True
+        return self._thread.wait(event, timeout_s)
 
     def close(self, reason: str) -> None:
         """End every wait for this reason, the thread and its connections."""
-        with self.lock:
-            self._over = self._over or reason
-        self._inbox.put(None)
-        if self._thread is not threading.current_thread():
-            self._thread.join(END_S)
+        self._thread.close(reason)
         for topic in (*self._subscribers, *self.reach.links.values()):
             topic.unregister()
+
+    # --- for the thread ----------------------------------------------------------------------------------------------
+
+    @property
+    def restless(self) -> bool:
+        """Tell whether something has to be looked at soon."""
+        return not self.reach.ready.is_set() or any(pursuit.restless for pursuit in self._open.values())
+
+    def look(self) -> None:
+        """See who can be called, and end what can be ended."""
+        if self.reach.gone(self._subscribers[-1]):
+            self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life")
+        if self._states_after >= 0:
+            self.reach.look(self._subscribers)
+        for pursuit in list(self._open.values()):
+            pursuit.settle(self._states_after)
+
+    def ending(self) -> None:
+        """Start nothing more."""
+        self.reach.ready.clear()
+
+    def ended(self, reason: str) -> None:
+        """End every wait."""
+        self._abandon(reason)
 
     # --- what is heard -----------------------------------------------------------------------------------------------
 
@@ -122,8 +125,7 @@ class Session:
         states = {resource.name: resource.state for resource in message.resources}
         with self.lock:
             self.resources = states
-            callbacks = list(self.on_changes)
-        for callback in callbacks:
+        for callback in self.on_changes:
             callback(dict(states))
 
     def _on_skills(self, message: Any) -> None:
@@ -132,10 +134,8 @@ class Session:
         for skill in message.skills:
             for execution in skill.last:
                 self._keep_last(skill.name, execution.ended_ns, execution)
-        with self.lock:
-            self.skills = {skill.name: skill for skill in message.skills}
-            callbacks = list(self.on_skills)
-        for callback in callbacks:
+        self.skills = {skill.name: skill for skill in message.skills}
+        for callback in self.on_skills:
             callback(dict(self.skills))
 
     def _on_event(self, event: Any) -> None:
@@ -151,9 +151,7 @@ class Session:
                 self._keep_last(event.skill, event.header.stamp.to_nsec(), event)
             if event.id in self._open:
                 self._open[event.id].on_event(event, life, self._last_transition)
-        with self.lock:
-            callbacks = list(self.on_events)
-        for callback in callbacks:
+        for callback in self.on_events:
             callback(event)
 
     def _keep_last(self, skill: str, stamp_ns: int, said: Any) -> None:
@@ -186,50 +184,7 @@ class Session:
     def _forget(self, handle: SkillHandle) -> None:
         self._open.pop(handle.id, None)
 
-    def _look(self) -> None:
-        """See who can be called, and end what can be ended."""
-        if self.reach.gone(self._subscribers[-1]):
-            self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life")
-        if self._states_after >= 0:
-            self.reach.look(self._subscribers)
-        for pursuit in list(self._open.values()):
-            pursuit.settle(self._states_after)
-
     def _abandon(self, reason: str) -> None:
         for pursuit in list(self._open.values()):
             pursuit.abandon(reason)
         self.questions.give_up(reason)
-
-    # --- the thread --------------------------------------------------------------------------------------------------
-
-    def _on_thread(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return a callback that has ``handler`` called on the client's thread."""
-        return lambda message: self._inbox.put(lambda: handler(message))
-
-    def _run(self) -> None:
-        while True:
-            restless = not self.reach.ready.is_set() or any(pursuit.restless for pursuit in self._open.values())
-            try:
-                job = self._inbox.get(timeout=TICK_S if restless else IDLE_S)
-            except queue.Empty:
-                job = _nothing
-            if job is None or rospy.is_shutdown():
-                break
-            self._attempt(job)
-            self._attempt(self._look)
-        self.reach.ready.clear()
-        with self.lock:
-            self._over = self._over or "the node was shut down"
-        while not self._inbox.empty():
-            self._attempt(self._inbox.get() or _nothing)
-        self._abandon(self._over)
-
-    def _attempt(self, job: Job) -> None:
-        try:
-            job()
-        except Exception as error:  # noqa: BLE001 - a callback must not end the client
-            rospy.logerr("client of %s: %s: %s", self.skillset, type(error).__name__, error)
-
-
-def _nothing() -> None:
-    """Have come to look at the time."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from skill_language.generate.client_templates import INIT, PACKAGE_XML, ROBOT, SETUP_PY
-from skill_language.generate.manager_package import SETUP_CFG
+from skill_language.generate.client_templates import INIT, ROBOT
 from skill_language.generate.python_code import tidy
-from skill_language.generate.text import MAINTAINER, fill, lines
+from skill_language.generate.python_package import package_files
+from skill_language.generate.text import fill, lines
 from skill_language.robot import Robot
 from skill_language.ros_types import camel
 
@@ -21,14 +21,17 @@ def client_package(robot: Robot) -> dict[str, str]:
         "package": package,
         "camel": camel(package.removesuffix("_client")),
     }
-    depends = lines((f"<depend>{skillset.name}_managers</depend>" for skillset in robot.skillsets), 2)
+    around = package_files(
+        package,
+        common["header"],
+        f"The robot {robot.name} for its users",
+        "typed clients of its skillsets",
+        ("rclpy", "skill_runtime", *(f"{skillset.name}_managers" for skillset in robot.skillsets)),
+        typed=True,
+    )
     return {
-        f"{package}/package.xml": fill(PACKAGE_XML, **common, maintainer=MAINTAINER, depends=depends),
-        f"{package}/setup.py": fill(SETUP_PY, **common),
-        f"{package}/setup.cfg": fill(SETUP_CFG, **common),
-        f"{package}/resource/{package}": "",
+        **around,
         f"{package}/{package}/__init__.py": fill(INIT, **common),
-        f"{package}/{package}/py.typed": "",
         f"{package}/{package}/robot.py": _robot_module(robot, common),
     }
 

@@ -7,60 +7,11 @@ import json
 from skill_language.generate.client_code import client_module
 from skill_language.generate.manager_code import hooks_module, inputs_module
 from skill_language.generate.mock_module import mock_module
-from skill_language.generate.text import MAINTAINER, fill, header, lines, packages
+from skill_language.generate.python_package import package_files
+from skill_language.generate.text import fill, header, lines, packages
 from skill_language.json_form import to_json
 from skill_language.model import Skillset
 from skill_language.robot import Robot
-
-PACKAGE_XML = """\
-<?xml version="1.0"?>
-<!-- $header. -->
-<package format="3">
-  <name>$package</name>
-  <version>0.1.0</version>
-  <description>The managers' side of the skillset $skillset: model, inputs, hooks to be written, client.</description>
-  $maintainer
-  <license>Apache-2.0</license>
-
-  <depend>skill_language</depend>
-  <depend>skill_runtime</depend>
-$depends
-
-  <export>
-    <build_type>ament_python</build_type>
-  </export>
-</package>
-"""
-
-SETUP_PY = """\
-# $header.
-from setuptools import setup
-
-setup(
-    name="$package",
-    version="0.1.0",
-    packages=["$package"],
-    data_files=[
-        ("share/ament_index/resource_index/packages", ["resource/$package"]),
-        ("share/$package", ["package.xml"]),
-    ],
-    install_requires=["setuptools"],
-    zip_safe=True,
-    maintainer="The Alula developers",
-    maintainer_email="alula@alula-robotics.org",
-    description="The managers' side of the skillset $skillset.",
-    license="Apache-2.0",
-    entry_points={"console_scripts": ["mock = $package.mock:main"]},
-)
-"""
-
-SETUP_CFG = """\
-# $header.
-[develop]
-script_dir=$$base/lib/$package
-[install]
-install_scripts=$$base/lib/$package
-"""
 
 INIT = '''\
 """The skillset ``$skillset``: model, inputs, hooks to be written, client.
@@ -110,13 +61,17 @@ def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
     parameters = [parameter for skill in skillset.skills for parameter in (*skill.inputs, *skill.outputs)]
     types = [robot.ros_type(p.type) for p in parameters] + [robot.message(data) for data in skillset.data]
     needed = [f"{skillset.name}_interfaces"] if skillset.skills else []
-    depends = lines((f"<depend>{name}</depend>" for name in (*needed, *packages(types))), 2)
+    around = package_files(
+        package,
+        common["header"],
+        f"The managers' side of the skillset {skillset.name}",
+        "model, inputs, hooks to be written, client",
+        ("skill_language", "skill_runtime", *needed, *packages(types)),
+        script=f"mock = {package}.mock:main",
+    )
     main = {f"{package}/{package}/__main__.py": fill(MAIN, **common, actions=f"{skillset.name}_interfaces.action")}
     return (main if skillset.skills else {}) | {
-        f"{package}/package.xml": fill(PACKAGE_XML, **common, maintainer=MAINTAINER, depends=depends).replace("\n\n\n", "\n\n"),
-        f"{package}/setup.py": fill(SETUP_PY, **common),
-        f"{package}/setup.cfg": fill(SETUP_CFG, **common),
-        f"{package}/resource/{package}": "",
+        **around,
         f"{package}/{package}/__init__.py": fill(INIT, **common),
         f"{package}/{package}/model.py": _model_module(robot, skillset),
         f"{package}/{package}/inputs.py": inputs_module(robot, skillset),

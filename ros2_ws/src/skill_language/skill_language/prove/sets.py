@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from skill_language.prove.bdd_model import ENDED, Cluster, Encoded, Update
+from skill_language.prove.diagrams import ENDED, Cluster, Encoded, Update
 from skill_language.prove.limits import Deadline
 from skill_language.prove.steps import State
 

@@ -10,7 +10,8 @@ from skill_language.errors import Severity
 from skill_language.model import Constant, Property, PropertyKind, Skill, Skillset
 from skill_language.prove import reachable, story
 from skill_language.prove.abstract import Abstraction
-from skill_language.prove.bdd_model import Encoded, encode
+from skill_language.prove.diagrams import Encoded
+from skill_language.prove.encoding import encode
 from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.local import Suspect

@@ -1,6 +1,6 @@
 """Real runs out of sets: a way found backwards through sets is walked forwards by the runtime's own steps.
 
-Sets may be wider than what can happen (see ``bdd_model``); a way that can't be walked is no counterexample.
+Sets may be wider than what can happen (see ``encoding``); a way that can't be walked is no counterexample.
 """
 
 from __future__ import annotations

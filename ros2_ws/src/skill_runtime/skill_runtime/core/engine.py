@@ -1,7 +1,7 @@
 """Runs one skillset: takes the steps of ``semantics`` one after another and calls the hooks between them.
 
-The engine is a front of several parts that share a ``Floor``: requests (here), ``Stops`` (interruption and emergency) and
-``Pauses``; ``why`` answers questions. A hook may end, interrupt or start whatever it likes, from any thread.
+The engine is a front of several parts that share a ``Floor``: ``Requests``, ``Reports`` of the functions, ``Stops`` (interruption
+and emergency) and ``Pauses``; ``why`` answers questions. A hook may end, interrupt or start whatever it likes, from any thread.
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ from skill_language.model import Skillset
 from skill_runtime.core import semantics
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import Listener
-from skill_runtime.core.execution import Execution, ExecutionState
+from skill_runtime.core.execution import Execution
 from skill_runtime.core.floor import Floor, Job
 from skill_runtime.core.hook_calls import HookAnswer, HookCaller, LocalHooks
-from skill_runtime.core.ledger import Entry, ResourceStatus
+from skill_runtime.core.ledger import ResourceStatus
 from skill_runtime.core.pauses import PauseReply, Pauses, Reply
 from skill_runtime.core.records import SkillRecord
+from skill_runtime.core.reports import Reports
+from skill_runtime.core.requests import Requests, Submit, run_at_once
 from skill_runtime.core.stops import DEFAULT_TIMEOUT_S, Stops
 from skill_runtime.core.why import Why, resources_of, sentence, unmet
 from skill_runtime.hooks import SkillHooks
@@ -37,11 +39,6 @@ class TransitionReply:
     accepted: bool
     reason: str
     state: str
-
-
-def run_at_once(job: Job) -> None:
-    """Run a job in the calling thread."""
-    job()
 
 
 def log_error(text: str) -> None:
@@ -80,13 +77,15 @@ class SkillsetEngine:
     ) -> None:
         semantics.check_supported(skillset)
         self.skillset = skillset
-        self._hooks: HookCaller = LocalHooks(skillset, hooks) if isinstance(hooks, Mapping) else hooks
         self._data_names = tuple(data.name for data in skillset.data)
-        self._floor = Floor(skillset, clock_ns, self._hooks, listener, defer=defer, on_error=on_error)
+        caller: HookCaller = LocalHooks(skillset, hooks) if isinstance(hooks, Mapping) else hooks
+        self._floor = Floor(skillset, clock_ns, caller, listener, defer=defer, on_error=on_error)
         self._lock = self._floor.lock
         self._ledger = self._floor.ledger
         self._stops = Stops(self._floor, interrupt_timeout_s)
         self._pauses = Pauses(self._floor, self._stops)
+        self._requests = Requests(self._floor, self._stops, self, self.tick)
+        self._reports = Reports(self._floor, self.fail)
 
     # --- what others ask for -----------------------------------------------------------------------------------------
 
@@ -106,31 +105,14 @@ class SkillsetEngine:
 
     def register(self, skill: str, inputs: object, *, execution_id: str = "") -> Execution:
         """Take down a request without calling a hook, so that it can be interrupted; ``run`` has to follow. Raises as ``request``."""
-        self.skillset.skill(skill)
-        with self._lock:
-            execution_id = execution_id or str(self._ledger.sequence + 1)
-            if execution_id in self._ledger.entries:
-                raise SkillRuntimeError(f"skill {skill}: the execution id {execution_id} is in use")
-            entry = self._ledger.add(Execution(self, execution_id, skill, inputs))
-            if self._floor.closed:
-                self._ledger.end_request(entry, ExecutionState.NOT_VALIDATED, self._floor.closed)
-        self._floor.deliver()
-        return entry.execution
+        return self._requests.register(skill, inputs, execution_id)
 
-    def run(self, execution_id: str, submit: Callable[[Job], None] = run_at_once) -> None:
+    def run(self, execution_id: str, submit: Submit = run_at_once) -> None:
         """Have a registered request validated and started, unless it has ended meanwhile.
 
         ``submit`` runs ``validate`` and ``on_dispatch``, which may wait, where somebody wrote them; all else is done in this thread.
         """
-        with self._lock:
-            entry = self._ledger.entries.get(execution_id)
-            if entry is None or entry.execution.state is not ExecutionState.REQUESTED:
-                return
-        if self._hooks.written(entry.execution.skill, "validate"):
-            validated = lambda refusal: self._validated(entry, str(refusal or ""), run_at_once)  # noqa: E731
-            submit(lambda: self._floor.call(entry, "validate", validated))
-        else:
-            self._validated(entry, "", submit)
+        self._requests.run(execution_id, submit)
 
     def transition(self, resource: str, to: str) -> TransitionReply:
         """Take an extern transition, or say why not."""
@@ -194,19 +176,7 @@ class SkillsetEngine:
         """End a running execution with a result of the model; False when it is not running (any more)."""
         values = dict(outputs or {})
         self.tick()
-        with self._lock:
-            entry = self._ledger.running(execution_id)
-            if entry is None:
-                return False
-            unknown = self._unknown_output(entry, values)
-            if unknown:
-                step = semantics.fail(self.skillset, self._ledger.situation, entry.key, unknown)
-            else:
-                entry.execution.outputs.update(values)
-                step = semantics.terminate(self.skillset, self._ledger.situation, entry.key, result, message)
-            stops = self._ledger.commit(step, by_itself=entry)
-        self._floor.after_step(stops)
-        return True
+        return self._reports.terminate(execution_id, result, message, values)
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED; False when it has ended or is not known."""
@@ -215,16 +185,7 @@ class SkillsetEngine:
 
     def set_outputs(self, execution_id: str, outputs: Mapping[str, object]) -> None:
         """Keep outputs of a running execution; unknown names end it as FAILED."""
-        values = dict(outputs)
-        with self._lock:
-            entry = self._ledger.running(execution_id)
-            if entry is None:
-                return
-            unknown = self._unknown_output(entry, values)
-            if not unknown:
-                entry.execution.outputs.update(values)
-        if unknown:
-            self.fail(execution_id, unknown)
+        self._reports.set_outputs(execution_id, dict(outputs))
 
     def progress(self, execution_id: str) -> float | None:
         """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running.
@@ -233,34 +194,11 @@ class SkillsetEngine:
         theirs by ``report_progress``. An answer that differs from the one before is progress, which puts off the progress deadline.
         """
         self.tick()
-        with self._lock:
-            entry = self._ledger.running(execution_id)
-            if entry is None:
-                return None
-            execution = entry.execution
-            if entry.dispatching or entry.stop_hook or execution.state is not ExecutionState.RUNNING:
-                return execution.progress
-        answers: list[object] = []
-        self._floor.call(entry, "progress", answers.append)
-        if not answers or answers[0] is None:
-            return None if execution.done else execution.progress
-        return self.report_progress(execution_id, answers[0])
+        return self._reports.ask_progress(execution_id)
 
     def report_progress(self, execution_id: str, value: object) -> float | None:
         """Keep an execution's progress, held within 0 to 1; what is no number ends it as FAILED."""
-        try:
-            told = min(1.0, max(0.0, float(value)))  # type: ignore[arg-type]  # that is tried
-        except (TypeError, ValueError) as error:
-            self.fail(execution_id, f"progress raised {type(error).__name__}: {error}")
-            return None
-        with self._lock:
-            entry = self._ledger.running(execution_id)
-            if entry is None:
-                return None
-            if told != entry.execution.progress and entry.execution.state is ExecutionState.RUNNING:
-                self._ledger.progressed(entry)
-            entry.execution.progress = told
-        return told
+        return self._reports.set_progress(execution_id, value)
 
     def fail_all(self, message: str) -> None:
         """End whatever was asked for or runs as FAILED."""
@@ -332,7 +270,7 @@ class SkillsetEngine:
         def answered(answer: HookAnswer) -> None:
             then(f"validate raised {answer.error}" if answer.error else str(answer.value or ""))
 
-        self._hooks.call(Execution(self, "", skill, inputs), "validate", answered)
+        self._floor.hooks.call(Execution(self, "", skill, inputs), "validate", answered)
 
     def explain(self, skill: str, refusal: str = "") -> Why:
         """Answer as ``why``, with what ``validate`` has said already."""
@@ -346,42 +284,8 @@ class SkillsetEngine:
 
     # --- parts -------------------------------------------------------------------------------------------------------
 
-    def _validated(self, entry: Entry, refusal: str, submit: Callable[[Job], None]) -> None:
-        """Refuse the request or take its start step and call ``on_dispatch``."""
-        self.tick()
-        started = False
-        stops: list[Entry] = []
-        with self._lock:
-            if entry.execution.done:
-                return
-            if refusal:
-                self._ledger.end_request(entry, ExecutionState.NOT_VALIDATED, refusal)
-            else:
-                stops, started = self._start(entry)
-        self._floor.after_step([other for other in stops if other is not entry])
-        if started and self._hooks.written(entry.execution.skill, "on_dispatch"):
-            submit(lambda: self._floor.call(entry, "on_dispatch", lambda _: self._stops.hook_returned(entry)))
-
-    def _start(self, entry: Entry) -> tuple[list[Entry], bool]:
-        """Take the start step with the lock held; return what is to be stopped, and whether the execution runs."""
-        entry.dispatching = self._hooks.written(entry.execution.skill, "on_dispatch")
-        stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, entry.key))
-        started = entry.execution.state is ExecutionState.RUNNING
-        if not started:
-            # Also when its own invariant broke in the very step: nothing was dispatched, nothing is to be stopped.
-            self._ledger.entries.pop(entry.key.id, None)
-        return stops, started
-
     def _paused(self, execution_id: str, *, paused: bool) -> PauseReply:
         self.tick()
         replies: list[PauseReply] = []
         self._pauses.set_paused(execution_id, paused=paused, reply=replies.append, wait=False)
         return replies[0]
-
-    def _unknown_output(self, entry: Entry, outputs: Mapping[str, object]) -> str:
-        """Return what is wrong with the names of outputs, or ""."""
-        known = [output.name for output in self.skillset.skill(entry.execution.skill).outputs]
-        unknown = [name for name in outputs if name not in known]
-        if not unknown:
-            return ""
-        return f"skill {entry.execution.skill} has no output {', '.join(unknown)}; it has {', '.join(known) or 'none'}"

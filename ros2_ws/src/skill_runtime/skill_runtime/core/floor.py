@@ -46,7 +46,7 @@ class Floor:
         self.records = Records(skillset)
         self.defer = defer
         self.on_error = on_error
-        self._hooks = hooks
+        self.hooks = hooks
         self._outbox = Outbox(listener, on_error)
         self.ledger = Ledger(skillset, clock_ns, self._publish)
 
@@ -82,7 +82,7 @@ class Floor:
                 self.fail(entry.key.id, f"{hook} raised {answer.error}")
             then(answer.value)
 
-        self._hooks.call(entry.execution, hook, answered)
+        self.hooks.call(entry.execution, hook, answered)
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED; False when it has ended or is not known."""

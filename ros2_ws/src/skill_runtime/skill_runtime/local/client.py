@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
 from skill_language.model import Parameter, Skillset
+from skill_runtime.callbacks import Callbacks, Forget
+from skill_runtime.client_base import ClientBase
 from skill_runtime.core.engine import TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.execution import ExecutionState
@@ -14,11 +16,11 @@ from skill_runtime.core.records import ExecutionRecord
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
 from skill_runtime.local.data import DataReading
-from skill_runtime.local.feed import LocalFeed
 from skill_runtime.local.host import LocalHost
 from skill_runtime.local.managers import LocalManagers
 from skill_runtime.local.values import complete, fit
-from skill_runtime.views import Forget, Sample, SkillsetView, TransitionAnswer
+from skill_runtime.samples import SampleFeed
+from skill_runtime.views import Sample, SkillsetView, TransitionAnswer
 from skill_runtime.waiting import Pending
 
 if TYPE_CHECKING:
@@ -27,10 +29,9 @@ if TYPE_CHECKING:
 OnChange = Callable[[dict[str, str]], None]
 OnEvent = Callable[[str, EngineEvent], None]
 T = TypeVar("T")
-CallbackT = TypeVar("CallbackT")
 
 
-class LocalClient:
+class LocalClient(ClientBase):
     """Starts, watches and interrupts the skills of one skillset, and follows its resources, data and events.
 
     Nothing here waits but ``wait_ready``. All that crosses between client and managers takes the world's ``latency_s`` and at
@@ -38,18 +39,17 @@ class LocalClient:
     """
 
     def __init__(self, world: LocalWorld, name: str) -> None:
-        self.skillset = name
+        super().__init__(name, LocalHost(world))
         self._world = world
         self._managers: LocalManagers | None = None
         self._known: Skillset | None = None
         self._resources: dict[str, str] = {}
         self._outputs: dict[str, Sequence[Parameter]] = {}
-        self._host = LocalHost(world)
         self._open: dict[str, SkillHandle] = {}
         self._last: dict[str, Ended[dict[str, Any], str]] = {}
-        self._on_change: list[OnChange] = []
-        self._on_event: list[OnEvent] = []
-        self._feeds: dict[str, LocalFeed] = {}
+        self._on_change: Callbacks[OnChange] = Callbacks()
+        self._on_event: Callbacks[OnEvent] = Callbacks()
+        self._feeds: dict[str, SampleFeed] = {}
         self._samples: dict[str, Sample] = {}
         self._pending: WeakSet[Pending[Any]] = WeakSet()
 
@@ -63,10 +63,7 @@ class LocalClient:
         return self._managers is not None
 
     @property
-    def model(self) -> Skillset:
-        """Return the model that the managers execute; raise RuntimeError before ``wait_ready``."""
-        if self._known is None:
-            raise RuntimeError(f"the managers of {self.skillset} have not described themselves yet; call wait_ready first")
+    def _described(self) -> Skillset | None:
         return self._known
 
     @property
@@ -81,23 +78,21 @@ class LocalClient:
 
     def on_change(self, callback: OnChange) -> Forget:
         """Have ``callback(resources)`` called after each step that changed a resource; the return value ends that."""
-        return _subscribed(self._on_change, callback)
+        return self._on_change.add(callback)
 
     def on_event(self, callback: OnEvent) -> Forget:
         """Have ``callback(skillset, event)`` called for each event from now on; the return value ends that."""
-        return _subscribed(self._on_event, callback)
+        return self._on_event.add(callback)
 
-    def data_feed(self, name: str) -> LocalFeed:
+    def data_feed(self, name: str) -> SampleFeed:
         """Return the values of a data.
 
         Raises:
             ValueError: there is no such data.
         """
-        known = {data.name: data for data in self.model.data}
-        if name not in known:
-            raise ValueError(f"skillset {self.skillset} has no data {name!r}; it has {', '.join(known) or 'none'}")
+        data = self._find_data(name)
         if name not in self._feeds:
-            self._feeds[name] = LocalFeed(self._world.clock, known[name])
+            self._feeds[name] = SampleFeed(data, lambda: self._world.clock.now_ns)
             if name in self._samples:
                 self._feeds[name].keep(self._samples[name])
         return self._feeds[name]
@@ -184,29 +179,13 @@ class LocalClient:
         self._world.send(arrive)
         return pending
 
-    def _check_skill(self, skill: str) -> None:
-        known = [known.name for known in self.model.skills]
-        if skill not in known:
-            raise ValueError(f"skillset {self.skillset} has no skill {skill!r}; it has {', '.join(known)}")
-
     def _fitted(self, skill: str, inputs: Mapping[str, object]) -> dict[str, object]:
         """Return the inputs as the hooks get them; raise ValueError when skill or inputs are wrong."""
         self._check_skill(skill)
         declared = self.model.skill(skill).inputs
-        place = f"inputs of {self.skillset}.{skill}"
-        values = fit(declared, inputs, place, self._world.types)
-        missing = [parameter.name for parameter in declared if parameter.name not in values]
-        if missing:
-            raise ValueError(f"{place}: {', '.join(missing)} missing")
+        values = fit(declared, inputs, self._place(skill), self._world.types)
+        self._check_complete(skill, (parameter.name for parameter in declared), values)
         return values
-
-    def _stillborn(self, skill: str) -> SkillHandle:
-        handle = SkillHandle(skill, "", host=self._host)
-        handle.fail(self._not_there())
-        return handle
-
-    def _not_there(self) -> str:
-        return f"the managers of {self.skillset} are not there"
 
     # --- what the managers tell, each on its way through the world ---------------------------------------------------
 
@@ -242,10 +221,10 @@ class LocalClient:
     def _take_step(self, resources: Mapping[str, str] | None, events: Sequence[EngineEvent]) -> None:
         if resources is not None:
             self._resources = dict(resources)
-            for on_change in list(self._on_change):
+            for on_change in self._on_change:
                 on_change(dict(resources))
         for event in events:
-            for on_event in list(self._on_event):
+            for on_event in self._on_event:
                 on_event(self.skillset, event)
         for event in events:
             if isinstance(event, ExecutionEvent):
@@ -287,16 +266,6 @@ class LocalClient:
             handle.fail(reason)
         for pending in list(self._pending):
             pending.fail(reason)
-
-
-def _subscribed(callbacks: list[CallbackT], callback: CallbackT) -> Forget:
-    callbacks.append(callback)
-
-    def forget() -> None:
-        if callback in callbacks:
-            callbacks.remove(callback)
-
-    return forget
 
 
 def _answered(reply: TransitionReply) -> TransitionAnswer:

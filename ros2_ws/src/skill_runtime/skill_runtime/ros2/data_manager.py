@@ -13,10 +13,8 @@ from rclpy.qos import QoSProfile
 from skillset_interfaces.srv import GetData
 
 from skill_language.model import Data, Skillset
-from skill_language.ros_types import PRIMITIVES
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.plain import to_plain
-from skill_runtime.ros2.convert import message_class
+from skill_runtime.plain import carried, message_class, to_plain
 from skill_runtime.ros2.names import LATCHED
 from skill_runtime.staleness import STALE_PERIODS, is_stale
 
@@ -29,11 +27,6 @@ DataBindings = Mapping[str, tuple[str, str]]
 class _Received:
     value: Any
     stamp_ns: int
-
-
-def plain_value(data: Data, message: Any) -> Any:
-    """Return the message, or what it carries where the model's type is a primitive: that comes as std_msgs/Float64 and the like."""
-    return message.data if data.type in PRIMITIVES else message
 
 
 class DataManager:
@@ -64,7 +57,7 @@ class DataManager:
             if staleness is not None:
                 staleness.reset()
             publish(message)
-            self._update(data.name, plain_value(data, message))
+            self._update(data.name, carried(data, message))
 
         return receive
 

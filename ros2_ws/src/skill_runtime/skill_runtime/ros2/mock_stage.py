@@ -11,7 +11,8 @@ from typing import Any
 from rclpy.node import Node
 from skillset_interfaces.msg import Event
 
-from skill_runtime.ros2.convert import fields_of, fill, message_class
+from skill_runtime.plain import message_class
+from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.data_manager import DataBindings
 from skill_runtime.ros2.due import DueTimer
 from skill_runtime.ros2.manager_node import SkillsetNode
