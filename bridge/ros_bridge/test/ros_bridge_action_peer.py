@@ -65,16 +65,20 @@ def serve(name):
 def serve_simple(name):
     """Run one goal at a time; a newer one preempts it."""
 
+    preempted = threading.Event()
+
     def execute(goal):
         report(event="goal", target=goal.target)
-        while not server.is_preempt_requested() and goal.behaviour == "hang":
-            rospy.rostime.wallsleep(0.01)
+        if goal.behaviour == "hang":
+            preempted.wait()
         if server.is_preempt_requested():
+            preempted.clear()
             server.set_preempted(CountResult([], "preempted"))
         else:
             server.set_succeeded(CountResult([goal.target], "from ROS 1"))
 
     server = actionlib.SimpleActionServer(name, CountAction, execute, auto_start=False)
+    server.register_preempt_callback(preempted.set)
     KEEP.append(server)
     server.start()
     report(event="serving", name=name)
@@ -128,7 +132,14 @@ def cancel_id(name, goal_id):
     CLIENTS[name].pub_cancel.publish(GoalID(stamp=rospy.Time(), id=goal_id))
 
 
+def leave():
+    """Tell the master of the end, as nodes do that are not killed."""
+    rospy.signal_shutdown("that was all")
+    os._exit(0)
+
+
 COMMANDS = {
+    "leave": leave,
     "serve": serve,
     "serve_simple": serve_simple,
     "client": client,
