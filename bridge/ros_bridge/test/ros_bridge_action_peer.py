@@ -1,25 +1,17 @@
 """A ROS 1 node for the tests of bridged actions, in a process of its own: takes commands as JSON lines, reports events as JSON lines."""
 
-import json
 import os
-import sys
 import threading
 
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalID
 from bridge_test_interfaces.msg import CountAction, CountFeedback, CountGoal, CountResult
+from ros_bridge_peer_loop import report, run
 
-WRITE = threading.Lock()
 KEEP = []
 CLIENTS = {}
 HANDLES = {}
-
-
-def report(**event):
-    with WRITE:
-        sys.stdout.write(json.dumps(event) + "\n")
-        sys.stdout.flush()
 
 
 def run_goal(handle, cancelled):
@@ -151,13 +143,4 @@ COMMANDS = {
 }
 
 
-def main():
-    rospy.init_node("bridge_action_peer", anonymous=True, disable_signals=True, disable_rostime=True)
-    report(event="ready")
-    for line in sys.stdin:
-        command = json.loads(line)
-        COMMANDS[command.pop("do")](**command)
-    os._exit(0)
-
-
-main()
+run("bridge_action_peer", COMMANDS)

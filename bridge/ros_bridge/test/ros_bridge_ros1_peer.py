@@ -1,8 +1,6 @@
 """A ROS 1 node for the bridge's tests, in a process of the ROS 1 world: takes commands as JSON lines, reports events as JSON lines."""
 
-import json
 import os
-import sys
 import threading
 import warnings
 from collections import deque
@@ -13,15 +11,9 @@ import rosbag
 import roslib.message
 import rospy
 from genpy.message import fill_message_args
+from ros_bridge_peer_loop import report, run
 
-WRITE = threading.Lock()
 KEEP = []
-
-
-def report(**event):
-    with WRITE:
-        sys.stdout.write(json.dumps(event) + "\n")
-        sys.stdout.flush()
 
 
 def serialized(message):
@@ -179,13 +171,4 @@ COMMANDS = {
 }
 
 
-def main():
-    rospy.init_node("bridge_test_peer", anonymous=True, disable_signals=True, disable_rostime=True)
-    report(event="ready")
-    for line in sys.stdin:
-        command = json.loads(line)
-        COMMANDS[command.pop("do")](**command)
-    os._exit(0)
-
-
-main()
+run("bridge_test_peer", COMMANDS)

@@ -123,7 +123,7 @@ def test_cancelling_at_any_moment_ends_a_goal_exactly_once(ros1, ros2, delay_s):
     ros2.server("/ba/in_ros2")
     key = f"race {delay_s}"
     ros1.do("goal", name="/ba/in_ros2", key=key, target=3, period_s=0.005)
-    threading.Event().wait(delay_s)
+    threading.Event().wait(delay_s)  # the moment is what is tested
     ros1.do("cancel", key=key)
     assert ending(ros1, key)["terminal"] in ("PREEMPTED", "SUCCEEDED", "RECALLED")
     sent = Sent(ros2.client("/ba/in_ros1"), target=3, period_s=0.005, behaviour="count")

@@ -54,11 +54,10 @@ def works(node):
 
 
 def test_spinning_goes_on_after_an_end_was_closed_under_the_executor(world):
-    """The handle is closed and the node still has the subscription: the moment between the two, in which another thread may be."""
+    """A part of the subscription is closed and the node still has it: the moment in which another thread is that destroys it."""
     node, executor, thread = world
     subscription = node.create_subscription(String, "/bridge_spinning", print, 1)
-    subscription.handle.destroy_when_not_in_use()
-    node.create_timer(0.01, lambda: None)  # the executor looks at its ends when something has happened
+    subscription.event_handlers[0].destroy()
     thread.start()
     assert executor.raised.wait(WITHIN_S)
     assert thread.is_alive()
