@@ -221,6 +221,7 @@ def generated(files, tmp_path, monkeypatch):
     runtime, hooks, handle, views = (types.ModuleType(f"skill_runtime{name}") for name in ("", ".hooks", ".handle", ".views"))
     runtime.__path__ = []
     hooks.SkillHooks = type("SkillHooks", (), {"progress": lambda self, execution: 0.125})
+    hooks.unwritten = lambda hook: hook
     handle.Handle = Stub
     views.Access, views.DataView, views.ResourceView, views.Skill = Stub, Stub, Stub, Stub
     views.TypedSkillset = type("TypedSkillset", (), {"__init__": lambda self, client: setattr(self, "client", client)})

@@ -18,6 +18,7 @@ INDENT_PX = 30
 LETTER_PX = 6.6
 MARGIN_PX = 16
 TITLE_PX = 34
+NOTE_LETTERS = 160  # of a note beside its node; ``tree.json`` has all of it
 FONT = "font-family='DejaVu Sans, Helvetica, sans-serif'"
 
 SYMBOLS = {
@@ -83,7 +84,8 @@ def _label(view: NodeView) -> str:
 def _note(view: NodeView) -> str:
     mark = MARKS.get(view.status, "")
     worth_it = view.message and view.message != mark and view.status != "INVALID"
-    return f"{mark} {view.message}".strip()[:110] if worth_it else mark
+    note = f"{mark} {view.message}".strip() if worth_it else mark
+    return note if len(note) <= NOTE_LETTERS else f"{note[: NOTE_LETTERS - 1]}…"
 
 
 def _rectangle(x: float, top: float, width: float, style: str) -> str:

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 if TYPE_CHECKING:
     from skill_runtime.core.execution import Execution
+
+
+HookT = TypeVar("HookT", bound=Callable[..., object])
+
+
+def unwritten(hook: HookT) -> HookT:
+    """Mark a hook that does nothing until somebody overrides it: managers that find it so give it no thread of its own."""
+    hook.unwritten = True  # type: ignore[attr-defined]
+    return hook
 
 
 class SkillHooks:
@@ -27,10 +36,12 @@ class SkillHooks:
         """Make what ``validate`` gets and ``execution.inputs`` holds from the values by name."""
         return SimpleNamespace(**values) if self.inputs_type is None else self.inputs_type(**values)
 
+    @unwritten
     def validate(self, inputs: object) -> str:  # noqa: ARG002
         """Return "" to accept the request, or why it is refused. Called first; changes nothing; may wait a bounded time."""
         return ""
 
+    @unwritten
     def on_dispatch(self, execution: Execution) -> None:
         """Start the function. Called once, after the start effect was applied; returns soon."""
 

@@ -11,6 +11,7 @@ from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Benc
 from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
 from skill_runtime.core import ExecutionState, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError, UnsupportedModelError
+from skill_runtime.hooks import SkillHooks
 
 S = ExecutionState
 
@@ -36,6 +37,25 @@ def test_validate_refuses_in_its_own_words():
     execution = bench.run(height=300)
     assert (execution.state, execution.message) == (S.NOT_VALIDATED, "300 m is too high")
     assert bench.hooks["takeoff"].calls == ["validate"]
+
+
+@pytest.mark.parametrize(("wrote", "jobs"), [((), 0), (("on_dispatch",), 1), (("validate",), 1), (("validate", "on_dispatch"), 1)])
+def test_only_hooks_that_somebody_wrote_are_given_a_thread(wrote, jobs):
+    called = []
+    hooks = type("Hooks", (SkillHooks,), {hook: lambda _, given, hook=hook: called.append(hook) or "" for hook in wrote})()
+    skillset = flying_skillset()
+    engine = SkillsetEngine(skillset, lambda: 0, {skill.name: hooks for skill in skillset.skills}, lambda _: None)
+    assert engine.transition("sdk", "AVAILABLE").accepted
+    execution = engine.register("takeoff", {})
+    waiting = []
+    engine.run(execution.id, waiting.append)
+    assert len(waiting) == jobs
+    assert (execution.state, called) == (S.REQUESTED if "validate" in wrote else S.RUNNING, [])
+    for job in waiting:
+        job()
+    assert (execution.state, called) == (S.RUNNING, list(wrote))
+    assert engine.interrupt(execution.id)
+    assert execution.state is S.INTERRUPTED
 
 
 def test_not_ready_names_the_precondition_and_the_states():

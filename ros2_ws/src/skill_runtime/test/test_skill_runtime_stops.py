@@ -181,6 +181,42 @@ def test_pauses_are_refused_with_a_reason():
     assert "is INTERRUPTING" in bench.engine.resume(execution.id).reason
 
 
+@pytest.mark.parametrize(
+    ("then", "answers", "state"),
+    [
+        ("", [(True, ""), (True, "")], S.RUNNING),
+        ("terminate", [(False, "no execution"), (False, "no execution")], S.TERMINATED),
+        ("interrupt", [(False, "INTERRUPTING"), (False, "INTERRUPTING")], S.INTERRUPTING),
+        ("raise", [(False, "no execution"), (False, "no execution")], S.FAILED),
+    ],
+)
+def test_what_is_asked_while_the_function_is_being_started_waits_for_its_turn(then, answers, state):
+    bench = bench_stopping_later()
+    replies = []
+
+    def dispatch(execution):
+        bench.engine.set_paused(execution.id, replies.append, paused=True)
+        bench.engine.set_paused(execution.id, replies.append, paused=False)
+        refusal = bench.engine.pause(execution.id)  # who waits for the answer in the hook itself is refused
+        assert not refusal.accepted
+        assert "being started" in refusal.reason
+        assert replies == []
+        if then == "terminate":
+            execution.terminate("DONE")
+        elif then == "interrupt":
+            bench.engine.interrupt(execution.id)
+        elif then == "raise":
+            raise RuntimeError
+
+    bench.hooks["takeoff"].acts["on_dispatch"] = dispatch
+    execution = bench.run()
+    assert execution.state is state
+    assert [reply.accepted for reply in replies] == [accepted for accepted, _ in answers]
+    assert all(reason in reply.reason for reply, (_, reason) in zip(replies, answers, strict=True))
+    paused = ["on_pause", "on_resume"]
+    assert [call for call in bench.hooks["takeoff"].calls if call in paused] == (paused if not then else [])
+
+
 def test_a_request_can_be_interrupted_from_the_moment_it_is_taken_down():
     bench = Bench()
     execution = bench.engine.register("takeoff", {})

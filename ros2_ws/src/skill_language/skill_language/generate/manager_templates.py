@@ -31,7 +31,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-from skill_runtime.hooks import SkillHooks
+from skill_runtime.hooks import SkillHooks, unwritten
 
 from ${skillset}_managers.inputs import (
 $inputs
@@ -56,6 +56,7 @@ class Abstract${camel}Skill(SkillHooks, ABC):
     skill = "$skill"
     inputs_type = ${camel}Inputs
 
+    @unwritten
     def validate(self, inputs: ${camel}Inputs) -> str:
         """Return "" to accept the inputs, or why they are refused."""
         return ""

@@ -117,13 +117,20 @@ class SkillsetEngine:
         self._floor.deliver()
         return entry.execution
 
-    def run(self, execution_id: str) -> None:
-        """Have a registered request validated and started, unless it has ended meanwhile."""
+    def run(self, execution_id: str, submit: Callable[[Job], None] = run_at_once) -> None:
+        """Have a registered request validated and started, unless it has ended meanwhile.
+
+        ``submit`` runs ``validate`` and ``on_dispatch``, which may wait, where somebody wrote them; all else is done in this thread.
+        """
         with self._lock:
             entry = self._ledger.entries.get(execution_id)
             if entry is None or entry.execution.state is not ExecutionState.REQUESTED:
                 return
-        self._floor.call(entry, "validate", lambda refusal: self._validated(entry, str(refusal or "")))
+        if self._hooks.written(entry.execution.skill, "validate"):
+            validated = lambda refusal: self._validated(entry, str(refusal or ""), run_at_once)  # noqa: E731
+            submit(lambda: self._floor.call(entry, "validate", validated))
+        else:
+            self._validated(entry, "", submit)
 
     def transition(self, resource: str, to: str) -> TransitionReply:
         """Take an extern transition, or say why not."""
@@ -339,7 +346,7 @@ class SkillsetEngine:
 
     # --- parts -------------------------------------------------------------------------------------------------------
 
-    def _validated(self, entry: Entry, refusal: str) -> None:
+    def _validated(self, entry: Entry, refusal: str, submit: Callable[[Job], None]) -> None:
         """Refuse the request or take its start step and call ``on_dispatch``."""
         self.tick()
         started = False
@@ -352,12 +359,12 @@ class SkillsetEngine:
             else:
                 stops, started = self._start(entry)
         self._floor.after_step([other for other in stops if other is not entry])
-        if started:
-            self._floor.call(entry, "on_dispatch", lambda _: self._stops.hook_returned(entry))
+        if started and self._hooks.written(entry.execution.skill, "on_dispatch"):
+            submit(lambda: self._floor.call(entry, "on_dispatch", lambda _: self._stops.hook_returned(entry)))
 
     def _start(self, entry: Entry) -> tuple[list[Entry], bool]:
         """Take the start step with the lock held; return what is to be stopped, and whether the execution runs."""
-        entry.dispatching = True
+        entry.dispatching = self._hooks.written(entry.execution.skill, "on_dispatch")
         stops = self._ledger.commit(semantics.start(self.skillset, self._ledger.situation, entry.key))
         started = entry.execution.state is ExecutionState.RUNNING
         if not started:
@@ -366,8 +373,9 @@ class SkillsetEngine:
         return stops, started
 
     def _paused(self, execution_id: str, *, paused: bool) -> PauseReply:
+        self.tick()
         replies: list[PauseReply] = []
-        self.set_paused(execution_id, replies.append, paused=paused)
+        self._pauses.set_paused(execution_id, paused=paused, reply=replies.append, wait=False)
         return replies[0]
 
     def _unknown_output(self, entry: Entry, outputs: Mapping[str, object]) -> str:

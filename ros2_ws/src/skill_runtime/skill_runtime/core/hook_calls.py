@@ -35,6 +35,10 @@ class HookCaller(Protocol):
         """
         ...
 
+    def written(self, skill: str, hook: str) -> bool:
+        """Tell whether somebody wrote the hook (see ``hooks.unwritten``): then it may wait; else it need not be called."""
+        ...
+
 
 class LocalHooks:
     """Hooks in this process, called in the thread that asks; ``then`` is called before ``call`` returns."""
@@ -46,6 +50,10 @@ class LocalHooks:
     def call(self, execution: Execution, hook: str, then: Then) -> None:
         """Call a hook; ``validate`` gets the inputs, every other the execution."""
         then(call_hook(self._hooks[execution.skill], execution, hook))
+
+    def written(self, skill: str, hook: str) -> bool:
+        """Tell whether somebody wrote the hook."""
+        return not getattr(getattr(self._hooks[skill], hook), "unwritten", False)
 
 
 def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookAnswer:

@@ -6,7 +6,7 @@ Not safe for threads: the engine calls it with its lock held.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from skill_language.model import Skillset
 from skill_runtime.core import semantics
@@ -35,6 +35,8 @@ class Entry:
     """Whether ``on_dispatch``, ``on_pause`` or ``on_resume`` is being called."""
     stop_hook: str = ""
     """The one hook that stops the function, once it is decided on; called at once, or after the hook that is being called."""
+    waiting: list[Callable[[], None]] = field(default_factory=list)
+    """Pauses and resumptions that were asked for while a hook was being called; they come after it, and after a stop."""
 
 
 class Ledger:

@@ -29,13 +29,23 @@ class Pauses:
         self._floor = floor
         self._stops = stops
 
-    def set_paused(self, execution_id: str, *, paused: bool, reply: Reply) -> None:
-        """Pause or resume; ``reply`` is called once, when the hook has answered or there is nothing to ask."""
+    def set_paused(self, execution_id: str, *, paused: bool, reply: Reply, wait: bool = True) -> None:
+        """Pause or resume; ``reply`` is called once, when the hook has answered or there is nothing to ask.
+
+        While the execution is being started, paused or resumed, this waits for its turn; without ``wait`` it is refused then.
+        """
         with self._floor.lock:
             entry = self._floor.ledger.entries.get(execution_id)
             known = _known_reply(execution_id, entry, paused=paused)
             if entry is not None and known is None:
-                entry.dispatching = True
+                if entry.dispatching and wait:
+                    entry.waiting.append(lambda: self.set_paused(execution_id, paused=paused, reply=reply))
+                    return
+                if entry.dispatching:
+                    reason = f"{entry.key.skill} {execution_id} is being started, paused or resumed"
+                    known = PauseReply(accepted=False, reason=reason)
+                else:
+                    entry.dispatching = True
         if entry is None or known is not None:
             reply(known or PauseReply(accepted=False))
             return
@@ -74,6 +84,4 @@ def _known_reply(execution_id: str, entry: Entry | None, *, paused: bool) -> Pau
         return PauseReply(accepted=True)
     if state in {ExecutionState.REQUESTED, ExecutionState.INTERRUPTING}:
         return PauseReply(accepted=False, reason=f"{entry.key.skill} {execution_id} is {state.value}")
-    if entry.dispatching:
-        return PauseReply(accepted=False, reason=f"{entry.key.skill} {execution_id} is being started, paused or resumed")
     return None

@@ -63,8 +63,11 @@ class Stops:
             entry.dispatching = False
             stop = bool(entry.stop_hook) and entry.execution.state is not ExecutionState.TERMINATED
             floor.ledger.forget_if_through(entry)
+            waiting, entry.waiting = entry.waiting, []
         if stop:
             self._stop(entry)
+        for job in waiting:
+            job()
 
     def interrupted(self, execution_id: str, message: str = "") -> bool:
         """Take the step of the interruption: the stop is done. False when none is under way."""

@@ -10,7 +10,6 @@ from typing import Any
 from weakref import WeakSet
 
 from action_msgs.srv import CancelGoal
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from skillset_interfaces.msg import Event, SkillStates
@@ -29,6 +28,7 @@ from skill_runtime.ros2.names import EVENTS, LATCHED, LIVELINESS_LEASE_S
 from skill_runtime.ros2.presence import Presence
 from skill_runtime.ros2.pursuit import Pursuit, outputs_of
 from skill_runtime.ros2.questions import HOOK_PATIENCE_S, Questions
+from skill_runtime.ros2.resting_action import RestingGroup
 from skill_runtime.ros2.spinning import SpunHost
 from skill_runtime.views import DataReading, Forget, SkillsetView, TransitionAnswer
 from skill_runtime.waiting import Pending
@@ -69,7 +69,7 @@ class SkillsetClient:
         self._skills: dict[str, Any] = {}
         self._on_skills_told: list[OnSkills] = []
         self._moments: WeakSet[Pending[Any]] = WeakSet()
-        group = MutuallyExclusiveCallbackGroup()
+        group = RestingGroup()
         self._group = group
         self._questions = Questions(node, group, self._host, self._wake)
         self._presence = Presence(

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.action import ActionClient
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -17,6 +16,7 @@ from skillset_interfaces.srv import Describe
 from skill_language.json_form import from_json
 from skill_language.model import Skillset
 from skill_runtime.ros2.names import ALIVE, action_module, action_type
+from skill_runtime.ros2.resting_action import RestingActionClient
 
 DESCRIBE_AGAIN_S = 1.0
 DOUBT_S = 1.0
@@ -119,7 +119,7 @@ class Presence:
         for skill in model.skills:
             self.actions[skill.name] = action_type(actions, skill.name)
             name = f"{self._root}/skill/{skill.name}"
-            self.clients[skill.name] = ActionClient(self._node, self.actions[skill.name], name, callback_group=self._group)
+            self.clients[skill.name] = RestingActionClient(self._node, self.actions[skill.name], name, callback_group=self._group)
         self.model = model
 
     def _hear(self, message: Any) -> None:

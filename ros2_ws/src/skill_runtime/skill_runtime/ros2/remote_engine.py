@@ -21,7 +21,7 @@ from skill_runtime.core.hook_calls import HookAnswer, call_hook
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.plain import to_plain
 from skill_runtime.ros2.resource_link import ResourceLink
-from skill_runtime.workers import Workers
+from skill_runtime.workers import Job, Workers
 
 STOPS = frozenset({"on_interrupt", "on_violation", "on_failure"})
 KEPT = 256
@@ -88,7 +88,7 @@ class RemoteEngine:
             self._end(image, ExecutionState.FAILED, "", f"the resource manager of {self.skillset.name} is not there")
         return image.execution
 
-    def run(self, execution_id: str) -> None:
+    def run(self, execution_id: str, submit: Callable[[Job], None]) -> None:
         """Do nothing: a request that was sent is run over there."""
 
     def interrupt(self, execution_id: str) -> bool:

@@ -141,3 +141,7 @@ class LinkedHooks:
     def call(self, execution: Execution, hook: str, then: Then) -> None:
         """Call a hook of the execution's skill."""
         self.links[execution.skill].call(execution, hook, then)
+
+    def written(self, skill: str, hook: str) -> bool:  # noqa: ARG002
+        """Tell that it may be: only the other process knows."""
+        return True

@@ -42,8 +42,8 @@ class Engine(Protocol):
         """Take down a request."""
         ...
 
-    def run(self, execution_id: str) -> None:
-        """Have a registered request validated and started."""
+    def run(self, execution_id: str, submit: Callable[[Job], None]) -> None:
+        """Have a registered request validated and started; ``submit`` runs hooks that may wait."""
         ...
 
     def interrupt(self, execution_id: str) -> bool:
@@ -60,7 +60,7 @@ class Engine(Protocol):
 
 
 class SkillManager:
-    """Serves one skill; ``submit`` runs a job on a thread of its own, because ``validate`` and ``on_interrupt`` may wait."""
+    """Serves one skill; ``submit`` runs a job on a thread of its own, because hooks may wait."""
 
     def __init__(
         self,
@@ -122,7 +122,7 @@ class SkillManager:
         except Exception as error:  # noqa: BLE001 - inputs are made by the developer's class
             self._refuse(goal, identifier, f"the request could not be taken down: {type(error).__name__}: {error}")
             return
-        self._submit(lambda: self._engine.run(identifier))
+        self._engine.run(identifier, self._submit)
 
     def _refuse(self, goal: Any, identifier: str, message: str) -> None:
         """End a goal that never became an execution."""
