@@ -15,6 +15,33 @@ from alula_testing.ros2 import spin
 WITHIN_S = 20.0
 
 
+class CountClient(ActionClient):
+    """A client whose responses wait until their requests are noted down.
+
+    rclpy 7.1.6 sends a request first and notes it then; a response that another thread of the executor takes in between is dropped.
+    """
+
+    def __init__(self, node: "ActionNode", name: str) -> None:
+        self._noting = threading.RLock()
+        super().__init__(node.node, Count, name, callback_group=node.group)
+
+    def take_data(self):
+        with self._noting:
+            return super().take_data()
+
+    def send_goal_async(self, *arguments):
+        with self._noting:
+            return super().send_goal_async(*arguments)
+
+    def _get_result_async(self, goal_handle):
+        with self._noting:
+            return super()._get_result_async(goal_handle)
+
+    def _cancel_goal_async(self, goal_handle):
+        with self._noting:
+            return super()._cancel_goal_async(goal_handle)
+
+
 class Sent:
     """A goal of the rclpy client: its answer, feedback, states and result as they come."""
 
@@ -68,7 +95,7 @@ class ActionNode:
 
     def client(self, name: str) -> ActionClient:
         if name not in self.clients:
-            self.clients[name] = ActionClient(self.node, Count, name, callback_group=self.group)
+            self.clients[name] = CountClient(self, name)
         assert self.clients[name].wait_for_server(WITHIN_S)
         return self.clients[name]
 
@@ -96,11 +123,12 @@ class ActionNode:
 
 
 class CountServer:
-    """An rclpy server that behaves as each goal says: count, hang, stubborn, abort, reject, deaf (refuses to cancel)."""
+    """An rclpy server that behaves as each goal says: count, held (count, end when told), hang, stubborn, abort, reject, deaf."""
 
     def __init__(self, owner: ActionNode, name: str) -> None:
         self.goals: list = []
         self.release = owner.release
+        self.finish = threading.Event()
         self.server = ActionServer(
             owner.node,
             Count,
@@ -131,7 +159,8 @@ class CountServer:
             if goal.behaviour not in ("hang", "deaf"):
                 counted.append(len(counted) + 1)
                 handle.publish_feedback(Count.Feedback(count=counted[-1], fraction=counted[-1] / goal.target))
-        self.release.wait(goal.period_s)  # neither world keeps the order of the last feedback and the result
+        if goal.behaviour == "held":
+            self.finish.wait(WITHIN_S)
         if goal.behaviour == "abort":
             handle.abort()
         else:

@@ -12,10 +12,11 @@ from ros_bridge_peer_loop import report, run
 KEEP = []
 CLIENTS = {}
 HANDLES = {}
+FINISH = threading.Event()
 
 
 def run_goal(handle, cancelled):
-    """Do as the goal's behaviour says: count, hang (until cancelled), stubborn (never cancelled), abort, reject."""
+    """Do as the goal's behaviour says: count, held (ends when told), hang (until cancelled), stubborn (never cancelled), abort, reject."""
     goal = handle.get_goal()
     name = handle.get_goal_id().id
     report(event="goal", id=name, target=goal.target, behaviour=goal.behaviour)
@@ -34,6 +35,9 @@ def run_goal(handle, cancelled):
         if goal.behaviour != "hang":
             counted.append(len(counted) + 1)
             handle.publish_feedback(CountFeedback(counted[-1], counted[-1] / goal.target))
+    if goal.behaviour == "held":
+        FINISH.wait()
+        FINISH.clear()
     if goal.behaviour == "abort":
         handle.set_aborted(CountResult(counted, "aborted"), "broken")
     else:
@@ -131,6 +135,7 @@ def leave():
 
 
 COMMANDS = {
+    "finish": FINISH.set,
     "leave": leave,
     "serve": serve,
     "serve_simple": serve_simple,

@@ -38,11 +38,12 @@ def ros2(ros1, action_ros2):
 def test_goal_feedback_and_result_cross_from_an_actionlib_server(ros1, ros2):
     client = ros2.client("/ba/in_ros1")
     wait_until(lambda: feedback_arrives(client), "the bridge knows the client's reader of feedback")
-    sent = Sent(client, target=5, period_s=0.02, behaviour="count")
+    sent = Sent(client, target=5, period_s=0.02, behaviour="held")
+    wait_until(lambda: len(sent.feedback) == 5, "all feedback arrives", WITHIN_S)
+    ros1.do("finish")  # neither world keeps the order of the last feedback and the result
     answer = sent.result()
     assert answer.status == GoalStatus.STATUS_SUCCEEDED
     assert (list(answer.result.counted), answer.result.message) == ([1, 2, 3, 4, 5], "from ROS 1")
-    wait_until(lambda: len(sent.feedback) == 5, "all feedback arrives")
     assert [(feedback.count, feedback.fraction) for feedback in sent.feedback] == [(number, number / 5) for number in range(1, 6)]
     assert ros1.expect("goal", target=5)["id"] == str(uuid.UUID(bytes=bytes(sent.future.result().goal_id.uuid)))
 
