@@ -33,7 +33,7 @@ class FastTopic:
         self._lock = threading.Lock()
         self._upward = spec.direction is Direction.ROS1_TO_ROS2
         self._last = native.RouteFigures()
-        program = (ctypes.c_uint32 * len(pair.program))(*pair.program)
+        program = native.words_of(pair.program)
         with node.handle:
             specification = native.Specification(
                 ros1_topic=spec.ros1_name.encode(),

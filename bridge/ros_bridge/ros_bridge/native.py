@@ -1,4 +1,4 @@
-"""The native data plane's C interface (ros_bridge_native, ``c_api.cpp``) as Python sees it.
+"""The native data plane's C interface (ros_bridge_native, ``c_api.cpp`` and ``c_api_services.cpp``) as Python sees it.
 
 Functions that make or end something of rcl's node keep Python's lock (``PyDLL``), because rclpy works on the same node under that
 lock; those that may wait, and those that only read, let it go (``CDLL``).
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Sequence
 from ctypes import POINTER, Structure, c_char, c_char_p, c_int32, c_int64, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p
 from enum import IntEnum
 from pathlib import Path
@@ -29,8 +30,10 @@ class EventKind(IntEnum):
     CLOSED = 2
     REFUSED = 3
     NEEDS_WRITER = 4
-    BAD_MESSAGE = 5
-    BAD_PEER = 6
+    NEEDS_SERVER = 5
+    BAD_MESSAGE = 6
+    BAD_PEER = 7
+    CALL_FAILED = 8
 
 
 class Specification(Structure):
@@ -50,6 +53,31 @@ class Specification(Structure):
         ("token", c_uint64),
         ("reliable", c_int32),
         ("latched", c_int32),
+    ]
+
+
+class ServiceSpecification(Structure):
+    """A service's route, as ``PlaneServiceSpecification``."""
+
+    _fields_: ClassVar = [
+        ("ros1_service", c_char_p),
+        ("ros1_type", c_char_p),
+        ("md5sum", c_char_p),
+        ("ros2_service", c_char_p),
+        ("node", c_void_p),
+        ("type_support", c_void_p),
+        ("request_program", POINTER(c_uint32)),
+        ("request_operations", c_uint64),
+        ("response_program", POINTER(c_uint32)),
+        ("response_operations", c_uint64),
+        ("timeout_ns", c_int64),
+        ("token", c_uint64),
+        ("refusal_has_flag", c_int32),
+        ("refusal_has_text", c_int32),
+        ("refusal_before", c_char_p),
+        ("refusal_before_bytes", c_uint64),
+        ("refusal_after", c_char_p),
+        ("refusal_after_bytes", c_uint64),
     ]
 
 
@@ -88,6 +116,10 @@ KEEPING_THE_LOCK = {
     "plane_route_target_peers": (c_uint64, [c_void_p]),
     "plane_route_source_peers": (c_uint64, [c_void_p]),
     "plane_route_figures": (None, [c_void_p, POINTER(RouteFigures)]),
+    "plane_service_in_ros1_new": (c_void_p, [c_void_p, POINTER(ServiceSpecification)]),
+    "plane_service_in_ros2_new": (c_void_p, [c_void_p, POINTER(ServiceSpecification)]),
+    "plane_service_found": (None, [c_void_p, c_char_p, c_uint16]),
+    "plane_service_not_found": (None, [c_void_p, c_char_p]),
     "plane_port": (c_int32, [c_void_p]),
 }
 LETTING_IT_GO = {
@@ -131,8 +163,13 @@ def find_library() -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
+def words_of(program: Sequence[int]) -> Any:
+    """Return a layout program as the library takes it."""
+    return (c_uint32 * len(program))(*program)
+
+
 def type_support_of(interface: Any) -> int:
-    """Return the address of the type support that rclpy uses for a message class."""
+    """Return the address of the type support that rclpy uses for a message or service class."""
     check_for_type_support(interface)
     capsule = interface.__class__._TYPE_SUPPORT  # noqa: SLF001 - rclpy reads it the same way
     get_name, get_pointer = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer

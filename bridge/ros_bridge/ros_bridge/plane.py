@@ -1,7 +1,7 @@
-"""The data plane: the native half that moves messages, the ROS 1 node that finds peers for it, and what holds them together.
+"""The data plane: the native half that moves messages and calls, the ROS 1 node that finds peers for it, and what holds them together.
 
-One thread hears the native half's events and tries publishers again that were lost; questions to publishers, which may hang, are asked by
-a few threads more. No message is ever seen by Python.
+One thread hears the native half's events and tries publishers again that were lost; questions to publishers and to the master, which may
+hang, are asked by a few threads more. No message is ever seen by Python.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ NODE_SUFFIX = "_topics"
 ASKING_THREADS = 4
 LISTEN_MS = 250
 RETRY_MS = 100
+LOOKING_THREADS = 2
 TOLD_ONCE = 100
 FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 1.0, 5.0
 
@@ -68,6 +69,7 @@ class Plane:
         self._lock = threading.RLock()
         self._subscriptions: dict[int, _Subscription] = {}  # by the native route's address
         self._links: dict[int, _Link] = {}
+        self._callers: dict[int, tuple[int, str]] = {}  # by their tokens, routes that call services in ROS 1
         self._names: dict[int, str] = {}
         self._told: deque[str] = deque(maxlen=TOLD_ONCE)
         self._closed = threading.Event()
@@ -82,6 +84,8 @@ class Plane:
             changed=self._publishers_changed,
         )
         self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_ask")
+        # Of their own, so that calls do not wait behind questions to publishers that hang.
+        self._lookers = ThreadPoolExecutor(LOOKING_THREADS, thread_name_prefix="plane_look")
         self._listener = threading.Thread(target=self._listen, name="plane_events", daemon=True)
         self._listener.start()
 
@@ -110,6 +114,16 @@ class Plane:
         if not others:
             self.node.unsubscribe(subscription.topic)
 
+    def call(self, token: int, route: int, service: str) -> None:
+        """Tell a native route where the server of a ROS 1 service is, whenever it asks."""
+        with self._lock:
+            self._callers[token] = (route, service)
+
+    def call_no_more(self, token: int) -> None:
+        """Tell it no more; when it returns nobody uses the native route."""
+        with self._lock:
+            self._callers.pop(token, None)
+
     def register_again(self) -> None:
         """Tell a master that has forgotten us everything."""
         self.node.register_again()
@@ -118,7 +132,8 @@ class Plane:
         """End both halves; the routes have to be closed before."""
         self._closed.set()
         self.node.close()
-        self._askers.shutdown(wait=False, cancel_futures=True)
+        for threads in (self._askers, self._lookers):
+            threads.shutdown(wait=False, cancel_futures=True)
         self._listener.join()
         with self._lock:
             self.native.delete(self.machinery)
@@ -157,6 +172,25 @@ class Plane:
             if wanted and not self.native.up_connect(link.route, link.token, address.encode(), port):
                 self._failed(link, self.native.error().decode(errors="replace"), refused=False)
 
+    def _look(self, token: int, service: str) -> None:
+        """Ask the master where a service's server is, in another thread."""
+        address, port, problem = "", 0, "no server"
+        try:
+            place = self.node.place_of_service(service)
+            if place is not None:
+                port = place[1]
+                address = str(socket.getaddrinfo(place[0], port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
+        except (OSError, ValueError, TypeError, LookupError) as error:  # it does not answer, or answers nonsense
+            problem = f"no server can be reached: {error}"
+        with self._lock:
+            route, _ = self._callers.get(token, (None, ""))
+            if route is None:
+                return
+            if address:
+                self.native.service_found(route, address.encode(), port)
+            else:
+                self.native.service_not_found(route, problem.encode())
+
     def _failed(self, link: _Link, reason: str, *, refused: bool) -> None:
         """Try again later, unless the publisher is gone by the master's word."""
         with self._lock:
@@ -194,10 +228,14 @@ class Plane:
     def _hear(self, kind: EventKind, token: int, text: str) -> None:
         if kind is EventKind.BAD_PEER and text not in self._told:
             self._told.append(text)
-            logger.warning("a ROS 1 subscriber was turned away: %s", text)
+            logger.warning("a ROS 1 peer was turned away: %s", text)
         if kind is EventKind.BAD_MESSAGE:
             logger.error("%s: %s can't be converted", self._names.get(token, "?"), text)
+        if kind is EventKind.CALL_FAILED:
+            logger.warning("call failed: %s", text)
         with self._lock:
+            if kind is EventKind.NEEDS_SERVER and token in self._callers:
+                self._lookers.submit(self._look, token, self._callers[token][1])
             link = self._links.get(token)
             if link is None:
                 return

@@ -1,4 +1,4 @@
-"""A ROS 1 node for topics alone: what it publishes and subscribes to is registered with the master, and it answers other nodes' questions.
+"""A ROS 1 node without rospy: it registers what it publishes, subscribes to and serves with the master, and answers other nodes' questions.
 
 It speaks the master and slave APIs (ROS wiki, "ROS/Master_API", "ROS/Slave_API"); messages themselves go through the native data plane.
 """
@@ -26,11 +26,16 @@ PublishersChanged = Callable[[str, list[str]], None]
 UNREACHABLE = (OSError, XmlRpcError, http.client.HTTPException)
 
 
+class SaysNoError(OSError):
+    """A master or node has answered, and says no."""
+
+
 def ask(uri: str, method: str, *arguments: object) -> Any:
     """Call a master's or node's method; return the value of its answer.
 
     Raises:
-        OSError: It does not answer, or says no.
+        SaysNoError: It says no.
+        OSError: It does not answer.
     """
     try:
         with ServerProxy(uri, transport=TimedTransport(ANSWER_WITHIN_S)) as proxy:
@@ -38,7 +43,7 @@ def ask(uri: str, method: str, *arguments: object) -> Any:
     except (XmlRpcError, http.client.HTTPException, ValueError, TypeError) as error:
         raise OSError(f"{uri}: {error}") from error
     if code != OK:
-        raise OSError(f"{uri}: {text}")
+        raise SaysNoError(f"{uri}: {text}")
     return value
 
 
@@ -70,6 +75,7 @@ class Ros1Node:
         self._lock = threading.Lock()
         self._subscribed: dict[str, str] = {}
         self._published: dict[str, str] = {}
+        self._served: dict[str, str] = {}
         self._untold: set[tuple[str, str]] = set()
         self._server = _Server((bind_address, 0), _Handler, logRequests=False, allow_none=True)
         self._server.register_instance(_Answers(self))
@@ -98,45 +104,64 @@ class Ros1Node:
             self._published[topic] = type_name
         self._tell("Publisher", topic, type_name)
 
+    def serve(self, service: str) -> None:
+        """Tell the master that calls of a service go to the port of the topics."""
+        with self._lock:
+            uri = self._served[service] = f"rosrpc://{self._host}:{self._topics_port}"
+        self._tell("Service", service, uri)
+
     def unsubscribe(self, topic: str) -> None:
         """Tell the master that it is over."""
-        self._forget("Subscriber", self._subscribed, topic)
+        self._forget("Subscriber", self._subscribed, topic, self.uri)
 
     def unpublish(self, topic: str) -> None:
         """Tell the master that it is over."""
-        self._forget("Publisher", self._published, topic)
+        self._forget("Publisher", self._published, topic, self.uri)
+
+    def unserve(self, service: str) -> None:
+        """Tell the master that it is over."""
+        self._forget("Service", self._served, service, f"rosrpc://{self._host}:{self._topics_port}")
 
     def register_again(self, *, only_untold: bool = False) -> None:
         """Tell the master everything, or what it has not heard yet."""
         with self._lock:
-            todo = [("Publisher", *entry) for entry in self._published.items()] + [
-                ("Subscriber", *entry) for entry in self._subscribed.items()
-            ]
+            kinds = {"Publisher": self._published, "Subscriber": self._subscribed, "Service": self._served}
+            todo = [(kind, *entry) for kind, table in kinds.items() for entry in table.items()]
             todo = [entry for entry in todo if not only_untold or entry[:2] in self._untold]
-        for kind, topic, type_name in todo:
-            self._tell(kind, topic, type_name)
+        for entry in todo:
+            self._tell(*entry)
 
-    def _tell(self, kind: str, topic: str, type_name: str) -> None:
+    def _tell(self, kind: str, name: str, type_or_uri: str) -> None:
+        """Register a topic with its type, or a service with where it is."""
         try:
-            answer = ask(self._master_uri, f"register{kind}", self.name, topic, type_name, self.uri)
+            answer = ask(self._master_uri, f"register{kind}", self.name, name, type_or_uri, self.uri)
         except OSError:
             with self._lock:
-                self._untold.add((kind, topic))
+                self._untold.add((kind, name))
             return
         with self._lock:
-            self._untold.discard((kind, topic))
+            self._untold.discard((kind, name))
         if kind == "Subscriber":
-            self._changed(topic, list(answer))
+            self._changed(name, list(answer))
 
-    def _forget(self, kind: str, table: dict[str, str], topic: str) -> None:
+    def _forget(self, kind: str, table: dict[str, str], name: str, uri: str) -> None:
         with self._lock:
-            self._untold.discard((kind, topic))
-            if table.pop(topic, None) is None:
+            self._untold.discard((kind, name))
+            if table.pop(name, None) is None:
                 return
         try:
-            ask(self._master_uri, f"unregister{kind}", self.name, topic, self.uri)
+            ask(self._master_uri, f"unregister{kind}", self.name, name, uri)
         except OSError as error:
-            logger.debug("%s: %s", topic, error)
+            logger.debug("%s: %s", name, error)
+
+    def place_of_service(self, service: str) -> tuple[str, int] | None:
+        """Ask the master where a service's server is: host and port; None when it knows none. Raises OSError or ValueError."""
+        try:
+            uri = str(ask(self._master_uri, "lookupService", self.name, service))
+        except SaysNoError:
+            return None
+        host, _, port = uri.removeprefix("rosrpc://").rstrip("/").rpartition(":")
+        return host, int(port)
 
     def place_of(self, topic: str, publisher_uri: str) -> tuple[str, int]:
         """Ask a publisher where it sends a topic from: host and port. Raises OSError."""
@@ -160,6 +185,8 @@ class Ros1Node:
             self.unsubscribe(topic)
         for topic, _ in self.topics("published"):
             self.unpublish(topic)
+        for service in tuple(self._served):
+            self.unserve(service)
         self._server.shutdown()
         self._server.server_close()
 

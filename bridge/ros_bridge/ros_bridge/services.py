@@ -1,4 +1,6 @@
-"""Services: a bridge a service, one class for each side that the server can be on. Every call ends within its time.
+"""Services through rospy and rclpy: a bridge a service, one class for each side that the server can be on. Every call ends within its time.
+
+It is for types whose layouts differ, and where the native data plane was not built; all others are ``fast_services``.
 
 What a caller gets when there is no answer: in ROS 1 a service error with the reason. ROS 2 knows no such error: a response with
 a flag ``accepted`` or ``success`` gets it false and the reason in ``reason`` or ``message``; one without gets no response, so the
@@ -10,6 +12,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +21,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from ros_bridge import raw
 from ros_bridge.config import ServiceRoute, World
 from ros_bridge.errors import CallError, CallTimeoutError
+from ros_bridge.fast_services import FastService
 from ros_bridge.later import Header, LaterService
 from ros_bridge.ros1_call import POLL_S, Deadline, Ros1Service
 from ros_bridge.stats import RouteStats
@@ -40,6 +44,7 @@ CONCURRENT_CALLS = 16  # of one service towards ROS 1, each in a thread
 WAITING_CALLS = 32  # of one service; more are refused at once
 FLAGS = ("accepted", "success")
 TEXTS = ("reason", "message")
+LENGTH_BYTES = 4  # before a string in ROS 1
 
 
 class Ros2Server:
@@ -183,9 +188,26 @@ def refusal(response_class: Any, reason: str) -> Any | None:
     return response
 
 
+def refusal_around(response_class: Any, convert: Callable[[bytes], memoryview]) -> tuple[bool, bool, bytes, bytes]:
+    """Return a response that says no as bytes of ROS 1: whether it can, whether it has a reason, and what is before and after that."""
+    empty = refusal(response_class, "")
+    if empty is None:
+        return False, False, b"", b""
+    without, with_a_letter = (bytes(convert(serialize_message(refusal(response_class, reason)))) for reason in ("", "x"))
+    if without == with_a_letter:
+        return True, False, without, b""
+    length_at = next(place for place, (one, other) in enumerate(zip(without, with_a_letter, strict=False)) if one != other)
+    return True, True, without[:length_at], without[length_at + LENGTH_BYTES :]
+
+
 KINDS: dict[World, type[Ros2Server | Ros1Server]] = {World.ROS1: Ros1Server, World.ROS2: Ros2Server}
 
 
 def make(spec: ServiceRoute, context: Context) -> Route:
-    """Make a service's route; raises BridgeError when its type can't cross."""
-    return KINDS[spec.server](spec, context.types.service(spec.type_name, spec.ros2_type), context.node)
+    """Make a service's route, by the native data plane where the layouts agree; raises BridgeError when its type can't cross."""
+    service = context.types.service(spec.type_name, spec.ros2_type)
+    if context.plane is not None and service.request.same_layout and service.response.same_layout:
+        interface = interface_class(service.ros2_name, "srv")
+        no = refusal_around(interface.Response, service.response.to_ros1)
+        return FastService(spec, service, interface, no, context.node, context.plane)
+    return KINDS[spec.server](spec, service, context.node)

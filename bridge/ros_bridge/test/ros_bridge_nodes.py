@@ -55,7 +55,7 @@ class Ros2Peer:
         """Return the response and how many seconds it took, or None when there was none in time."""
         client = self.node.create_client(kind, service)
         self.ends.append((self.node.destroy_client, client))
-        assert client.wait_for_service(within_s)
+        assert client.wait_for_service(20.0)
         start = time.monotonic()
         response = client.call(request, timeout_sec=within_s)
         return response, time.monotonic() - start

@@ -7,9 +7,14 @@ import threading
 from ros_bridge_harness import PROBE_S
 from std_msgs.msg import String
 
-from ros_bridge.hostile import LENGTH, HostilePublisher, header
+from ros_bridge import hostile
+from ros_bridge.hostile import LENGTH, HostilePublisher
 
 STRING_SUM = "992ce8a1687cec8c8bd883ec73ca41d1"
+
+
+def header(**fields):
+    return hostile.header(fields)
 
 
 def read_header(connection):
@@ -43,12 +48,12 @@ def frame(text):
 
 def greeting(topic):
     """Return the header that a publisher of std_msgs/String answers with."""
-    return header({"callerid": "/fake", "type": "std_msgs/String", "md5sum": STRING_SUM, "latching": "0", "topic": topic})
+    return header(callerid="/fake", type="std_msgs/String", md5sum=STRING_SUM, latching="0", topic=topic)
 
 
 def wish(**changed):
     """Return the header that a subscriber of std_msgs/String asks with."""
-    return header({"callerid": "/t", "topic": "/bp/down", "type": "std_msgs/String", "md5sum": STRING_SUM} | changed)
+    return header(**{"callerid": "/t", "topic": "/bp/down", "type": "std_msgs/String", "md5sum": STRING_SUM} | changed)
 
 
 def until_it_arrives(publisher, connection, text):

@@ -1,31 +1,16 @@
-// What Python calls (native.py). Every function catches everything; what failed is told by plane_error, for the thread that asked.
-#include <cstring>
-#include <string>
+// What Python calls (native.py): topics, and what all routes share. Every function catches everything; what failed is told by
+// plane_error, for the thread that asked.
+#include "c_api.hpp"
 
-#include "layout.hpp"
+#include <cstring>
+#include <stdexcept>
+
 #include "routes.hpp"
 #include "type_support.hpp"
 
-#define PLANE_API extern "C" __attribute__((visibility("default")))
-
 using namespace plane;
 
-namespace {
-
-thread_local std::string last_error;
-
-// Return what the function returns, or `otherwise` when it throws.
-template <class Result, class Function>
-Result guarded(Result otherwise, Function function) {
-  try {
-    return function();
-  } catch (const std::exception & error) {
-    last_error = error.what();
-  } catch (...) {
-    last_error = "unknown exception";
-  }
-  return otherwise;
-}
+namespace plane {
 
 Program program_of(const uint32_t * words, size_t operations) {
   Program program;
@@ -34,7 +19,7 @@ Program program_of(const uint32_t * words, size_t operations) {
   return program;
 }
 
-}  // namespace
+}  // namespace plane
 
 // The structures are the same, field by field, in native.py.
 struct PlaneSpecification {

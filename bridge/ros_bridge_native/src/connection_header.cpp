@@ -52,4 +52,11 @@ std::string mismatch(const Fields & peer, const TopicIdentity & own) {
   return "";
 }
 
+std::string mismatch(const Fields & peer, const ServiceIdentity & own) {
+  const std::string sum = value(peer, "md5sum");
+  if (sum.empty()) return "the connection header has no md5sum";
+  if (!fits(sum, own.md5sum)) return "md5sum of " + own.type + " is " + sum + ", here it is " + own.md5sum;
+  return "";
+}
+
 }  // namespace plane

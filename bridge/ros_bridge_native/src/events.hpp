@@ -15,8 +15,10 @@ enum class EventKind : int32_t {
   kClosed = 2,     // it does no longer, or the connection could not be made
   kRefused = 3,    // the connection headers do not fit
   kNeedsWriter = 4,  // a latching publisher waits for a writer of its own
-  kBadMessage = 5,
-  kBadPeer = 6,  // a peer of our server was turned away
+  kNeedsServer = 5,  // calls wait for the place of a service in ROS 1
+  kBadMessage = 6,
+  kBadPeer = 7,  // a peer of our server was turned away
+  kCallFailed = 8,
 };
 
 struct Event {

@@ -1,7 +1,5 @@
 #include "ros1_publisher.hpp"
 
-#include <arpa/inet.h>
-#include <fcntl.h>
 #include <sys/epoll.h>
 #include <sys/uio.h>
 #include <unistd.h>
@@ -9,8 +7,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
+#include <utility>
 
+#include "ros1_server.hpp"
 #include "sockets.hpp"
 
 namespace plane {
@@ -21,13 +20,15 @@ constexpr size_t kMostSenders = 256;  // of latched messages that are kept
 
 }  // namespace
 
-// One subscriber: first its connection header is read and answered, then it is sent to.
+// One subscriber: first its connection header is read and answered, then it is sent to. A service's client gets another connection then.
 class OutConnection : public Handler, public std::enable_shared_from_this<OutConnection> {
  public:
   OutConnection(std::shared_ptr<Server> server, int fd) : server_(std::move(server)), fd_(fd), born_ns_(now_ns()) {}
-  ~OutConnection() override { ::close(fd_); }
+  ~OutConnection() override {
+    if (fd_ >= 0) ::close(fd_);
+  }
 
-  void begin() { key_ = server_->loop_.add(fd_, shared_from_this(), EPOLLIN, true); }
+  void begin() { key_ = server_->loop.add(fd_, shared_from_this(), EPOLLIN, true); }
 
   void on_ready(uint32_t epoll_events) override {
     if (epoll_events & EPOLLOUT) on_writable();
@@ -60,7 +61,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     if (closed_) return;
     closed_ = true;
     if (publisher_) publisher_->detach(shared_from_this());
-    server_->loop_.remove(key_, fd_);
+    server_->loop.remove(key_, fd_);
     ::shutdown(fd_, SHUT_RDWR);
     std::lock_guard<std::mutex> lock(mutex_);
     broken_ = true;
@@ -87,6 +88,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     if (!decode(reinterpret_cast<const uint8_t *>(header_.data()) + sizeof length, length, fields)) {
       return turn_away("what it sent is no connection header");
     }
+    if (fields.count("service")) return hand_over(fields, sizeof length + length);
     const auto publisher = server_->find(fields["topic"]);
     if (!publisher) return turn_away("topic [" + fields["topic"] + "] is not published here");
     const std::string reason = mismatch(fields, publisher->identity);
@@ -94,11 +96,26 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     accept(publisher);
   }
 
+  // It is a client, not a subscriber.
+  void hand_over(const Fields & fields, size_t header_bytes) {
+    const std::string & service = fields.at("service");
+    ServiceDesk * desk = server_->find_desk(service);
+    if (desk == nullptr) return turn_away("service [" + service + "] is not provided here");
+    const std::string reason = mismatch(fields, desk->identity());
+    const auto caller = fields.find("callerid");
+    if (!reason.empty()) return turn_away((caller == fields.end() ? "?" : caller->second) + " on " + service + ": " + reason);
+    server_->loop.remove(key_, fd_);
+    closed_ = true;
+    const auto connection = std::make_shared<ServiceConnection>(server_->loop, *desk, std::exchange(fd_, -1), fields);
+    connection->begin(server_->caller_id, fields, reinterpret_cast<const uint8_t *>(header_.data()) + header_bytes,
+      header_.size() - header_bytes);
+  }
+
   void accept(const std::shared_ptr<Ros1Publisher> & publisher) {
     header_.clear();
     header_.shrink_to_fit();
     const auto & own = publisher->identity;
-    const std::string answer = encode({{"callerid", server_->caller_id_}, {"latching", publisher->latched ? "1" : "0"},
+    const std::string answer = encode({{"callerid", server_->caller_id}, {"latching", publisher->latched ? "1" : "0"},
       {"md5sum", own.md5sum}, {"message_definition", own.definition}, {"topic", own.topic}, {"type", own.type}});
     auto frame = std::make_shared<Buffer>();
     frame->reserve(answer.size());
@@ -110,7 +127,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   }
 
   void turn_away(const std::string & reason) {
-    server_->events_.put(EventKind::kBadPeer, 0, reason);
+    server_->events.put(EventKind::kBadPeer, 0, reason);
     const std::string answer = encode({{"error", reason}});
     (void)!::send(fd_, answer.data(), answer.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
     shut();
@@ -120,7 +137,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     std::lock_guard<std::mutex> lock(mutex_);
     waits_for_room_ = false;
     flush();
-    if (!waits_for_room_ && !broken_) server_->loop_.change(key_, fd_, EPOLLIN);
+    if (!waits_for_room_ && !broken_) server_->loop.change(key_, fd_, EPOLLIN);
   }
 
   // With the lock: send what the socket takes; ask to be called again if there is more.
@@ -138,7 +155,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
       if (written < 0 && errno == EINTR) continue;
       if (written < 0 && errno == EAGAIN) {
         waits_for_room_ = true;
-        return server_->loop_.change(key_, fd_, EPOLLIN | EPOLLOUT);
+        return server_->loop.change(key_, fd_, EPOLLIN | EPOLLOUT);
       }
       if (written < 0) {
         broken_ = true;  // the loop sees the same on its side, and shuts the connection
@@ -158,7 +175,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   }
 
   const std::shared_ptr<Server> server_;
-  const int fd_;
+  int fd_;
   const int64_t born_ns_;
   Key key_ = 0;
   bool closed_ = false;
@@ -214,62 +231,6 @@ std::vector<std::shared_ptr<OutConnection>> Ros1Publisher::connections() {
   return connections_;
 }
 
-Server::Server(Loop & loop, Events & events, std::string caller_id) : loop_(loop), events_(events), caller_id_(std::move(caller_id)) {}
-
-Server::~Server() {
-  if (fd_ >= 0) ::close(fd_);
-  if (spare_ >= 0) ::close(spare_);
-}
-
-void Server::listen_on(const std::string & address) {
-  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  spare_ = open("/dev/null", O_RDONLY | O_CLOEXEC);
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  socklen_t size = sizeof place;
-  if (inet_pton(AF_INET, address.c_str(), &place.sin_addr) != 1 || bind(fd_, reinterpret_cast<sockaddr *>(&place), sizeof place) != 0 ||
-      listen(fd_, SOMAXCONN) != 0 || getsockname(fd_, reinterpret_cast<sockaddr *>(&place), &size) != 0) {
-    throw std::runtime_error("can't listen on " + address + ": " + std::strerror(errno));
-  }
-  port_ = ntohs(place.sin_port);
-  key_ = loop_.add(fd_, shared_from_this(), EPOLLIN);
-}
-
-void Server::close() { loop_.run_and_wait([this] { loop_.remove(key_, fd_); }); }
-
-void Server::on_ready(uint32_t) {
-  const int fd = accept4(fd_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
-  if (fd >= 0) {
-    set_options(fd);
-    std::make_shared<OutConnection>(shared_from_this(), fd)->begin();
-  } else if (errno == EMFILE || errno == ENFILE) {
-    ::close(spare_);
-    ::close(accept(fd_, nullptr, nullptr));
-    spare_ = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    events_.put(EventKind::kBadPeer, 0, "this process has no file descriptors left; a subscriber was turned away");
-  }
-}
-
-std::shared_ptr<Ros1Publisher> Server::find(const std::string & topic) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = publishers_.find(topic);
-  return found == publishers_.end() ? nullptr : found->second;
-}
-
-void Server::offer(const std::shared_ptr<Ros1Publisher> & publisher) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  publishers_[publisher->identity.topic] = publisher;
-}
-
-void Server::withdraw(const std::shared_ptr<Ros1Publisher> & publisher) {
-  {
-    std::lock_guard<std::mutex> lock(mutex_);
-    const auto found = publishers_.find(publisher->identity.topic);
-    if (found != publishers_.end() && found->second == publisher) publishers_.erase(found);
-  }
-  loop_.run_and_wait([&] {
-    for (const auto & connection : publisher->connections()) connection->shut();
-  });
-}
+void greet_peer(const std::shared_ptr<Server> & server, int fd) { std::make_shared<OutConnection>(server, fd)->begin(); }
 
 }  // namespace plane

@@ -1,8 +1,7 @@
-// TCPROS, the sending side: one listening socket for all topics, a connection with a bounded queue for each subscriber.
+// TCPROS, the sending side: a topic, and for each subscriber a connection with a bounded queue.
 #pragma once
 
 #include <deque>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -17,6 +16,10 @@
 namespace plane {
 
 class OutConnection;
+class Server;
+
+// Read the header of a peer that has connected to the server, and become what it asks for: a subscriber's connection, or a service's.
+void greet_peer(const std::shared_ptr<Server> & server, int fd);
 
 // A topic that ROS 1 can subscribe to.
 class Ros1Publisher {
@@ -43,36 +46,6 @@ class Ros1Publisher {
   std::mutex mutex_;
   std::vector<std::shared_ptr<OutConnection>> connections_;
   std::deque<std::pair<std::string, Frame>> last_;  // the last message of each sender, the latest at the end
-};
-
-// The listening socket.
-class Server : public Handler, public std::enable_shared_from_this<Server> {
- public:
-  Server(Loop & loop, Events & events, std::string caller_id);
-  ~Server() override;
-
-  void listen_on(const std::string & address);  // throws std::runtime_error
-  void close();
-  uint16_t port() const { return port_; }
-
-  void offer(const std::shared_ptr<Ros1Publisher> & publisher);
-  void withdraw(const std::shared_ptr<Ros1Publisher> & publisher);  // returns when no connection is left
-
-  void on_ready(uint32_t epoll_events) override;
-
- private:
-  friend class OutConnection;
-  std::shared_ptr<Ros1Publisher> find(const std::string & topic);
-
-  Loop & loop_;
-  Events & events_;
-  const std::string caller_id_;
-  int fd_ = -1;
-  int spare_ = -1;  // given up for a moment when descriptors have run out, to turn away who waits
-  Key key_ = 0;
-  uint16_t port_ = 0;
-  std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<Ros1Publisher>> publishers_;
 };
 
 }  // namespace plane

@@ -17,12 +17,6 @@ namespace {
 
 constexpr size_t kReadBytes = kLargeBytes + sizeof(uint32_t);
 
-uint32_t length_at(const uint8_t * data) {
-  uint32_t length;
-  std::memcpy(&length, data, sizeof length);
-  return length;
-}
-
 }  // namespace
 
 InConnection::InConnection(Loop & loop, Events & events, Inbox & inbox, const TopicIdentity & identity, const std::string & caller_id,

@@ -8,13 +8,6 @@
 namespace plane {
 namespace {
 
-void require(rcl_ret_t code, const char * what, const std::string & topic) {
-  if (code == RCL_RET_OK) return;
-  const std::string reason = rcl_get_error_string().str;
-  rcl_reset_error();
-  throw std::runtime_error(std::string(what) + " " + topic + ": " + reason);
-}
-
 rmw_qos_profile_t profile(const Quality & quality) {
   rmw_qos_profile_t qos = rmw_qos_profile_default;
   qos.history = RMW_QOS_POLICY_HISTORY_KEEP_LAST;
@@ -27,6 +20,13 @@ rmw_qos_profile_t profile(const Quality & quality) {
 void on_new_message(const void * arrived, size_t) { (*static_cast<const std::function<void()> *>(arrived))(); }
 
 }  // namespace
+
+void require(rcl_ret_t code, const char * what, const std::string & name) {
+  if (code == RCL_RET_OK) return;
+  const std::string reason = rcl_get_error_string().str;
+  rcl_reset_error();
+  throw std::runtime_error(std::string(what) + " " + name + ": " + reason);
+}
 
 Ros2Publisher::Ros2Publisher(rcl_node_t * node, const rosidl_message_type_support_t * type, const std::string & topic,
                              const Quality & quality)

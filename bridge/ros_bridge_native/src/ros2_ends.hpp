@@ -13,6 +13,9 @@
 
 namespace plane {
 
+// Raise std::runtime_error with rcl's reason unless the code is that of success.
+void require(rcl_ret_t code, const char * what, const std::string & name);
+
 struct Quality {
   size_t depth;
   bool reliable;

@@ -1,4 +1,4 @@
-// A topic from one world to the other.
+// What crosses: the base of all routes, and topics. Services are in services_in_ros1.hpp and services_in_ros2.hpp.
 #pragma once
 
 #include <deque>
@@ -12,6 +12,7 @@
 #include "events.hpp"
 #include "loop.hpp"
 #include "ros1_publisher.hpp"
+#include "ros1_server.hpp"
 #include "ros1_subscription.hpp"
 #include "ros2_ends.hpp"
 #include "worker.hpp"
@@ -27,6 +28,7 @@ struct Machinery {
   Loop loop;
   Worker upward{"plane_to_ros2"};
   Worker downward{"plane_to_ros1"};
+  Worker calls{"plane_calls"};
   std::shared_ptr<Server> server;
 };
 
@@ -44,8 +46,8 @@ class Route {
  public:
   virtual ~Route() = default;
   // How many peers the end has that messages go out of, and the one that they come from.
-  virtual size_t target_peers() = 0;
-  virtual size_t source_peers() = 0;
+  virtual size_t target_peers() { return 0; }
+  virtual size_t source_peers() { return 0; }
   Counters counters;
 
  protected:

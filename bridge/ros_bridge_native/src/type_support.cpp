@@ -3,6 +3,7 @@
 #include <fastcdr/Cdr.h>
 #include <rcutils/error_handling.h>
 #include <rosidl_typesupport_fastrtps_cpp/message_type_support.h>
+#include <rosidl_typesupport_fastrtps_cpp/service_type_support.h>
 
 #include <cstring>
 #include <map>
@@ -16,15 +17,22 @@ using eprosima::fastcdr::Cdr;
 
 constexpr const char * kFastDds = "rosidl_typesupport_fastrtps_c";
 
-// Return how many bytes are left; Cdr tells only whether a given number is.
-size_t bytes_left(Cdr & cdr) {
-  const auto state = cdr.get_state();
-  size_t left = 0;
-  for (size_t step = kMostBytes; step; step >>= 1) {
-    if (cdr.jump(step)) left += step;
-  }
-  cdr.set_state(state);
-  return left;
+// Cdr knows where its bytes end, and does not tell. Asking by jump() makes it enlarge a buffer of its own, which those of services are. An
+// explicit instantiation may name private members; should another Fast CDR call them otherwise, this does not compile.
+using Place = eprosima::fastcdr::FastBuffer::iterator Cdr::*;
+struct CdrPlaces {
+  Place here, end;
+};
+CdrPlaces places_of_cdr();
+template <Place kHere, Place kEnd>
+struct Reach {
+  friend CdrPlaces places_of_cdr() { return {kHere, kEnd}; }
+};
+template struct Reach<&Cdr::offset_, &Cdr::end_>;
+
+size_t bytes_left(const Cdr & cdr) {
+  const CdrPlaces places = places_of_cdr();
+  return static_cast<size_t>(cdr.*places.end - cdr.*places.here);
 }
 
 bool serialize(const void * message, Cdr & cdr) {
@@ -75,6 +83,17 @@ const rosidl_message_type_support_t * find_handle(const rosidl_message_type_supp
   return get_message_typesupport_handle(reinterpret_cast<const BytesTypeSupport *>(ours)->genuine, identifier);
 }
 
+struct BytesServiceTypeSupport {
+  rosidl_service_type_support_t handle;  // first, as above
+  service_type_support_callbacks_t callbacks;
+  const rosidl_service_type_support_t * genuine;
+};
+
+const rosidl_service_type_support_t * find_service_handle(const rosidl_service_type_support_t * ours, const char * identifier) {
+  if (std::strcmp(identifier, ours->typesupport_identifier) == 0) return ours;
+  return get_service_typesupport_handle(reinterpret_cast<const BytesServiceTypeSupport *>(ours)->genuine, identifier);
+}
+
 }  // namespace
 
 const rosidl_message_type_support_t * bytes_type_support(const rosidl_message_type_support_t * genuine) {
@@ -97,6 +116,31 @@ const rosidl_message_type_support_t * bytes_type_support(const rosidl_message_ty
   made.handle = *specific;
   made.handle.data = &made.callbacks;
   made.handle.func = find_handle;
+  made.genuine = genuine;
+  return &made.handle;
+}
+
+const rosidl_service_type_support_t * bytes_service_type_support(const rosidl_service_type_support_t * genuine) {
+  static std::mutex mutex;
+  static auto & kept = *new std::map<const rosidl_service_type_support_t *, BytesServiceTypeSupport>();
+  std::lock_guard<std::mutex> lock(mutex);
+  if (const auto found = kept.find(genuine); found != kept.end()) return &found->second.handle;
+  const auto * specific = get_service_typesupport_handle(genuine, kFastDds);
+  if (specific == nullptr) {
+    rcutils_reset_error();
+    throw std::runtime_error("the type has no type support for Fast DDS");
+  }
+  const auto * request = bytes_type_support(genuine->request_typesupport);
+  const auto * response = bytes_type_support(genuine->response_typesupport);
+  BytesServiceTypeSupport & made = kept[genuine];
+  made.callbacks = *static_cast<const service_type_support_callbacks_t *>(specific->data);
+  made.callbacks.request_members_ = request;
+  made.callbacks.response_members_ = response;
+  made.handle = *specific;
+  made.handle.data = &made.callbacks;
+  made.handle.func = find_service_handle;
+  made.handle.request_typesupport = request;
+  made.handle.response_typesupport = response;
   made.genuine = genuine;
   return &made.handle;
 }

@@ -6,13 +6,14 @@
 #pragma once
 
 #include <rosidl_runtime_c/message_type_support_struct.h>
+#include <rosidl_runtime_c/service_type_support_struct.h>
 
 #include "buffer.hpp"
 #include "layout.hpp"
 
 namespace plane {
 
-// What rcl_publish is given.
+// What rcl is given to send.
 struct Outgoing {
   const Program * program;
   const uint8_t * ros1;
@@ -20,7 +21,7 @@ struct Outgoing {
   size_t cdr_size;  // measured before
 };
 
-// What rcl_take is given. The message goes into the frame, behind the four bytes of its length.
+// What rcl is given to take into. The message goes into the frame, behind the four bytes of its length.
 struct Incoming {
   const Program * program;
   Buffer * frame;
@@ -33,5 +34,8 @@ struct Incoming {
 // Return the type support for a genuine one (of rosidl_typesupport_c); kept for good, as DDS may hold on to it.
 // Throws std::runtime_error if the type has none for Fast DDS.
 const rosidl_message_type_support_t * bytes_type_support(const rosidl_message_type_support_t * genuine);
+
+// The same for a service, whose request and response are such messages.
+const rosidl_service_type_support_t * bytes_service_type_support(const rosidl_service_type_support_t * genuine);
 
 }  // namespace plane
