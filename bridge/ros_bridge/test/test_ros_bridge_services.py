@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from ros_bridge_harness import RUNNING, BridgeProcess, Master, wait_until
+from ros_bridge_nodes import Ros2Peer
+from ros_bridge_wire import exactly, header, read_header
 from std_srvs.srv import Empty, SetBool
-from test_ros_bridge_live import Ros2Peer
-from test_ros_bridge_plane import exactly, header, read_header
 from uav_msgs.srv import SetSensor
 
 from alula_flight.claims import free_port
