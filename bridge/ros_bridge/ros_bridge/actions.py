@@ -10,7 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from rclpy.serialization import serialize_message
 
@@ -37,6 +37,7 @@ logger = logging.getLogger("ros_bridge")
 TICK_S = 0.05
 IDLE_TICK_S = 0.2
 SHUTTING_DOWN = "the bridge is shutting down"
+Goals = TypeVar("Goals", GoalsToRos1, GoalsToRos2)
 
 
 class Clockwork:
@@ -88,40 +89,79 @@ class Crossing:
         return converted
 
 
-class ServerInRos1:
-    """An action whose actionlib server lives in ROS 1, offered in ROS 2."""
+class _End(Protocol):
+    """An end of an action in one of the worlds."""
+
+    def close(self) -> None:
+        """Leave."""
+
+
+class _ActionBridge(Generic[Goals]):
+    """What is the same whichever side the server is on: subclasses open the ends, which bring what ``_goals`` has to hear."""
+
+    GOALS: type[Goals]
+    _server: _End
+    _clients: _End
 
     def __init__(self, spec: ActionRoute, action: ActionType, action_class: Any, context: Context) -> None:
         """Open nothing yet."""
         self._spec, self._type, self._class, self._context = spec, action, action_class, context
         self._stats = RouteStats()
         self._crossing = Crossing(self._stats)
-        self._goals = GoalsToRos1(spec.label, spec.timeout_s)
+        self._goals: Goals = self.GOALS(spec.label, spec.timeout_s)
         self._started = False
-        self._clockwork = Clockwork(spec.ros2_name, self._goals.tick, lambda: self._goals.busy)
+        self._clockwork = Clockwork(spec.target_name, self._goals.tick, lambda: self._goals.busy)
 
     def start(self) -> None:
-        """Reach for the server and offer the action in ROS 2."""
+        """Reach for the server and offer the action to its clients; what the ends bring waits until both are there."""
         with self._goals.lock:
-            self._server = ActionlibServerEnd(
-                self._spec.ros1_name,
-                self._type,
-                self._context.types,
-                on_status=self._on_status,
-                on_feedback=self._on_feedback,
-                on_result=self._on_result,
-            )
-            self._clients = Ros2ClientsEnd(
-                self._context.node,
-                self._class,
-                self._spec.ros2_name,
-                on_goal=self._on_goal_request,
-                on_cancel=self._on_cancel_request,
-                on_result=self._on_result_request,
-            )
-            self._goals.connect(self._server, self._clients)
+            self._open()
             self._started = True
         self._clockwork.start()
+
+    def _open(self) -> None:
+        """Open both ends and connect the goals to them."""
+        raise NotImplementedError
+
+    def figures(self) -> Figures:
+        """Return how many goals, feedbacks and results have crossed."""
+        return self._stats.figures()
+
+    def close(self) -> None:
+        """End the open goals for their clients, cancel them at the server, and leave."""
+        if not self._started:
+            return
+        self._clockwork.close()
+        self._goals.give_up_all(SHUTTING_DOWN, time.monotonic())
+        self._clients.close()
+        self._server.close()
+
+
+class ServerInRos1(_ActionBridge[GoalsToRos1]):
+    """An action whose actionlib server lives in ROS 1, offered in ROS 2."""
+
+    GOALS = GoalsToRos1
+    _server: ActionlibServerEnd
+    _clients: Ros2ClientsEnd
+
+    def _open(self) -> None:
+        self._server = ActionlibServerEnd(
+            self._spec.ros1_name,
+            self._type,
+            self._context.types,
+            on_status=self._on_status,
+            on_feedback=self._on_feedback,
+            on_result=self._on_result,
+        )
+        self._clients = Ros2ClientsEnd(
+            self._context.node,
+            self._class,
+            self._spec.ros2_name,
+            on_goal=self._on_goal_request,
+            on_cancel=self._on_cancel_request,
+            on_result=self._on_result_request,
+        )
+        self._goals.connect(self._server, self._clients)
 
     def _on_goal_request(self, request: Any, header: Header) -> None:
         try:
@@ -153,51 +193,29 @@ class ServerInRos1:
         if self._goals.knows(status):
             self._goals.on_result(status, self._crossing.to_ros2(self._type.result.pair, payload), time.monotonic())
 
-    def figures(self) -> Figures:
-        """Return how many goals, feedbacks and results have crossed."""
-        return self._stats.figures()
 
-    def close(self) -> None:
-        """End the open goals for their clients, cancel them at the server, and leave."""
-        if not self._started:
-            return
-        self._clockwork.close()
-        self._goals.give_up_all(SHUTTING_DOWN, time.monotonic())
-        self._clients.close()
-        self._server.close()
-
-
-class ServerInRos2:
+class ServerInRos2(_ActionBridge[GoalsToRos2]):
     """An action whose server lives in ROS 2, offered in ROS 1."""
 
-    def __init__(self, spec: ActionRoute, action: ActionType, action_class: Any, context: Context) -> None:
-        """Open nothing yet."""
-        self._spec, self._type, self._class, self._context = spec, action, action_class, context
-        self._stats = RouteStats()
-        self._crossing = Crossing(self._stats)
-        self._goals = GoalsToRos2(spec.label, spec.timeout_s)
-        self._started = False
-        self._clockwork = Clockwork(spec.ros1_name, self._goals.tick, lambda: self._goals.busy)
+    GOALS = GoalsToRos2
+    _server: Ros2ServerEnd
+    _clients: ActionlibClientsEnd
 
-    def start(self) -> None:
-        """Reach for the server and offer the action in ROS 1."""
+    def _open(self) -> None:
         empty = bytes(self._type.result.pair.to_ros1(bytes(serialize_message(empty_result(self._class, "")))))
-        with self._goals.lock:
-            self._server = Ros2ServerEnd(
-                self._context.node,
-                self._class,
-                self._spec.ros2_name,
-                on_answer=self._on_answer,
-                on_result=self._on_result,
-                on_feedback=self._on_feedback,
-                on_status=lambda states: self._goals.on_status(states, time.monotonic()),
-            )
-            self._clients = ActionlibClientsEnd(
-                self._spec.ros1_name, self._type, self._context.types, on_goal=self._on_goal, on_cancel=self._on_cancel, empty_result=empty
-            )
-            self._goals.connect(self._server, self._clients)
-            self._started = True
-        self._clockwork.start()
+        self._server = Ros2ServerEnd(
+            self._context.node,
+            self._class,
+            self._spec.ros2_name,
+            on_answer=self._on_answer,
+            on_result=self._on_result,
+            on_feedback=self._on_feedback,
+            on_status=lambda states: self._goals.on_status(states, time.monotonic()),
+        )
+        self._clients = ActionlibClientsEnd(
+            self._spec.ros1_name, self._type, self._context.types, on_goal=self._on_goal, on_cancel=self._on_cancel, empty_result=empty
+        )
+        self._goals.connect(self._server, self._clients)
 
     def _on_goal(self, message: bytes) -> None:
         goal_id, payload = actionlib_wire.decode_goal(message)
@@ -227,19 +245,6 @@ class ServerInRos2:
             self._goals.on_result(goal, Ros2Status.ABORTED, None, reason, time.monotonic())
             return
         self._goals.on_result(goal, Ros2Status(response.status), payload, "", time.monotonic())
-
-    def figures(self) -> Figures:
-        """Return how many goals, feedbacks and results have crossed."""
-        return self._stats.figures()
-
-    def close(self) -> None:
-        """End the open goals for their clients, cancel them at the server, and leave."""
-        if not self._started:
-            return
-        self._clockwork.close()
-        self._goals.give_up_all(SHUTTING_DOWN, time.monotonic())
-        self._clients.close()
-        self._server.close()
 
 
 KINDS: dict[World, type[ServerInRos1 | ServerInRos2]] = {World.ROS1: ServerInRos1, World.ROS2: ServerInRos2}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import ClassVar
 
 from ros_bridge.mapping import TypeRules
 from ros_bridge.selection import Selection
@@ -58,8 +59,10 @@ class TopicRoute:
 
 
 @dataclass(frozen=True)
-class ServiceRoute:
-    """A service that crosses; ``timeout_s`` (wall clock) bounds a call with all its waiting."""
+class _ServedRoute:
+    """What services and actions have in common: a server in one world, and callers in the other."""
+
+    KIND: ClassVar[str]
 
     ros1_name: str
     ros2_name: str
@@ -71,7 +74,7 @@ class ServiceRoute:
     @property
     def label(self) -> str:
         """Name the route for people."""
-        return f"service {_both_names(self)}"
+        return f"{self.KIND} {_both_names(self)}"
 
     @property
     def target_name(self) -> str:
@@ -80,35 +83,27 @@ class ServiceRoute:
 
 
 @dataclass(frozen=True)
-class ActionRoute:
+class ServiceRoute(_ServedRoute):
+    """A service that crosses; ``timeout_s`` (wall clock) bounds a call with all its waiting."""
+
+    KIND = "service"
+
+
+@dataclass(frozen=True)
+class ActionRoute(_ServedRoute):
     """An action that crosses: actionlib in ROS 1, an action in ROS 2.
 
     ``type_name`` is ``package/Name``, as ROS 2 has it: ROS 1's messages are ``package/NameAction``, ``package/NameGoal`` and so on.
     ``timeout_s`` (wall clock) bounds each waiting for the server's acknowledgement, not the goal's execution.
     """
 
-    ros1_name: str
-    ros2_name: str
-    server: World
-    type_name: str
-    timeout_s: float = 5.0
-    ros2_type: str = ""
-
-    @property
-    def label(self) -> str:
-        """Name the route for people."""
-        return f"action {_both_names(self)}"
-
-    @property
-    def target_name(self) -> str:
-        """The name in the world that the clients are in."""
-        return self.ros2_name if self.server is World.ROS1 else self.ros1_name
+    KIND = "action"
 
 
 Spec = TopicRoute | ServiceRoute | ActionRoute
 
 
-def _both_names(spec: Spec) -> str:
+def _both_names(spec: TopicRoute | _ServedRoute) -> str:
     return spec.ros1_name if spec.ros1_name == spec.ros2_name else f"{spec.ros1_name} (ROS 2: {spec.ros2_name})"
 
 

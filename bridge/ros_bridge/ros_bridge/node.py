@@ -23,12 +23,12 @@ from ros_bridge.parameters import ParameterMirror
 from ros_bridge.plane import open_plane
 from ros_bridge.routes import Context, Maker, RouteTable
 from ros_bridge.rows import SECTION_OF, Rates, live_table, render, summary
+from ros_bridge.spinning import spin
 from ros_bridge.stats import write_json
 
 import rclpy  # isort: skip
 import rospy  # isort: skip - after ros_bridge.raw, which fetches it
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor  # isort: skip
-from rclpy.exceptions import InvalidHandle
+from rclpy.executors import SingleThreadedExecutor  # isort: skip
 
 from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager  # isort: skip
 
@@ -81,7 +81,7 @@ class Bridge:
         if self._parameters is not None:
             self._executor.add_node(self._parameters.node)
         self._diagnostics = open_diagnostics(self._node, types)
-        self._spinner = threading.Thread(target=self._spin, name="ros2", daemon=True)
+        self._spinner = threading.Thread(target=spin, args=(self._executor,), name="ros2", daemon=True)
         self._watch = MasterWatch(master, caller_id, self._register_again, self._heartbeat.changed)
 
     def _register_again(self) -> None:
@@ -100,21 +100,6 @@ class Bridge:
             raise BridgeError("\n".join(self.table.failed.values()))
         for spec in self._config.routes:
             self.table.start(spec)
-
-    def _spin(self) -> None:
-        while True:
-            try:
-                self._executor.spin()
-            except ExternalShutdownException:
-                logger.info("ROS 2 was shut down")
-            except ShutdownException:
-                return
-            except InvalidHandle:
-                continue  # rclpy 7.1.6: an end was closed by another thread while the executor was about to look at it
-            except Exception:
-                logger.exception("a callback of ROS 2 raised")
-                continue
-            return
 
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
         """Bridge until asked to stop; figures are this thread's."""

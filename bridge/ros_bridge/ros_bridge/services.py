@@ -1,4 +1,4 @@
-"""Services through rospy and rclpy: a bridge a service, one class for each side that the server can be on. Every call ends within its time.
+"""Services through rospy and rclpy: one class for each side that the server can be on. Every call ends within its time.
 
 It is for types whose layouts differ, and where the native data plane was not built; all others are ``fast_services``.
 

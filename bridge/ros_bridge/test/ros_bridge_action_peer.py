@@ -1,29 +1,22 @@
 """A ROS 1 node for the tests of bridged actions, in a process of its own: takes commands as JSON lines, reports events as JSON lines."""
 
-import json
 import os
-import sys
 import threading
 
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalID
 from bridge_test_interfaces.msg import CountAction, CountFeedback, CountGoal, CountResult
+from ros_bridge_peer_loop import report, run
 
-WRITE = threading.Lock()
 KEEP = []
 CLIENTS = {}
 HANDLES = {}
-
-
-def report(**event):
-    with WRITE:
-        sys.stdout.write(json.dumps(event) + "\n")
-        sys.stdout.flush()
+FINISH = threading.Event()
 
 
 def run_goal(handle, cancelled):
-    """Do as the goal's behaviour says: count, hang (until cancelled), stubborn (never cancelled), abort, reject."""
+    """Do as the goal's behaviour says: count, held (ends when told), hang (until cancelled), stubborn (never cancelled), abort, reject."""
     goal = handle.get_goal()
     name = handle.get_goal_id().id
     report(event="goal", id=name, target=goal.target, behaviour=goal.behaviour)
@@ -42,6 +35,9 @@ def run_goal(handle, cancelled):
         if goal.behaviour != "hang":
             counted.append(len(counted) + 1)
             handle.publish_feedback(CountFeedback(counted[-1], counted[-1] / goal.target))
+    if goal.behaviour == "held":
+        FINISH.wait()
+        FINISH.clear()
     if goal.behaviour == "abort":
         handle.set_aborted(CountResult(counted, "aborted"), "broken")
     else:
@@ -65,16 +61,20 @@ def serve(name):
 def serve_simple(name):
     """Run one goal at a time; a newer one preempts it."""
 
+    preempted = threading.Event()
+
     def execute(goal):
         report(event="goal", target=goal.target)
-        while not server.is_preempt_requested() and goal.behaviour == "hang":
-            rospy.rostime.wallsleep(0.01)
+        if goal.behaviour == "hang":
+            preempted.wait()
         if server.is_preempt_requested():
+            preempted.clear()
             server.set_preempted(CountResult([], "preempted"))
         else:
             server.set_succeeded(CountResult([goal.target], "from ROS 1"))
 
     server = actionlib.SimpleActionServer(name, CountAction, execute, auto_start=False)
+    server.register_preempt_callback(preempted.set)
     KEEP.append(server)
     server.start()
     report(event="serving", name=name)
@@ -128,7 +128,15 @@ def cancel_id(name, goal_id):
     CLIENTS[name].pub_cancel.publish(GoalID(stamp=rospy.Time(), id=goal_id))
 
 
+def leave():
+    """Tell the master of the end, as nodes do that are not killed."""
+    rospy.signal_shutdown("that was all")
+    os._exit(0)
+
+
 COMMANDS = {
+    "finish": FINISH.set,
+    "leave": leave,
     "serve": serve,
     "serve_simple": serve_simple,
     "client": client,
@@ -140,13 +148,4 @@ COMMANDS = {
 }
 
 
-def main():
-    rospy.init_node("bridge_action_peer", anonymous=True, disable_signals=True, disable_rostime=True)
-    report(event="ready")
-    for line in sys.stdin:
-        command = json.loads(line)
-        COMMANDS[command.pop("do")](**command)
-    os._exit(0)
-
-
-main()
+run("bridge_action_peer", COMMANDS)

@@ -17,6 +17,8 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 WITHIN_S = 10.0
+LOOK_S = 0.005
+PROBE_S = 0.05  # between messages that are sent until the first of them arrives
 
 
 def alula_root() -> Path:
@@ -28,12 +30,13 @@ def bag_folder() -> Path:
     return Path(os.environ.get("ALULA_DATA", alula_root().parent / "shared" / "data")) / "bags"
 
 
-def wait_until(condition: Callable[[], object], what: str, within_s: float = WITHIN_S) -> None:
+def wait_until(condition: Callable[[], object], what: str, within_s: float = WITHIN_S, every_s: float = LOOK_S) -> None:
+    """Return as soon as the condition holds. It is asked again and again, as what it looks at changes in other threads and processes."""
     end = time.monotonic() + within_s
     while not condition():
         if time.monotonic() > end:
             pytest.fail(f"not within {within_s} s: {what}")
-        time.sleep(0.005)
+        time.sleep(every_s)
 
 
 def end(process: subprocess.Popen, within_s: float = 5.0) -> float:

@@ -1,26 +1,19 @@
 """A ROS 1 node for the bridge's tests, in a process of the ROS 1 world: takes commands as JSON lines, reports events as JSON lines."""
 
-import json
 import os
-import sys
 import threading
-from collections import Counter
+import warnings
+from collections import deque
+from hashlib import md5
 from io import BytesIO
 
 import rosbag
 import roslib.message
 import rospy
 from genpy.message import fill_message_args
+from ros_bridge_peer_loop import report, run
 
-WRITE = threading.Lock()
 KEEP = []
-BAG = []
-
-
-def report(**event):
-    with WRITE:
-        sys.stdout.write(json.dumps(event) + "\n")
-        sys.stdout.flush()
 
 
 def serialized(message):
@@ -44,6 +37,7 @@ def subscribe(topic, type):  # noqa: A002
 
 
 PUBLISHERS = {}
+BAG = deque()
 
 
 def advertise(topic, type, *, latch=False):  # noqa: A002
@@ -61,18 +55,31 @@ def subscribe_raw(topic):
     """Subscribe with no type of its own, as `rostopic echo` does."""
 
     def received(message):
-        report(event="message", topic=topic, hex=message._buff.hex(), caller=message._connection_header["callerid"])
+        header = message._connection_header
+        report(event="message", topic=topic, hex=message._buff.hex(), caller=header["callerid"], type=header["type"])
 
     KEEP.append(rospy.Subscriber(topic, rospy.AnyMsg, received))
 
 
+class Subscribed(rospy.SubscribeListener):
+    """Tells when a subscriber has connected."""
+
+    def __init__(self):
+        super().__init__()
+        self.event = threading.Event()
+
+    def peer_subscribe(self, *_):
+        self.event.set()
+
+
 def publish_once(topic, type, values):  # noqa: A002
     """Wait for a subscriber as short-lived publishers do, publish one message, and leave for good."""
-    advertise(topic, type)
-    while not PUBLISHERS[topic].get_num_connections():
-        rospy.rostime.wallsleep(0.01)
+    subscribed = Subscribed()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)  # rospy's, about what is meant here: without a queue the message is sent at once
+        PUBLISHERS[topic] = rospy.Publisher(topic, roslib.message.get_message_class(type), subscribed, queue_size=None)
+    subscribed.event.wait()
     publish(topic, values)
-    rospy.rostime.wallsleep(0.2)  # what rospy has in its queue would be lost
     os._exit(0)
 
 
@@ -81,35 +88,36 @@ def set_parameter(name, value):
     report(event="set", name=name)
 
 
-def recorded(path, number):
-    """Yield topic, type, MD5 sum, definition and bytes of each connection's first messages."""
-    counts = Counter()
-    with rosbag.Bag(path) as bag:
-        for topic, (kind, data, md5sum, *_, message_class), _time in bag.read_messages(raw=True):
-            counts[topic] += 1
-            if counts[topic] <= number:
-                yield topic, kind, md5sum, message_class._full_text, data
+def bytes_class(kind, md5sum, definition):
+    """Return a class of messages that are serialized already, of a type that need not be installed."""
+    fields = {"__slots__": (), "_type": kind, "_md5sum": md5sum, "_full_text": definition, "_has_header": False}
+    return type(kind.replace("/", "_"), (rospy.AnyMsg,), fields)
 
 
-def advertise_bag(path, prefix, number):
+def advertise_own(topic, type, definition):  # noqa: A002
+    """Advertise a type of which only this node has the definition."""
+    md5sum = md5(definition.encode()).hexdigest()  # noqa: S324 - ROS 1's fingerprint
+    PUBLISHERS[topic] = rospy.Publisher(topic, bytes_class(type, md5sum, definition), queue_size=1)
+
+
+def advertise_bag(path, prefix):
     """Advertise what a recording has, with the recorded types."""
-    for topic, kind, md5sum, text, data in recorded(path, number):
-        name = prefix + topic
-        if name not in PUBLISHERS:
-            fields = {"__slots__": (), "_type": kind, "_md5sum": md5sum, "_full_text": text, "_has_header": False}
-            PUBLISHERS[name] = rospy.Publisher(name, type(f"Recorded{len(PUBLISHERS)}", (rospy.AnyMsg,), fields), queue_size=1000)
-        BAG.append((name, data))
-    report(event="advertised")
+    with rosbag.Bag(path) as bag:
+        recorded = [(prefix + topic, raw) for topic, raw, _ in bag.read_messages(raw=True)]
+    for topic, (kind, _, md5sum, *_, message_class) in recorded:
+        if topic not in PUBLISHERS:
+            PUBLISHERS[topic] = rospy.Publisher(topic, bytes_class(kind, md5sum, message_class._full_text), queue_size=1000)
+    BAG.extend((topic, raw[1]) for topic, raw in recorded)
+    report(event="advertised", number=len(recorded))
 
 
-def play_bag():
-    """Publish it, not faster than queues can take it."""
-    for name, data in BAG:
-        message = PUBLISHERS[name].data_class()
+def play(number):
+    """Publish the next messages of the recording, in its order."""
+    for _ in range(min(number, len(BAG))):
+        topic, data = BAG.popleft()
+        message = PUBLISHERS[topic].data_class()
         message._buff = data
-        PUBLISHERS[name].publish(message)
-        rospy.rostime.wallsleep(0.002)
-    report(event="played", number=len(BAG))
+        PUBLISHERS[topic].publish(message)
 
 
 def connections(topic):
@@ -154,21 +162,13 @@ COMMANDS = {
     "subscribe_raw": subscribe_raw,
     "publish_once": publish_once,
     "set_parameter": set_parameter,
+    "advertise_own": advertise_own,
     "advertise_bag": advertise_bag,
-    "play_bag": play_bag,
+    "play": play,
     "connections": connections,
     "serve": serve,
     "call": call,
 }
 
 
-def main():
-    rospy.init_node("bridge_test_peer", anonymous=True, disable_signals=True, disable_rostime=True)
-    report(event="ready")
-    for line in sys.stdin:
-        command = json.loads(line)
-        COMMANDS[command.pop("do")](**command)
-    os._exit(0)
-
-
-main()
+run("bridge_test_peer", COMMANDS)

@@ -4,13 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 from ros_bridge_harness import BridgeProcess
-from test_ros_bridge_live import (  # noqa: F401 - pytest finds tests and fixtures by their names
+from test_ros_bridge_live import (  # noqa: F401 - pytest finds tests by their names
     CONFIG,
-    leave_nothing_running,
-    master,
-    peers,
-    ros1,
-    ros2,
     test_response_without_a_flag_is_not_sent_at_all,
     test_ros1_client_calls_a_ros2_server,
     test_ros1_client_gets_an_error_when_the_ros2_server_raises_or_goes,
@@ -22,7 +17,7 @@ from test_ros_bridge_live import (  # noqa: F401 - pytest finds tests and fixtur
 
 
 @pytest.fixture(scope="module")
-def bridge(master, ros2_domain, tmp_path_factory):  # noqa: F811 - pytest's way
+def bridge(master, ros2_domain, tmp_path_factory):
     without = SimpleNamespace(environment={**master.environment, "ROS_BRIDGE_NATIVE": "/no/such/library"})
     process = BridgeProcess(without, tmp_path_factory.mktemp("python_bridge"), CONFIG)
     process.wait_running()

@@ -1,4 +1,4 @@
-"""Services among peers of every kind, by the data plane and by the path through Python: raw TCPROS clients and servers on the ROS 1 side."""
+"""Services among peers of every kind, by the data plane and through Python: raw TCPROS clients and servers on the ROS 1 side."""
 
 import contextlib
 import random
@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from ros_bridge_harness import RUNNING, BridgeProcess, Master, wait_until
+from ros_bridge_nodes import Ros2Peer
+from ros_bridge_wire import exactly, header, read_header
 from std_srvs.srv import Empty, SetBool
-from test_ros_bridge_live import Ros2Peer
-from test_ros_bridge_plane import exactly, header, read_header
 from uav_msgs.srv import SetSensor
 
 from alula_flight.claims import free_port
@@ -256,7 +256,7 @@ def test_big_requests_and_responses_cross_both_ways(world):
 
 @PATHS
 def test_calls_that_are_held_hold_up_no_others(world):
-    """Three calls under way in ROS 2, of which one's client leaves: others are answered meanwhile, and each of the rest gets its own answer."""
+    """Of three calls under way in ROS 2 one's client leaves: others are answered meanwhile, and the two that stay get their own answers."""
     held = HeldService(world, "/bv/held_in_ros2")
     serve_echo(world)
     clients = [Client(world, "/bv/held_in_ros2", persistent="1") for _ in range(3)]

@@ -9,11 +9,11 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from ros_bridge_harness import RUNNING, BridgeProcess, Master, Ros1Peer, wait_until
+from ros_bridge_harness import PROBE_S, BridgeProcess, Master, Ros1Peer, wait_until
+from ros_bridge_nodes import LATCHED, Ros2Peer, open_up, wait_ros1_receives
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
-from test_ros_bridge_live import LATCHED, Ros2Peer, open_up, wait_ros1_receives
 
 from alula_flight.claims import free_port
 from ros_bridge.fuzz import Fuzzer
@@ -103,14 +103,9 @@ def world(ros2_domain, tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def leave_nothing_running(world):
-    before = list(RUNNING)
+def bridge_survives(world):
     yield
     world.ros2.tidy()
-    for process in RUNNING:
-        if process not in before:
-            process.close()
-    RUNNING[:] = before
     assert world.bridge.process.poll() is None
 
 
@@ -159,9 +154,9 @@ def test_link_to_the_master_goes_and_comes_back(world, how):
 
     def arrives():
         late.do("publish", topic="/bs/up", values={"data": "late"})
-        return any(message.data == "late" for message in late_received) or time.sleep(0.05)
+        return any(message.data == "late" for message in late_received)
 
-    wait_until(arrives, "a publisher that came later is bridged")
+    wait_until(arrives, "a publisher that came later is bridged", every_s=PROBE_S)
     complaints = [line for line in world.bridge.lines[said:] if "does not answer" in line]
     assert len(complaints) == 1
 
@@ -184,7 +179,9 @@ def test_restarted_master_learns_everything_again_while_old_connections_go_on(wo
 
 def test_publisher_killed_in_the_middle_of_a_4_mb_message(world):
     """Half a message leaves nothing behind: the next publisher's whole one arrives, and only that."""
-    images = world.ros2.subscribe("/bs/image", Image)
+    images: list[Image] = []
+    arrived = threading.Event()
+    world.ros2.listen("/bs/image", Image, lambda image: (images.append(image), arrived.set()))
     data = bytes(IMAGE_BYTES)
     message = (
         bytes(16) + struct.pack("<II", 1000, 1000) + LENGTH.pack(5) + b"rgba8" + struct.pack("<BI", 0, 4000) + LENGTH.pack(len(data)) + data
@@ -195,9 +192,9 @@ def test_publisher_killed_in_the_middle_of_a_4_mb_message(world):
         connection.sendall(whole[: len(whole) // 2])
 
     def all_of_it(connection: socket.socket) -> None:
-        while not images:
+        while not images:  # a reader in ROS 2 that has found the bridge may still be unknown to it
             connection.sendall(whole)
-            time.sleep(0.2)
+            arrived.wait(4 * PROBE_S)
 
     for name, talk in (("/half", half), ("/whole", all_of_it)):
         publisher = HostilePublisher(world.master.uri, "/bs/image", "sensor_msgs/Image", name=name, reply=header(IMAGE), talk=talk)

@@ -1,0 +1,168 @@
+"""rclpy's ends of actions for live tests: goals that are followed, and a server that does as each goal says."""
+
+import threading
+import uuid
+
+import rclpy
+from bridge_test_interfaces.action import Count
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import MultiThreadedExecutor
+from ros_bridge_harness import wait_until
+
+from alula_testing.ros2 import spin
+
+WITHIN_S = 20.0
+
+
+class CountClient(ActionClient):
+    """A client whose responses wait until their requests are noted down.
+
+    rclpy 7.1.6 sends a request first and notes it then; a response that another thread of the executor takes in between is dropped.
+    """
+
+    def __init__(self, node: "ActionNode", name: str) -> None:
+        self._noting = threading.RLock()
+        super().__init__(node.node, Count, name, callback_group=node.group)
+
+    def take_data(self):
+        with self._noting:
+            return super().take_data()
+
+    def send_goal_async(self, *arguments):
+        with self._noting:
+            return super().send_goal_async(*arguments)
+
+    def _get_result_async(self, goal_handle):
+        with self._noting:
+            return super()._get_result_async(goal_handle)
+
+    def _cancel_goal_async(self, goal_handle):
+        with self._noting:
+            return super()._cancel_goal_async(goal_handle)
+
+
+class Sent:
+    """A goal of the rclpy client: its answer, feedback, states and result as they come."""
+
+    def __init__(self, client: ActionClient, **fields: object) -> None:
+        self.feedback: list[Count.Feedback] = []
+        self.future = client.send_goal_async(Count.Goal(**fields), lambda message: self.feedback.append(message.feedback))
+        self.result_future = None
+
+    def answered(self):
+        wait_until(self.future.done, "the goal is answered", WITHIN_S)
+        return self.future.result()
+
+    def accepted(self):
+        handle = self.answered()
+        assert handle.accepted
+        self.result_future = handle.get_result_async()
+        return handle
+
+    def result(self, within_s: float = WITHIN_S):
+        if self.result_future is None:
+            self.accepted()
+        wait_until(self.result_future.done, "the goal has a result", within_s)
+        return self.result_future.result()
+
+    def cancel(self):
+        future = self.future.result().cancel_goal_async()
+        wait_until(future.done, "the cancel request is answered", WITHIN_S)
+        return future.result()
+
+
+def feedback_arrives(client):
+    """Tell whether a goal brings feedback: a reader that has found its writer may still be unknown to it."""
+    sent = Sent(client, target=10, period_s=0.01, behaviour="count")
+    sent.result()
+    return sent.feedback
+
+
+class ActionNode:
+    """An rclpy node spun by several threads. rclpy's executor dies when an action's end is destroyed while it spins: stop it first."""
+
+    def __init__(self) -> None:
+        self.node = rclpy.create_node(f"bridge_action_test_{uuid.uuid4().hex[:8]}")
+        self.group = ReentrantCallbackGroup()
+        self.executor = MultiThreadedExecutor(4)
+        self.executor.add_node(self.node)
+        self.thread = threading.Thread(target=spin, args=(self.executor,), daemon=True)
+        self.clients: dict[str, ActionClient] = {}
+        self.servers: list[ActionServer] = []
+        self.started: list[ActionNode] = []
+        self.release = threading.Event()  # ends what its server executes: Python waits for these threads when it ends
+
+    def client(self, name: str) -> ActionClient:
+        if name not in self.clients:
+            self.clients[name] = CountClient(self, name)
+        assert self.clients[name].wait_for_server(WITHIN_S)
+        return self.clients[name]
+
+    def server(self, name: str) -> "CountServer":
+        node = ActionNode()
+        server = CountServer(node, name)
+        node.servers.append(server.server)
+        node.thread.start()
+        self.started.append(node)
+        return server
+
+    def tidy(self) -> None:
+        while self.started:
+            self.started.pop().close()
+
+    def close(self) -> None:
+        self.tidy()
+        self.release.set()
+        self.executor.shutdown(timeout_sec=0.0)
+        if self.thread.is_alive():
+            self.thread.join(5.0)
+        for end in (*self.servers, *self.clients.values()):
+            end.destroy()
+        self.node.destroy_node()
+
+
+class CountServer:
+    """An rclpy server that behaves as each goal says: count, held (count, end when told), hang, stubborn, abort, reject, deaf."""
+
+    def __init__(self, owner: ActionNode, name: str) -> None:
+        self.goals: list = []
+        self.release = owner.release
+        self.finish = threading.Event()
+        self.server = ActionServer(
+            owner.node,
+            Count,
+            name,
+            execute_callback=self._execute,
+            goal_callback=self._on_goal,
+            cancel_callback=self._on_cancel,
+            callback_group=owner.group,
+        )
+
+    @staticmethod
+    def _on_goal(goal):
+        return GoalResponse.REJECT if goal.behaviour == "reject" else GoalResponse.ACCEPT
+
+    @staticmethod
+    def _on_cancel(handle):
+        return CancelResponse.REJECT if handle.request.behaviour == "deaf" else CancelResponse.ACCEPT
+
+    def _execute(self, handle):
+        self.goals.append(handle)
+        goal = handle.request
+        counted = []
+        while (len(counted) < goal.target or goal.behaviour in ("hang", "deaf")) and not self.release.is_set():
+            if handle.is_cancel_requested and goal.behaviour != "stubborn":
+                handle.canceled()
+                return Count.Result(counted=counted, message="cancelled")
+            self.release.wait(goal.period_s)
+            if goal.behaviour not in ("hang", "deaf"):
+                counted.append(len(counted) + 1)
+                handle.publish_feedback(Count.Feedback(count=counted[-1], fraction=counted[-1] / goal.target))
+        if goal.behaviour == "held":
+            self.finish.wait(WITHIN_S)
+        if goal.behaviour == "abort":
+            handle.abort()
+        else:
+            handle.succeed()
+        return Count.Result(counted=counted, message="from ROS 2")

@@ -1,0 +1,89 @@
+"""TCPROS by hand for the bridge's tests: frames, connection headers, publishers that answer with given bytes."""
+
+import socket
+import struct
+import threading
+
+from ros_bridge_harness import PROBE_S
+from std_msgs.msg import String
+
+from ros_bridge import hostile
+from ros_bridge.hostile import LENGTH, HostilePublisher
+
+STRING_SUM = "992ce8a1687cec8c8bd883ec73ca41d1"
+
+
+def header(**fields):
+    return hostile.header(fields)
+
+
+def read_header(connection):
+    body, fields = read_frame(connection), {}
+    while body:
+        size = LENGTH.unpack(body[:4])[0]
+        name, _, value = body[4 : 4 + size].decode().partition("=")
+        fields[name] = value
+        body = body[4 + size :]
+    return fields
+
+
+def read_frame(connection):
+    return exactly(connection, LENGTH.unpack(exactly(connection, 4))[0])
+
+
+def exactly(connection, size):
+    data = b""
+    while len(data) < size:
+        part = connection.recv(size - len(data))
+        assert part, "the connection was closed"
+        data += part
+    return data
+
+
+def frame(text):
+    """Return a std_msgs/String as it goes over a connection."""
+    body = text.encode()
+    return struct.pack("<II", len(body) + 4, len(body)) + body
+
+
+def greeting(topic):
+    """Return the header that a publisher of std_msgs/String answers with."""
+    return header(callerid="/fake", type="std_msgs/String", md5sum=STRING_SUM, latching="0", topic=topic)
+
+
+def wish(**changed):
+    """Return the header that a subscriber of std_msgs/String asks with."""
+    return header(**{"callerid": "/t", "topic": "/bp/down", "type": "std_msgs/String", "md5sum": STRING_SUM} | changed)
+
+
+def until_it_arrives(publisher, connection, text):
+    """Publish until it comes out of a raw connection; what came before is passed over."""
+    stop = threading.Event()
+
+    def publish():
+        while not stop.wait(PROBE_S):
+            publisher.publish(String(data=text))
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        while read_frame(connection)[4:] != text.encode():
+            pass
+    finally:
+        stop.set()
+        thread.join()
+
+
+class FakePublisher(HostilePublisher):
+    """A ROS 1 publisher that answers each connection with the next of given bytes, or the last, and closes it."""
+
+    def __init__(self, master, replies, topic="/bp/fake"):
+        self.replies = list(replies)
+        self.answered = 0
+        super().__init__(master.uri, topic, "std_msgs/String", name="/fake", reply=b"", talk=self._answer)
+
+    def _answer(self, connection):
+        connection.sendall(self.replies[min(self.answered, len(self.replies) - 1)])
+        self.answered += 1
+        connection.shutdown(socket.SHUT_WR)
+        connection.recv(1)

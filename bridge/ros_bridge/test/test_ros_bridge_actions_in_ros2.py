@@ -1,0 +1,134 @@
+"""Actions through the bridge as a process: from actionlib clients in rospy to real servers in rclpy."""
+
+import threading
+
+import pytest
+from action_msgs.msg import GoalStatus
+from ros_bridge_action_nodes import WITHIN_S, Sent
+from ros_bridge_harness import wait_until
+
+CONFIG = """
+topics: []
+actions:
+  - {name: /ba/in_ros1, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 10.0}
+  - {name: /ba/in_ros2, server: ros2, type: bridge_test_interfaces/Count, timeout_s: 10.0}
+  - {name: /ba/nobody2, server: ros2, type: bridge_test_interfaces/Count, timeout_s: 0.6}
+"""
+
+
+@pytest.fixture(scope="module")
+def ros1(action_ros1):
+    action_ros1.do("serve", name="/ba/in_ros1")
+    for name in ("/ba/in_ros2", "/ba/nobody2"):
+        action_ros1.do("client", name=name)
+        assert action_ros1.expect("connected")["found"]
+    return action_ros1
+
+
+@pytest.fixture
+def ros2(ros1, action_ros2):
+    return action_ros2
+
+
+def send(ros1, name, key, **fields):
+    ros1.do("goal", name=name, key=key, **fields)
+    return ros1.expect("sent", key=key)
+
+
+def ending(ros1, key):
+    return ros1.expect("transition", key=key, state="DONE", within_s=WITHIN_S)
+
+
+def test_goal_feedback_and_result_cross_from_a_ros2_server(ros1, ros2):
+    server = ros2.server("/ba/in_ros2")
+    send(ros1, "/ba/in_ros2", "a", target=4, period_s=0.05, behaviour="held")
+    for number in range(1, 5):
+        assert ros1.expect("feedback", key="a", count=number)["fraction"] == number / 4
+    server.finish.set()  # neither world keeps the order of the last feedback and the result
+    end = ending(ros1, "a")
+    assert (end["terminal"], end["counted"], end["message"]) == ("SUCCEEDED", [1, 2, 3, 4], "from ROS 2")
+
+
+def test_rejection_by_a_ros2_server_is_a_rejection_in_ros1(ros1, ros2):
+    ros2.server("/ba/in_ros2")
+    send(ros1, "/ba/in_ros2", "rejected", behaviour="reject")
+    assert ending(ros1, "rejected")["terminal"] == "REJECTED"
+
+
+def test_abortion_by_a_ros2_server_crosses_with_its_result(ros1, ros2):
+    ros2.server("/ba/in_ros2")
+    send(ros1, "/ba/in_ros2", "aborted", target=2, behaviour="abort")
+    end = ending(ros1, "aborted")
+    assert (end["terminal"], end["counted"]) == ("ABORTED", [1, 2])
+
+
+def test_states_in_ros1_go_from_active_over_preempting_to_preempted(ros1, ros2):
+    ros2.server("/ba/in_ros2")
+    send(ros1, "/ba/in_ros2", "cancelled", behaviour="hang", period_s=0.2)
+    ros1.expect("transition", key="cancelled", state="ACTIVE")
+    ros1.do("cancel", key="cancelled")
+    ros1.expect("transition", key="cancelled", state="PREEMPTING")
+    end = ending(ros1, "cancelled")
+    assert (end["terminal"], end["message"]) == ("PREEMPTED", "cancelled")
+
+
+def test_refused_cancelling_leaves_the_goal_active_in_ros1(ros1, ros2):
+    server = ros2.server("/ba/in_ros2")
+    send(ros1, "/ba/in_ros2", "deaf", behaviour="deaf", period_s=0.05)
+    ros1.expect("transition", key="deaf", state="ACTIVE")
+    ros1.do("cancel", key="deaf")
+    send(ros1, "/ba/in_ros2", "after", target=1)
+    ending(ros1, "after")
+    server.release.set()
+    assert ending(ros1, "deaf")["terminal"] == "SUCCEEDED"
+
+
+def test_several_goals_of_ros1_and_cancelling_by_stamp_and_all(ros1, ros2):
+    server = ros2.server("/ba/in_ros2")
+    first, second, third = (send(ros1, "/ba/in_ros2", key, behaviour="hang", period_s=0.05) for key in ("one", "two", "three"))
+    assert first["stamp_ns"] < second["stamp_ns"] < third["stamp_ns"]
+    wait_until(lambda: len(server.goals) == 3, "all run at once", WITHIN_S)
+    ros1.do("cancel_before", name="/ba/in_ros2", stamp_ns=second["stamp_ns"])
+    assert {ros1.expect("transition", state="DONE", terminal="PREEMPTED")["key"] for _ in range(2)} == {"one", "two"}
+    assert sum(handle.is_active for handle in server.goals) == 1
+    ros1.do("cancel_all", name="/ba/in_ros2")
+    assert ending(ros1, "three")["terminal"] == "PREEMPTED"
+
+
+def test_goal_without_a_server_in_ros2_is_rejected_with_a_reason(ros1):
+    send(ros1, "/ba/nobody2", "lonely", target=1)
+    end = ending(ros1, "lonely")
+    assert (end["terminal"], end["text"]) == ("REJECTED", "no server in ROS 2")
+
+
+def test_goal_waits_for_a_ros2_server_that_comes_in_time(ros1, ros2):
+    send(ros1, "/ba/in_ros2", "early", target=1)
+    ros2.server("/ba/in_ros2")
+    assert ending(ros1, "early")["terminal"] == "SUCCEEDED"
+
+
+def test_ros2_server_that_goes_aborts_its_goals_and_its_successor_gets_the_next(ros1, ros2):
+    for key in ("before", "again"):
+        server = ros2.server("/ba/in_ros2")
+        send(ros1, "/ba/in_ros2", key, behaviour="hang", period_s=0.05)
+        ros1.expect("transition", key=key, state="ACTIVE")
+        ros2.tidy()
+        end = ending(ros1, key)
+        assert (end["terminal"], end["text"]) == ("ABORTED", "the server in ROS 2 is gone")
+        server.release.set()
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.002, 0.01, 0.05])
+def test_cancelling_at_any_moment_ends_a_goal_exactly_once(ros1, ros2, delay_s):
+    """The race of goal, answer, result and cancel request, both ways."""
+    ros2.server("/ba/in_ros2")
+    key = f"race {delay_s}"
+    ros1.do("goal", name="/ba/in_ros2", key=key, target=3, period_s=0.005)
+    threading.Event().wait(delay_s)  # the moment is what is tested
+    ros1.do("cancel", key=key)
+    assert ending(ros1, key)["terminal"] in ("PREEMPTED", "SUCCEEDED", "RECALLED")
+    sent = Sent(ros2.client("/ba/in_ros1"), target=3, period_s=0.005, behaviour="count")
+    sent.accepted()
+    threading.Event().wait(delay_s)
+    sent.cancel()
+    assert sent.result().status in (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_SUCCEEDED)

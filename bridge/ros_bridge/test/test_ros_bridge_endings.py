@@ -1,0 +1,64 @@
+"""The bridge as a process from its beginning to its end: signals, wrong configurations, a master that is not there yet or starts anew."""
+
+import json
+import signal
+import time
+
+from ros_bridge_harness import BridgeProcess, Master, Ros1Peer, wait_until
+from ros_bridge_nodes import Ros2Peer, open_up
+from std_msgs.msg import String
+
+from alula_flight.claims import free_port
+
+
+def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, ros2_domain, tmp_path):
+    config = "topics:\n  - {name: /bt_end, direction: ros1_to_ros2, type: std_msgs/String}\n"
+    for number in (signal.SIGINT, signal.SIGTERM):
+        process = BridgeProcess(master, tmp_path / number.name, config)
+        process.wait_running()
+        start = time.monotonic()
+        process.process.send_signal(number)
+        assert process.process.wait(5.0) == 0
+        assert time.monotonic() - start < 2.0
+        about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
+        figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
+        assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}
+
+
+def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):
+    nobody = Master(free_port())
+    process = BridgeProcess(nobody, tmp_path, "topics: []\n")
+    wait_until(lambda: any("waiting for a ROS master" in line for line in process.lines), "it says that it waits", 20.0)
+    process.process.send_signal(signal.SIGTERM)
+    assert process.process.wait(2.0) == 0
+
+
+def test_wrong_configuration_ends_with_2_and_wrong_type_with_1(master, ros2_domain, tmp_path):
+    for config, code, words in [
+        ("topics:\n  - {nmae: /a}", 2, "bridge.yaml:2: unknown key 'nmae'"),
+        ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: no_msgs/No}", 1, "no_msgs/No"),
+    ]:
+        process = BridgeProcess(master, tmp_path / str(code), config)
+        assert process.process.wait(20.0) == code
+        wait_until(lambda process=process, words=words: any(words in line for line in process.lines), f"{words} in {process.lines}")
+
+
+def test_waits_for_the_master_with_one_message_and_survives_its_restart(ros2_domain, tmp_path):
+    master = Master(free_port())
+    process = BridgeProcess(master, tmp_path, "topics:\n  - {name: /bt_restart, direction: ros1_to_ros2, type: std_msgs/String}\n")
+    wait_until(lambda: process.lines, "it says that it waits", 20.0)
+    ros2 = Ros2Peer()
+    master.start()
+    process.wait_running()
+    assert sum("waiting for a ROS master" in line for line in process.lines) == 1
+    master.close()
+    wait_until(lambda: any("does not answer" in line for line in process.lines), "it notices")
+    master.start()
+    peer = Ros1Peer(master)
+    received = open_up(peer, ros2, "/bt_restart", String, "std_msgs/String", values={"data": "after the restart"})
+    assert received[0].data == "after the restart"
+    peer.close()
+    assert process.close() < 2.0
+    ros2.tidy()
+    ros2.close()
+    master.close()
