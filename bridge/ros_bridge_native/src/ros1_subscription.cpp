@@ -16,6 +16,7 @@ namespace plane {
 namespace {
 
 constexpr size_t kReadBytes = kLargeBytes + sizeof(uint32_t);
+constexpr int kMostReads = 64;  // of one connection in a row
 
 }  // namespace
 
@@ -67,7 +68,8 @@ void InConnection::on_connected() {
   loop_.change(key_, fd_, EPOLLIN);
 }
 
-void InConnection::receive() {
+// Returns whether there may be more to receive.
+bool InConnection::receive() {
   uint8_t * to;
   size_t room;
   if (large_) {
@@ -75,25 +77,29 @@ void InConnection::receive() {
     room = large_bytes_ - large_->size();
   } else {
     received_.reserve(kReadBytes);
-    if (received_.size() == received_.capacity() && !skip_oldest()) return loop_.change(key_, fd_, 0);  // until it has rested
+    if (received_.size() == received_.capacity() && !skip_oldest()) return false;
     to = received_.data() + received_.size();
     room = received_.capacity() - received_.size();
   }
   const ssize_t number = recv(fd_, to, room, MSG_DONTWAIT);
-  if (number < 0 && (errno == EAGAIN || errno == EINTR)) return;
+  if (number < 0 && (errno == EAGAIN || errno == EINTR)) return false;
   if (number <= 0 && rests_) {
     ends_ = true;  // what the publisher has sent before it went does not wait
     take_messages();
   }
-  if (number <= 0) return shut(number == 0 ? "the publisher has closed the connection" : std::strerror(errno));
+  if (number <= 0) {
+    shut(number == 0 ? "the publisher has closed the connection" : std::strerror(errno));
+    return false;
+  }
   if (large_) {
     large_->set_size(large_->size() + number);
     if (large_->size() == large_bytes_) end_large();
-    return;
+    return true;
   }
   received_.set_size(received_.size() + number);
   if (state_ == State::kHeader) take_header();
   if (state_ == State::kOpen && !rests_) take_messages();
+  return static_cast<size_t>(number) == room;
 }
 
 // Make room among what waits. Returns false if that is a message that is not here as a whole.
@@ -163,6 +169,7 @@ void InConnection::take_messages() {
     if (!ends_ && !inbox_.ready()) {
       rests_ = true;
       loop_.rest(shared_from_this());
+      loop_.change(key_, fd_, 0);  // a flood is read once a rest, not once a message: its receivers need the processor
       break;
     }
     inbox_.on_small(*this, message + sizeof(uint32_t), length);
@@ -174,6 +181,7 @@ void InConnection::take_messages() {
 }
 
 void InConnection::on_rested() {
+  for (int i = 0; i < kMostReads && state_ == State::kOpen && receive(); ++i) {}
   rests_ = false;
   if (state_ != State::kOpen) return;
   take_messages();

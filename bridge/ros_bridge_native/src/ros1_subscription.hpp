@@ -56,7 +56,7 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   enum class State { kConnecting, kHeader, kOpen, kClosed };
 
   void on_connected();
-  void receive();
+  bool receive();
   void take_messages();
   void take_header();
   bool skip_oldest();
