@@ -129,6 +129,15 @@ def test_refusals_with_their_reasons_to_the_one_who_asked(players):
     assert accepted == [True, True, False, False]
 
 
+def test_a_script_that_ends_as_every_play_does_is_heard_to_its_end(players):
+    last = Step("transition", resource="homepoint_status", state="INVALID")
+    trace = compare(players, Script((*READY, Step("start", "on ground", "land"), last)))
+    assert [event[1:4] for event in trace["events"][-2:]] == [
+        ["homepoint_status", "VALID", "INVALID"],
+        ["homepoint_status", "INVALID", "VALID"],
+    ]
+
+
 def test_ends_of_every_kind(players):
     script = Script(
         (

@@ -156,6 +156,7 @@ class Ends:
 
         from ros_bridge import raw
         from ros_bridge.conversion import Types, ament_prefixes
+        from ros_bridge.spinning import spin
 
         types = Types(ament_prefixes())
         self._figures, self._dice, self._rospy, self._string = figures, dice, rospy, String
@@ -172,7 +173,7 @@ class Ends:
         self._changing: list[Callable[[], None]] = []
         executor = SingleThreadedExecutor()
         executor.add_node(self._node)
-        threading.Thread(target=executor.spin, daemon=True).start()
+        threading.Thread(target=spin, args=(executor,), daemon=True).start()
 
     def _take_down(self, text: bytes) -> None:
         if text:

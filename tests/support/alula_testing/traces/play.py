@@ -113,7 +113,11 @@ class Player:
         resource, other = _CURTAIN
         state = other[self._stage.engine.resources[resource].state]
         self._stage.transition(resource, state)
-        self._stage.until(lambda: any(e.get("resource") == resource for e in self._stage.events()[-1:]), "all events are heard")
+        # The state, too: the script's own last step may have moved this resource, but not there.
+        fallen = (resource, state)
+        self._stage.until(
+            lambda: any((e.get("resource"), e.get("to_state")) == fallen for e in self._stage.events()[-1:]), "all events are heard"
+        )
         client = self._client(0)
         self._stage.until(lambda: client.resources.get(resource) == state, "all changes are known")
 
