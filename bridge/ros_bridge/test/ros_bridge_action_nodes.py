@@ -113,10 +113,10 @@ class ActionNode:
 
     def close(self) -> None:
         self.tidy()
-        self.release.set()
         self.executor.shutdown(timeout_sec=0.0)
         if self.thread.is_alive():
             self.thread.join(5.0)
+        self.release.set()  # only now: what ends would else be told to an executor that has let go of what wakes it
         for end in (*self.servers, *self.clients.values()):
             end.destroy()
         self.node.destroy_node()
