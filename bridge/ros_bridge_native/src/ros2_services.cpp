@@ -2,6 +2,7 @@
 
 #include <rcl/error_handling.h>
 #include <rcl/graph.h>
+#include <rmw_fastrtps_shared_cpp/custom_service_info.hpp>
 
 #include "ros2_ends.hpp"
 
@@ -85,6 +86,13 @@ bool Ros2Service::answer(const Outgoing & response, rmw_request_id_t who) const 
   if (rcl_send_response(&service_, &who, bytes) == RCL_RET_OK) return true;
   rcl_reset_error();
   return false;
+}
+
+// rmw does not pass on this question to DDS, as it does for publishers.
+void Ros2Service::wait_for_arrival(int64_t most_ns) const {
+  const auto * service = static_cast<const CustomServiceInfo *>(rcl_service_get_rmw_handle(&service_)->data);
+  const eprosima::fastrtps::Duration_t most(static_cast<long double>(most_ns) / 1e9L);
+  service->response_writer_->wait_for_acknowledgments(most);
 }
 
 }  // namespace plane

@@ -51,6 +51,8 @@ class Ros2Service {
   void take(Incoming & incoming, rmw_request_id_t & who) const;
   // Answer. Waits up to 100 ms for a client that DDS has not connected to yet. Returns false when that fails.
   bool answer(const Outgoing & response, rmw_request_id_t who) const;
+  // Return when the clients have what they were answered, or the time is over.
+  void wait_for_arrival(int64_t most_ns) const;
 
  private:
   rcl_node_t * node_;

@@ -11,6 +11,8 @@ constexpr size_t kWaitingCalls = 32;
 constexpr size_t kMostPosted = 256;
 // After that the master is asked again: the service may have moved to another node.
 constexpr int64_t kReuseWithinNs = 2'000'000'000;
+// How long the last answers may take to their clients. A server that is no more takes back what they have not got yet.
+constexpr int64_t kFarewellNs = 200'000'000;
 constexpr const char * kNotAsked = "the ROS master has not answered, asked";
 
 }  // namespace
@@ -30,8 +32,10 @@ ServiceInRos1::ServiceInRos1(Machinery & machinery, ServiceSpecification specifi
 
 ServiceInRos1::~ServiceInRos1() {
   service_->stop_listening();
-  machinery_.loop.run_and_wait([this] {
+  bool answered = false;
+  machinery_.loop.run_and_wait([&] {
     closed_ = true;
+    answered = !calls_.empty();
     replies_.stop_deferring();
     timer_->end();
     while (!calls_.empty()) fail(calls_.begin(), kBridgeEnds);
@@ -41,6 +45,7 @@ ServiceInRos1::~ServiceInRos1() {
   });
   replies_.finish();
   machinery_.loop.run_and_wait([] {});  // what was posted meanwhile
+  if (answered) service_->wait_for_arrival(kFarewellNs);
 }
 
 // In a thread of DDS; in the loop's when it had too many. Requests that nobody takes are DDS's to keep or to let go.
