@@ -58,9 +58,11 @@ def open_both_ways(ros1, ros2_node, publisher, topic, received):
     """Publish on both sides until each side has a message of the other, and wait for the last of these."""
 
     def opened():
-        ros1.do("publish", topic=topic, values={"data": "open"})
-        publisher.publish(publisher.msg_type(data="open"))
-        return any("/ros_bridge" in line for line in ros1.lines) and len(received) > 2
+        ros1.do("publish", topic=topic, values={"data": "open one"})
+        publisher.publish(publisher.msg_type(data="open two"))
+        # Each side hears itself, too.
+        down = any("/ros_bridge" in line and b"open two".hex() in line for line in ros1.lines)
+        return down and any(message.data == "open one" for message in received)
 
     ros1.lines.clear()
     ros2_node.until(opened, f"{topic} is open both ways")
