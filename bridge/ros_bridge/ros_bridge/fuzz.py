@@ -1,7 +1,8 @@
 """Throw garbage at a running bridge: ``python -m ros_bridge.fuzz --seconds 60 --up /a --down /b`` (String topics that it carries).
 
 Broken and random frames, connection headers and definitions from a publisher; random bytes, and real requests with bytes changed, to its
-XML-RPC and TCPROS ports. Prints figures as JSON; ends with 1 when the bridge no longer answers. The same seed throws the same things.
+XML-RPC and TCPROS ports; with ``--service /c`` (a SetBool that it offers in ROS 1) broken headers and requests of that service's clients.
+Prints figures as JSON; ends with 1 when the bridge no longer answers. The same seed throws the same things.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 from ros_bridge.hostile import LENGTH, WITHIN_S, HostilePublisher, header, master, open_ports
 
 STRING = {"type": "std_msgs/String", "md5sum": "992ce8a1687cec8c8bd883ec73ca41d1", "message_definition": "string data\n"}
+SET_BOOL = {"md5sum": "09fb03525b03e7ea1fd3992bafd87e16", "persistent": "1"}
 REQUESTS = (
     header({"callerid": "/fuzz", "topic": "{down}", **STRING}),
     b"POST /RPC2 HTTP/1.1\r\nHost: a\r\nContent-Type: text/xml\r\nContent-Length: 93\r\n\r\n"
@@ -94,9 +96,9 @@ def reply(dice: random.Random) -> bytes:
 class Fuzzer:
     """One run against one bridge."""
 
-    def __init__(self, master_uri: str, up: str, down: str, seed: int) -> None:
-        """Find the bridge by the topic that it publishes in ROS 1."""
-        self._master_uri, self._up, self._down = master_uri, up, down
+    def __init__(self, master_uri: str, up: str, down: str, seed: int, service: str = "") -> None:
+        """Find the bridge by the topic that it publishes in ROS 1; services are on the same port."""
+        self._master_uri, self._up, self._down, self._service = master_uri, up, down, service
         self._dice = random.Random(seed)  # noqa: S311 - repeatable, not secret
         self._ports = open_ports(master_uri, down)
         self.pid = self._ask_pid()
@@ -118,7 +120,17 @@ class Fuzzer:
     def _knock(self) -> None:
         request = self._dice.choice(REQUESTS).replace(b"{down}", self._down.encode())
         garbage = self._dice.choice((mutated(request, self._dice), self._dice.randbytes(self._dice.randint(0, 300))))
-        with contextlib.suppress(OSError), socket.create_connection(self._dice.choice(self._ports), timeout=WITHIN_S) as connection:
+        self._send(garbage, self._dice.choice(self._ports))
+
+    def _call(self) -> None:
+        greeting = header(SET_BOOL | {"callerid": "/fuzz", "service": self._service, "probe": self._dice.choice("01")})
+        if self._dice.random() < 0.3:
+            greeting = mutated(greeting, self._dice)
+        calls = (LENGTH.pack(1) + self._dice.randbytes(1)) * self._dice.randint(0, 5)
+        self._send(greeting + self._dice.choice((calls, mutated(calls, self._dice), frames(self._dice))), self._ports[1])
+
+    def _send(self, garbage: bytes, place: tuple[str, int]) -> None:
+        with contextlib.suppress(OSError), socket.create_connection(place, timeout=WITHIN_S) as connection:
             connection.sendall(garbage)
             connection.settimeout(0.02)
             connection.recv(1000)
@@ -128,7 +140,8 @@ class Fuzzer:
         figures = FuzzFigures()
         start_s = time.monotonic()
         before_mb = 0.0
-        throws: tuple[Callable[[], None], ...] = (self._publish, self._knock, self._knock, self._knock)
+        throws: list[Callable[[], None]] = [self._publish, self._knock, self._knock, self._knock]
+        throws += [self._call] * 3 if self._service else []
         while (elapsed_s := time.monotonic() - start_s) < seconds and Path(f"/proc/{self.pid}").exists():
             if not before_mb and elapsed_s > min(1.0, seconds / 2):
                 before_mb = memory_mb(self.pid)
@@ -150,9 +163,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--up", default="/fuzz/up", help="a std_msgs/String topic that the bridge carries to ROS 2")
     parser.add_argument("--down", default="/fuzz/down", help="one that it carries to ROS 1")
+    parser.add_argument("--service", default="", help="a std_srvs/SetBool service that it offers in ROS 1")
     options = parser.parse_args(arguments)
     master_uri = os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
-    figures = Fuzzer(master_uri, options.up, options.down, options.seed).run(options.seconds)
+    figures = Fuzzer(master_uri, options.up, options.down, options.seed, options.service).run(options.seconds)
     sys.stdout.write(json.dumps(asdict(figures)) + "\n")
     return 0 if figures.alive else 1
 

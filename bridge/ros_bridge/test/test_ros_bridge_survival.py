@@ -28,6 +28,7 @@ topics:
 services:
   - {name: /bs/in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 15.0}
   - {name: /bs/quick, server: ros1, type: std_srvs/SetBool, timeout_s: 15.0}
+  - {name: /bs/in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 15.0}
 """
 IMAGE = {"type": "sensor_msgs/Image", "md5sum": "060021388200f6f0f447d0fcd9c64743", "message_definition": "", "callerid": "/half"}
 IMAGE_BYTES = 4_000_000
@@ -221,9 +222,13 @@ def test_subscriber_killed_in_the_middle_of_4_mb_messages(world):
 def test_garbage_on_all_sockets_leaves_the_bridge_alive_and_its_memory_flat(world):
     peer = Ros1Peer(world.master)
     check = steady(world, peer)
-    figures = Fuzzer(world.master.uri, "/bs/fuzzed", "/bs/down", seed=7).run(5.0)
+    answered = []
+    served = world.ros2.node.create_service(SetBool, "/bs/in_ros2", lambda request, reply: answered.append(request.data) or reply)
+    figures = Fuzzer(world.master.uri, "/bs/fuzzed", "/bs/down", seed=7, service="/bs/in_ros2").run(6.0)
+    world.ros2.node.destroy_service(served)
     assert figures.alive
     assert figures.thrown > 10
+    assert answered  # some of it was what a client says
     assert figures.grown_mb < 30.0
     check("after the garbage")
 
