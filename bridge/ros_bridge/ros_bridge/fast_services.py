@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ctypes
-import threading
 from typing import TYPE_CHECKING, Any
 
 from ros_bridge import native
 from ros_bridge.config import ServiceRoute, World
-from ros_bridge.stats import Durations, Figures
+from ros_bridge.native_route import NativeRoute
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -19,17 +18,15 @@ if TYPE_CHECKING:
 Refusal = tuple[bool, bool, bytes, bytes]  # there is a flag, there is a text, bytes before the text, bytes behind it
 
 
-class FastService:
+class FastService(NativeRoute):
     """One route. Its figures stay readable after ``close``."""
 
     def __init__(self, spec: ServiceRoute, service: ServiceType, interface: Any, no: Refusal, node: Node, plane: Plane) -> None:
         """Offer the service; calls cross from here on. ``no`` is the response that refuses. Raises NativeError."""
+        super().__init__(plane.native)
         self._spec = spec
         self._plane = plane
-        self._native = plane.native
-        self._lock = threading.Lock()
         self._in_ros1 = spec.server is World.ROS1
-        self._last = native.RouteFigures()
         self._token = plane.token(spec.label)
         with node.handle:
             specification = native.ServiceSpecification(
@@ -53,42 +50,21 @@ class FastService:
                 refusal_after_bytes=len(no[3]),
             )
             make = self._native.service_in_ros1_new if self._in_ros1 else self._native.service_in_ros2_new
-            self._route: int | None = self._native.require(make(plane.machinery, ctypes.byref(specification)))
+            self._handle = self._native.require(make(plane.machinery, ctypes.byref(specification)))
         if self._in_ros1:
-            plane.call(self._token, self._route, spec.ros1_name)
+            plane.call(self._token, self._handle, spec.ros1_name)
         else:
             plane.node.serve(spec.ros1_name)
 
     def start(self) -> None:
         """Do nothing: a call reaches for the server when it comes."""
 
-    def figures(self) -> Figures:
-        """Return what was called."""
-        counters = self._counters()
-        durations = Durations.of(counters.bins)
-        return Figures(
-            count=int(counters.count),
-            bytes=int(counters.bytes),
-            p50_ms=durations.percentile_ms(0.50),
-            p95_ms=durations.percentile_ms(0.95),
-            errors=int(counters.errors),
-        )
-
-    def _counters(self) -> native.RouteFigures:
-        with self._lock:
-            if self._route is not None:
-                self._native.route_figures(self._route, ctypes.byref(self._last))
-            return self._last
-
     def close(self) -> None:
         """Withdraw the service; calls under way end with an error or a refusal."""
-        if self._route is None:
+        if self._handle is None:
             return
         if self._in_ros1:
             self._plane.call_no_more(self._token)
         else:
             self._plane.node.unserve(self._spec.ros1_name)
-        with self._lock:
-            route, self._route = self._route, None
-            self._native.route_figures(route, ctypes.byref(self._last))
-            self._native.route_delete(route)
+        self._delete()
