@@ -1,0 +1,71 @@
+"""What an attack needs of a world: managers, clients and a way to wait."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from alula_testing import waits
+from alula_testing.ros1 import end_process
+
+PATIENCE_S = 120.0
+READY = "serving"
+
+
+class Graph(Protocol):
+    """One world with the managers of the drone's navigation, whose functions run until they are ended."""
+
+    def client(self) -> Any:
+        """Return a client of the skillset that is ready."""
+        ...
+
+    def until(self, condition: Callable[[], object], what: str) -> None:
+        """Wait until the condition holds; fail, naming ``what``, when it does not within a generous time."""
+        ...
+
+
+class LiveGraph:
+    """A world with processes: managers can be frozen and started twice, clients can end without a word."""
+
+    def __init__(self, world: str, make_client: Callable[[], Any]) -> None:
+        self._world = world
+        self._make_client = make_client
+        self._client: Any = None
+        self.managers = self.start("server")
+        self.read_until_ready(self.managers)
+
+    def client(self) -> Any:
+        """Return the one client of this process, ready."""
+        if self._client is None:
+            self._client = self._make_client()
+        assert self._client.wait_ready(PATIENCE_S), "the managers are not there"
+        return self._client
+
+    def until(self, condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
+        """Wait until the condition holds (wall clock)."""
+        waits.until(condition, what, patience_s)
+
+    def start(self, program: str) -> subprocess.Popen[str]:
+        """Start a program of this package in this world."""
+        command = [sys.executable, "-m", f"alula_testing.attacks.{program}", self._world]
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        return subprocess.Popen(command, text=True, start_new_session=True, env=os.environ.copy(), **pipes)
+
+    @staticmethod
+    def read_until_ready(process: subprocess.Popen[str]) -> bool:
+        """Return True as soon as the managers of a process serve, False when it has ended instead."""
+        assert process.stdout is not None
+        return any(line.strip() == READY for line in process.stdout)
+
+    def close(self) -> None:
+        """End the managers."""
+        end_process(self.managers)  # type: ignore[arg-type]  # of text or bytes, it is ended
+
+
+def answer(found: dict[str, Any]) -> str:
+    """Return what an attack has found as a line."""
+    return json.dumps(found) + "\n"
