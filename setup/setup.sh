@@ -46,7 +46,7 @@ tree_digest() { # of all files below the given folders that decide what is built
 }
 
 model_digest() { # of the models and of what generates from them
-  ( cd "$ALULA_ROOT" && find skillsets ros2_ws/src/skill_language -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
+  ( cd "$ALULA_ROOT" && find skillsets ros2_ws/src/skill_model ros2_ws/src/skill_language -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
       -not -path '*/.*' -not -path '*/test/*' -print0 | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16 )
 }
 
@@ -88,7 +88,7 @@ make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup
 
 generate() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
-    export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/skill_language"
+    export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/skill_model:$ALULA_ROOT/ros2_ws/src/skill_language"
     # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
     python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune )
 }

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from alula_testing.flights import Flight, start_flight, story
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 
 pytestmark = [pytest.mark.flight, pytest.mark.timeout(1200)]
 Summary = dict[str, Any]

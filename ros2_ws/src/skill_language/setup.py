@@ -15,7 +15,7 @@ setup(
     zip_safe=True,
     maintainer="The Alula developers",
     maintainer_email="alula@alula-robotics.org",
-    description="The skill language: model, two notations, checks, proofs, JSON form, code generator and language server.",
+    description="The skill language: two notations, checks, proofs, code generator and language server.",
     license="Apache-2.0",
     entry_points={
         "console_scripts": [

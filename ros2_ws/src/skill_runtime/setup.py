@@ -13,6 +13,6 @@ setup(
     zip_safe=True,
     maintainer="The Alula developers",
     maintainer_email="alula@alula-robotics.org",
-    description="Executes a skillset: the step semantics and engine without ROS, managers and client over rclpy.",
+    description="Executes a skillset: the engine without ROS, managers and client over rclpy.",
     license="Apache-2.0",
 )

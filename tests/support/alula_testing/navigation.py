@@ -10,7 +10,7 @@ from skillset_interfaces.srv import Transition
 
 from alula_testing.recorder import Recorder
 from alula_testing.waits import until
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.handle import SkillHandle
 
 S = ExecutionState

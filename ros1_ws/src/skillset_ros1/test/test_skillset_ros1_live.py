@@ -19,8 +19,8 @@ from skillset_ros1_bench import SOON_S, Navigation, on_thread, until
 from uav_msgs.msg import GuidanceState
 
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals
-from skill_language.json_form import from_json
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
+from skill_model.json_form import from_json
 from skill_runtime.waiting import CannotWaitError
 
 S = ExecutionState

@@ -1,13 +1,11 @@
 """The skill language: what a robot can do, as plain values that were read, checked and can be generated from.
 
-``load`` reads files, ``check`` judges a model, ``printer`` and ``json_form`` write it, ``generate`` makes ROS packages of
+``load`` reads files, ``check`` judges a model, ``printer`` writes it, ``generate`` makes ROS packages of
 it. Nothing in this package imports ROS.
 """
 
 from skill_language.errors import Diagnostic, LanguageError, Severity
-from skill_language.json_form import from_json, to_json
 from skill_language.load import load_robot, load_skillset
-from skill_language.model import Skillset
 from skill_language.notation import Notation
 from skill_language.printer import print_skillset
 
@@ -16,10 +14,7 @@ __all__ = [
     "LanguageError",
     "Notation",
     "Severity",
-    "Skillset",
-    "from_json",
     "load_robot",
     "load_skillset",
     "print_skillset",
-    "to_json",
 ]

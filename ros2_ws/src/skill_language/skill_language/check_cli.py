@@ -16,10 +16,10 @@ from dataclasses import replace
 from time import monotonic
 
 from skill_language.errors import Diagnostic, Severity, has_errors, render
-from skill_language.model import Skillset
 from skill_language.models import ModelFile, check_files
 from skill_language.notation import Notation
 from skill_language.printer import print_file
+from skill_model.model import Skillset
 
 UNREADABLE = "ALU0"
 EXIT_CODES = """

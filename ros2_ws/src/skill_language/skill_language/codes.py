@@ -11,7 +11,6 @@ CODES: Mapping[str, str] = {
     "ALU001": "a file can't be read",
     "ALU002": "a file is not UTF-8 text",
     "ALU003": "a file is too large for a model",
-    "ALU004": "a JSON form that is no model",
     "ALU005": "a side file (types, bindings) that is not as it should be",
     "ALU006": "a folder without skillsets",
     "ALU100": "a character that the language doesn't know",

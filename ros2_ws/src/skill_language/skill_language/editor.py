@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from skill_language.lexer import Kind, Source, Token, tokenize
-from skill_language.model import Data, Effect, Parameter, Resource, Skill, Skillset, Span, Transition
 from skill_language.models import ModelFile
 from skill_language.notation import Notation, notation_of
 from skill_language.paper import skill as paper_skill
 from skill_language.rl import skill as rl_skill
 from skill_language.syntax.document import MEMBERS
 from skill_language.syntax.resources import occurring
+from skill_model.model import Data, Effect, Parameter, Resource, Skill, Skillset, Span, Transition
 
 Element = Resource | Skill | Effect | Data | Parameter
 

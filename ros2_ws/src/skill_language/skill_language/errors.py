@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from skill_language.model import NOWHERE, Span
+from skill_model.model import NOWHERE, Span
 
 
 class Severity(Enum):

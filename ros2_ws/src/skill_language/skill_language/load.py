@@ -8,11 +8,11 @@ from pathlib import Path
 
 from skill_language import side_files
 from skill_language.errors import Diagnostic, LanguageError, Severity, has_errors, nearest
-from skill_language.model import Skillset, Span
 from skill_language.models import about, check_files
 from skill_language.notation import SUFFIXES
 from skill_language.robot import Bindings, Robot
-from skill_language.ros_types import PRIMITIVES, RosType
+from skill_model.model import Skillset, Span
+from skill_model.ros_types import PRIMITIVES, RosType
 
 FOR_GENERATOR = frozenset({"ALU215", "ALU216", "ALU217", "ALU218"})
 """What a model may have by itself, but not when interfaces and managers are made of it: these warnings are errors then."""

@@ -13,9 +13,9 @@ from pathlib import Path
 from skill_language.check import check
 from skill_language.errors import Diagnostic, LanguageError, Severity, nearest
 from skill_language.lexer import MAX_CHARACTERS
-from skill_language.model import Skillset, Span
 from skill_language.notation import SUFFIXES, Notation, read
 from skill_language.syntax.document import Document, typed_elements, with_known_types
+from skill_model.model import Skillset, Span
 
 
 @dataclass

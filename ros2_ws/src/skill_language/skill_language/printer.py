@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from skill_language.model import NO_EFFECT, Effect, Skillset
 from skill_language.notation import Notation
 from skill_language.printing.paper import PAPER
 from skill_language.printing.rl import ROBOT_LANGUAGE
 from skill_language.printing.text import Style, skillset_text
+from skill_model.model import NO_EFFECT, Effect, Skillset
 
 
 class NotInThisNotationError(ValueError):

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from skill_language.model import Data, Skillset
-from skill_language.ros_types import PRIMITIVES, RosType
+from skill_model.model import Data, Skillset
+from skill_model.ros_types import PRIMITIVES, RosType
 
 Direction = Literal["ros1_to_ros2", "ros2_to_ros1"]
 World = Literal["ros1", "ros2"]

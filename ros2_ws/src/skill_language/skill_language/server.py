@@ -14,8 +14,8 @@ from pygls.uris import to_fs_path
 from skill_language.editor import Place, Word, completions, definition, description, word_at
 from skill_language.errors import Diagnostic, Severity
 from skill_language.lexer import MAX_CHARACTERS
-from skill_language.model import Span
 from skill_language.models import ModelFile, check_texts
+from skill_model.model import Span
 
 _SEVERITY = {Severity.ERROR: lsp.DiagnosticSeverity.Error, Severity.WARNING: lsp.DiagnosticSeverity.Warning}
 _KIND = {

@@ -11,9 +11,9 @@ import yaml
 
 from skill_language.errors import Diagnostic, nearest, quoted
 from skill_language.lexer import MAX_CHARACTERS
-from skill_language.model import Span
 from skill_language.robot import Bindings, BridgedService, BridgedTopic, DataSource
-from skill_language.ros_types import PRIMITIVES, RosType, parse_type
+from skill_model.model import Span
+from skill_model.ros_types import PRIMITIVES, RosType, parse_type
 
 T = TypeVar("T", DataSource, BridgedTopic, BridgedService)
 

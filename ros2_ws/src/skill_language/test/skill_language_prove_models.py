@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from skill_language.model import (
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     And,

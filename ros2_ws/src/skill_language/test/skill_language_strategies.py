@@ -6,7 +6,12 @@ import string
 
 from hypothesis import strategies as st
 
-from skill_language.model import (
+from skill_language.paper import skill as paper
+from skill_language.rl import skill as rl
+from skill_language.syntax.cursor import OPERATOR_WORDS
+from skill_language.syntax.document import MEMBERS
+from skill_language.syntax.resources import every_arrow, occurring
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     And,
@@ -37,11 +42,6 @@ from skill_language.model import (
     Skillset,
     Transition,
 )
-from skill_language.paper import skill as paper
-from skill_language.rl import skill as rl
-from skill_language.syntax.cursor import OPERATOR_WORDS
-from skill_language.syntax.document import MEMBERS
-from skill_language.syntax.resources import every_arrow, occurring
 
 WORDS = OPERATOR_WORDS | set(paper.BLOCKS) | set(rl.BLOCKS) | set(MEMBERS) | {"skillset", "all", "period"}
 TRAPS = ["initial", "violation", "apply", "post", "extern", "state", "guard", "postcondition", "interrupting", "running", "never"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from skill_language.errors import Diagnostic, LanguageError, nearest
-from skill_language.model import Span
 from skill_language.paper import parse
+from skill_model.model import Span
 
 
 def test_several_errors_of_one_file_are_told_in_order():

@@ -231,6 +231,6 @@ def test_the_name_of_a_package():
 
 def test_every_code_has_a_test():
     tested = {row[0] for row in SYNTAX + SEMANTICS}
-    elsewhere = {"ALU001", "ALU002", "ALU003", "ALU004", "ALU005", "ALU006", "ALU107", "ALU401", "ALU402", "ALU403", "ALU404", "ALU405"}
+    elsewhere = {"ALU001", "ALU002", "ALU003", "ALU005", "ALU006", "ALU107", "ALU401", "ALU402", "ALU403", "ALU404", "ALU405"}
     elsewhere |= {"ALU109", "ALU223", "ALU224"}
     assert tested | elsewhere == set(CODES) - set(PROOF_CODES)

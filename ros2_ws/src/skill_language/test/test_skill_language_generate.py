@@ -65,7 +65,7 @@ def test_what_packages_depend_on(files):
     assert '    "action/GoTo.action"\n    "action/Wait.action"\n' in files["rover_interfaces/CMakeLists.txt"]
     assert "<depend>geometry_msgs</depend>" in files["rover_interfaces/package.xml"]
     managers = files["rover_managers/package.xml"]
-    for name in ("rover_interfaces", "skill_runtime", "skill_language", "geometry_msgs", "sensor_msgs"):
+    for name in ("rover_interfaces", "skill_runtime", "skill_model", "geometry_msgs", "sensor_msgs"):
         assert f"<depend>{name}</depend>" in managers
 
 

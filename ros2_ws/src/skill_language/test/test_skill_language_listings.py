@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from skill_language.errors import LanguageError
-from skill_language.model import (
+from skill_language.paper import parse
+from skill_model.model import (
     And,
     Assignment,
     Comparison,
@@ -26,7 +27,6 @@ from skill_language.model import (
     Skill,
     Transition,
 )
-from skill_language.paper import parse
 
 LISTING_2 = """
 resource

@@ -10,11 +10,11 @@ import pytest
 from skill_language import paper, rl
 from skill_language.check import check
 from skill_language.codes import CODES, PROOF_CODES
-from skill_language.json_form import to_json
-from skill_language.model import NO_EFFECT
 from skill_language.models import ModelFile, check_texts
 from skill_language.syntax.quantities import SECONDS
-from skill_language.units import UNIT_IN_SI
+from skill_model.json_form import to_json
+from skill_model.model import NO_EFFECT
+from skill_model.units import UNIT_IN_SI
 
 PAGE = next(p / "skillsets" / "LANGUAGE.md" for p in Path(__file__).resolve().parents if (p / "skillsets").is_dir()).read_text()
 PAPER = [paper.parse(f"skillset page {{ {text} }}") for text in re.findall(r"```skill\n(.*?)```", PAGE, re.DOTALL)]

@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from skill_language_prove_models import VALUES, skillsets
 
-from skill_language.model import TRUE
 from skill_language.prove.abstract import without_data
 from skill_language.prove.encoding import encode
 from skill_language.prove.explicit import search as one_by_one
@@ -19,8 +18,10 @@ from skill_language.prove.local import local_checks
 from skill_language.prove.sets import Sets
 from skill_language.prove.steps import World
 from skill_language.prove.symbolic import search as by_sets
-from skill_runtime.core import SkillsetEngine, semantics
-from skill_runtime.core.conditions import holds
+from skill_model import semantics
+from skill_model.conditions import holds
+from skill_model.model import TRUE
+from skill_runtime.core import SkillsetEngine
 from skill_runtime.hooks import SkillHooks
 
 ANY_TIME = Deadline.after(3600.0)

@@ -10,7 +10,8 @@ import pytest
 from test_skill_language_prove_page import PAGE, proved
 
 from skill_language.load import check_file
-from skill_language.model import (
+from skill_language.prove import bench, prove
+from skill_model.model import (
     Assignment,
     Comparison,
     DataIs,
@@ -29,7 +30,6 @@ from skill_language.model import (
     Skillset,
     Transition,
 )
-from skill_language.prove import bench, prove
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 GOTO = """

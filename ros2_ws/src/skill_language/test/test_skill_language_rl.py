@@ -13,9 +13,12 @@ from hypothesis import strategies as st
 from skill_language import rl
 from skill_language.check_cli import main
 from skill_language.errors import LanguageError
-from skill_language.json_form import to_json
 from skill_language.lexer import MAX_ERRORS
-from skill_language.model import (
+from skill_language.models import ModelFile, check_texts
+from skill_language.notation import Notation, notation_of
+from skill_language.printer import print_skillset
+from skill_model.json_form import to_json
+from skill_model.model import (
     TRUE,
     And,
     Assignment,
@@ -39,9 +42,6 @@ from skill_language.model import (
     ResultKind,
     SkillRuns,
 )
-from skill_language.models import ModelFile, check_texts
-from skill_language.notation import Notation, notation_of
-from skill_language.printer import print_skillset
 
 UAV = next(p / "skillsets" / "uav.rl" for p in Path(__file__).resolve().parents if (p / "skillsets").is_dir())
 A, B = ResourceIs("r", "A"), ResourceIs("r", "B")

@@ -9,11 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from skill_language_strategies import skillsets
 
 from skill_language import paper, rl
-from skill_language.errors import LanguageError
-from skill_language.json_form import from_json, to_json
-from skill_language.model import Assignment, Comparison, DataIs, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
 from skill_language.notation import Notation
 from skill_language.printer import NotInThisNotationError, print_skillset
+from skill_model.json_form import from_json, to_json
+from skill_model.model import Assignment, Comparison, DataIs, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
 
 SLOW = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
@@ -65,33 +64,3 @@ def test_what_no_text_says_is_refused(notation):
         print_skillset(Skillset("s", skills=(skill,)), notation)
     with pytest.raises(NotInThisNotationError, match="effect of event e can't have a name"):
         print_skillset(Skillset("s", events=(Event("e", effect=Effect("n")),)), notation)
-
-
-NOT = '{"is": "not", "operand": '
-SKILL = '{"name": "s", "skills": [{"name": "f", %s}]}'
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("", "Expecting value"),
-        ("[]", "skillset should be an object, not []"),
-        ('{"name": 3}', "skillset.name should be str, not 3"),
-        ("{}", "skillset should be an object with `name`"),
-        ('{"name": "s", "colour": 1}', "skillset should be an object with the fields name, types"),
-        (SKILL % '"progress": {"period_s": true}', "skillset.skills[0].progress.period_s should be float, not True"),
-        (SKILL % '"progress": {"period_s": NaN}', "period_s should be float, not nan"),
-        (SKILL % '"results": [{"name": "R", "kind": "x"}]', "one of result, success, failure"),
-        (SKILL % '"preconditions": [{"name": "p", "condition": {"is": []}}]', 'a condition with "is" one of'),
-        (SKILL % '"inputs": 3', "skillset.skills[0].inputs should be a list, not 3"),
-        ("[" * 100_000, "nested too deeply"),
-        (SKILL % ('"start": ' + '{"name": "e", "assignments": 1}'), "start.assignments should be a list"),
-        (SKILL % f'"preconditions": [{{"name": "p", "condition": {NOT * 300}1{"}" * 301}]', "nested less deeply"),
-    ],
-)
-def test_json_that_is_no_model(text, told):
-    with pytest.raises(LanguageError) as caught:
-        from_json(text)
-    (finding,) = caught.value.diagnostics
-    assert finding.code == "ALU004"
-    assert told in finding.message

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from skill_language.model import Skillset
 from skill_missions.director import Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
 from skill_missions.skillset import Handle
+from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent
 from skill_runtime.local import LocalClient, LocalWorld, event_record
 from skill_runtime.mock import Behaviour, Play, mock_world

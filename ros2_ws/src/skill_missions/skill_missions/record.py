@@ -9,7 +9,7 @@ from skill_missions.director import Director, End, Outcome
 from skill_missions.drawing import draw
 from skill_missions.files import EventLog, write_json, write_text
 from skill_missions.plan import MissionPlan
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 
 
 class MissionRecord:

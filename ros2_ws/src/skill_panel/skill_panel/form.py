@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from skill_language.model import Skill
+from skill_model.model import Skill
 
 FLOATS = ("double", "float")
 TRUE, FALSE = ("true", "yes", "1", "on"), ("false", "no", "0", "off")

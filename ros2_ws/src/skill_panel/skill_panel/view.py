@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
-from skill_language.model import Resource, Skillset
-from skill_runtime.core.situation import Situation
+from skill_model.model import Resource, Skillset
+from skill_model.situation import Situation
 from skill_runtime.core.why import unmet
 
 NANOSECONDS = 1e9

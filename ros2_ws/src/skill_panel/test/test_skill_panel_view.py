@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from skill_language.model import (
+from skill_model.model import (
     Comparison,
     DataIs,
     Parameter,
@@ -18,7 +18,7 @@ from skill_language.model import (
     Skillset,
     Transition,
 )
-from skill_language.model import Data as ModelData
+from skill_model.model import Data as ModelData
 from skill_panel.form import Field, FormError, fields, value_of, values
 from skill_panel.memory import Memory
 from skill_panel.view import DataRow, ResourceRow, Running, SkillRow, SkillsetView, one_line

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable
 
-from skill_language.model import Data, Skillset
+from skill_model.model import Data, Skillset
 from skill_runtime.handle import SkillHandle
 from skill_runtime.waiting import Host
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Self, TypeVar, cast
 
+from skill_model.execution_state import ExecutionState
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.core.execution import ExecutionState
 from skill_runtime.waiting import Host, Moment, Pending, Waitable
 
 OutputsT = TypeVar("OutputsT", bound=Mapping[str, object])

@@ -9,8 +9,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from skill_language.model import Data
-from skill_language.ros_types import PRIMITIVES
+from skill_model.model import Data
+from skill_model.ros_types import PRIMITIVES
 from skill_runtime import fitting
 
 _VECTOR_FIELDS = ["x", "y", "z"]

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from skill_language.model import Data
+from skill_model.model import Data
 from skill_runtime.callbacks import Callbacks, Forget
 from skill_runtime.staleness import is_stale
 from skill_runtime.views import Sample

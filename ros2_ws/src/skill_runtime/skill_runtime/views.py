@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, cast
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.callbacks import Forget
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, Handle, OutputsT, ResultT

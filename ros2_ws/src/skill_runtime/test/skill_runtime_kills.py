@@ -19,7 +19,7 @@ from pathlib import Path
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.ros2 import SkillsetClient
 
 SKILL = "lidar_mapping"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from alula_testing.recorder import Recorder
-from skill_language.model import (
+from skill_model.model import (
     Assignment,
     Effect,
     Interrupt,

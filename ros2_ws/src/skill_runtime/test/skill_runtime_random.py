@@ -9,7 +9,9 @@ from itertools import pairwise, permutations
 
 from hypothesis import strategies as st
 
-from skill_language.model import (
+from skill_model.conditions import holds
+from skill_model.execution_state import ExecutionState
+from skill_model.model import (
     And,
     Assignment,
     Effect,
@@ -26,8 +28,7 @@ from skill_language.model import (
     Skillset,
     Transition,
 )
-from skill_runtime.core import ExecutionEvent, ExecutionState, TransitionEvent
-from skill_runtime.core.conditions import holds
+from skill_runtime.core import ExecutionEvent, TransitionEvent
 
 S = ExecutionState
 JOIN_S = 20.0

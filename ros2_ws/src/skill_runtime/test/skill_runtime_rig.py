@@ -18,7 +18,7 @@ from skillset_interfaces.srv import Transition
 from alula_testing import waits
 from alula_testing.recorder import Recorder
 from alula_testing.ros2 import spin
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 from skill_runtime.ros2.names import EVENTS
 from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode

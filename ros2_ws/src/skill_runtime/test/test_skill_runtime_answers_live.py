@@ -20,7 +20,7 @@ from skillset_interfaces.msg import SkillStates  # noqa: E402
 from skillset_interfaces.srv import SetPaused, Why  # noqa: E402
 
 from alula_testing.navigation import FLYING  # noqa: E402
-from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
 from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
 from skill_runtime.hooks import SkillHooks  # noqa: E402
 from skill_runtime.ros2 import SkillsetNode  # noqa: E402

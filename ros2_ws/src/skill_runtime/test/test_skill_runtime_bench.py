@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from skill_model.execution_state import ExecutionState
 from skill_runtime.bench.cases import CASES, FREE, INPUT, LOST, USED, Case, make_skillset, resource_name, skill_name
 from skill_runtime.bench.figures import (
     HEADINGS,
@@ -24,7 +25,7 @@ from skill_runtime.bench.figures import (
     times_of,
     verdicts,
 )
-from skill_runtime.core import ExecutionState, SkillsetEngine
+from skill_runtime.core import SkillsetEngine
 from skill_runtime.hooks import SkillHooks
 
 SAMPLES = st.lists(st.floats(0, 1e6), min_size=1, max_size=50)

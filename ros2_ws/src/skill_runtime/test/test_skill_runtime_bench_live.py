@@ -17,10 +17,10 @@ pytest.importorskip("navigation_interfaces.action")
 
 from alula_flight.claims import is_claimed
 from alula_testing.waits import until
+from skill_model.execution_state import ExecutionState
 from skill_runtime.bench.cases import CASES
 from skill_runtime.bench.clients import States
 from skill_runtime.bench.run import LEAST, open_bench
-from skill_runtime.core import ExecutionState
 from skill_runtime.handle import SkillHandle
 
 LIMIT_S = 60.0

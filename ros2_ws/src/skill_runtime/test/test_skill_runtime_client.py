@@ -23,7 +23,7 @@ from skill_runtime_client_rig import NUMBERS, READY_S, READY_TO_TAKE_OFF, SOON_S
 from uav_client import Uav  # noqa: E402
 from uav_msgs.msg import GuidanceState  # noqa: E402
 
-from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
 from skill_runtime.handle import SkillFailedError  # noqa: E402
 from skill_runtime.ros2 import Robot  # noqa: E402
 from skill_runtime.ros2.robot import NotThereError  # noqa: E402

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header, Int8, UInt8MultiArray, UInt64
 
-from skill_language.model import Parameter
+from skill_model.model import Parameter
 from skill_runtime import fitting
 from skill_runtime.local.values import fit
 from skill_runtime.plain import message_class, to_plain

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from std_msgs.msg import Float64
 
-from skill_language.model import Comparison, Data, DataIs
-from skill_runtime.core.conditions import holds
+from skill_model.conditions import holds
+from skill_model.model import Comparison, Data, DataIs
 from skill_runtime.plain import carried
 
 

@@ -9,9 +9,10 @@ import pytest
 from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 from alula_testing.recorder import Recorder
-from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
-from skill_runtime.core import ExecutionState, SkillsetEngine
-from skill_runtime.core.errors import SkillRuntimeError, UnsupportedModelError
+from skill_model.execution_state import ExecutionState
+from skill_model.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
+from skill_runtime.core import SkillsetEngine
+from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.hooks import SkillHooks
 
 S = ExecutionState
@@ -282,9 +283,9 @@ def test_preconditions_over_data_need_a_fresh_value():
 
 def test_models_that_cannot_be_executed_are_refused():
     over_data = DataIs("battery", (), Comparison.GT, 1.0)
-    with pytest.raises(UnsupportedModelError, match="battery"):
+    with pytest.raises(SkillRuntimeError, match="battery"):
         Bench(flying_skillset(flying_skill("takeoff", results=(Result("DONE", postcondition=over_data),))))
-    with pytest.raises(UnsupportedModelError, match="battery"):
+    with pytest.raises(SkillRuntimeError, match="battery"):
         Bench(flying_skillset(events=(Event("low", over_data),)))
     with pytest.raises(SkillRuntimeError, match="no hooks for takeoff"):
         SkillsetEngine(flying_skillset(), lambda: 0, {}, lambda _: None)

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from skill_runtime.core.execution import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.handle import Report, SkillFailedError, SkillHandle, StillRunningError
 from skill_runtime.waiting import NoAnswerError, Pending
 

@@ -38,8 +38,8 @@ from uav_msgs.msg import GuidanceState  # noqa: E402
 
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals  # noqa: E402
 from alula_testing.recorder import Recorder  # noqa: E402
-from skill_language.json_form import from_json  # noqa: E402
-from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
+from skill_model.json_form import from_json  # noqa: E402
 from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
 from skill_runtime.ros2 import RosHooks, SkillsetClient, SkillsetNode  # noqa: E402
 from skill_runtime.ros2.hooks_ros import ServiceCaller, ServiceCallError  # noqa: E402

@@ -7,8 +7,9 @@ from skill_runtime_local_rig import Timed, make
 from skill_runtime_models import flying_skill, flying_skillset
 
 from alula_testing.recorder import Recorder
-from skill_language.model import Progress
-from skill_runtime.core import ExecutionEvent, ExecutionState
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Progress
+from skill_runtime.core import ExecutionEvent
 from skill_runtime.local import LocalWorld
 
 S = ExecutionState

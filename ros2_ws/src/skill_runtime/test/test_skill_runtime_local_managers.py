@@ -10,8 +10,8 @@ import pytest
 from skill_runtime_local_rig import Timed, make, timed
 from skill_runtime_models import flying_skillset
 
-from skill_language.json_form import from_json
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
+from skill_model.json_form import from_json
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.local import LocalWorld, WorldError
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from skill_runtime_local_rig import make, timed
 from skill_runtime_models import flying_skillset
 
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.local import event_record
 
 STEPS = st.lists(

@@ -7,7 +7,7 @@ from skill_runtime_local_rig import make
 from skill_runtime_models import flying_skill, flying_skillset
 
 from alula_testing.recorder import Recorder
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.local import LocalWorld, VirtualClock, WorldError
 from skill_runtime.waiting import CannotWaitError
 

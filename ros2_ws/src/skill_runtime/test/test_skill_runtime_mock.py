@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skill_runtime_models import flying_skill, flying_skillset
 
-from skill_language.model import Data, Parameter, Result, ResultKind
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Data, Parameter, Result, ResultKind
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.local import event_record
 from skill_runtime.mock import Behaviour, BehaviourError, Change, Ending, Formula, FormulaError, Rule, load_behaviour, mock_world

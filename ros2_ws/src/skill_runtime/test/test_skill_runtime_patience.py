@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from skill_runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_skill, flying_skillset
 
 from alula_testing.recorder import Recorder
-from skill_language.model import Assignment, Comparison, Data, DataIs, Effect, Event, Hold, Implies, Interrupt, Invariant, Or, Progress
-from skill_runtime.core import ExecutionState, SkillsetEngine
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Assignment, Comparison, Data, DataIs, Effect, Event, Hold, Implies, Interrupt, Invariant, Or, Progress
+from skill_runtime.core import SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import TransitionEvent
 

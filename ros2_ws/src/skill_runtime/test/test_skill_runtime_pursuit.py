@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("rclpy")
 actions = pytest.importorskip("navigation_interfaces.action")
 
-from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
 from skill_runtime.ros2 import pursuit  # noqa: E402
 
 

@@ -30,7 +30,7 @@ from skill_runtime_random import (  # noqa: E402
 )
 from skill_runtime_rig import NUMBERS, READY_S, NavigationRecorder, Spinning, until  # noqa: E402
 
-from skill_language.model import Progress  # noqa: E402
+from skill_model.model import Progress  # noqa: E402
 from skill_runtime.core import ExecutionEvent  # noqa: E402
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode  # noqa: E402
 from skill_runtime.ros2.convert import fields_of, values_of  # noqa: E402

@@ -17,7 +17,7 @@ from skill_runtime_kills import END_S, SKILL, Mission  # noqa: E402
 from skill_runtime_rig import SOON_S, Navigation, until  # noqa: E402
 
 from alula_testing.navigation import FLYING  # noqa: E402
-from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
 
 S = ExecutionState
 

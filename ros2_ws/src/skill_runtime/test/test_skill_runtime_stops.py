@@ -7,8 +7,8 @@ import threading
 import pytest
 from skill_runtime_models import RELEASE, TAKE, Bench, flying_skill, flying_skillset
 
-from skill_language.model import Interrupt
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Interrupt
 from skill_runtime.core.stops import DEFAULT_TIMEOUT_S
 from skill_runtime.hooks import SkillHooks
 

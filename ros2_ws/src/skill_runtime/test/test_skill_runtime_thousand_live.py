@@ -15,7 +15,7 @@ pytest.importorskip("navigation_interfaces.action")
 from skill_runtime_rig import SOON_S  # noqa: E402
 
 from alula_testing.navigation import FLYING  # noqa: E402
-from skill_runtime.core import ExecutionState  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
 
 WARM, MEASURED = 300, 1000
 """The events' topic keeps the last 1000 of them: four of each execution, and it is full."""

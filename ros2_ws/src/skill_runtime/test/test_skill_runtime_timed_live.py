@@ -24,7 +24,8 @@ from std_msgs.msg import Float64  # noqa: E402
 
 from alula_testing import waits  # noqa: E402
 from alula_testing.recorder import Recorder  # noqa: E402
-from skill_language.model import (  # noqa: E402
+from skill_model.execution_state import ExecutionState  # noqa: E402
+from skill_model.model import (  # noqa: E402
     Assignment,
     Comparison,
     Data,
@@ -36,7 +37,6 @@ from skill_language.model import (  # noqa: E402
     Progress,
     ResourceIs,
 )
-from skill_runtime.core import ExecutionState  # noqa: E402
 from skill_runtime.ros2 import SkillsetNode  # noqa: E402
 from skill_runtime.ros2.names import EVENTS  # noqa: E402
 

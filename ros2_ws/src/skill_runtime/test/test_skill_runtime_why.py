@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from skill_runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
 
-from skill_language.model import And, Assignment, Comparison, Data, DataIs, Effect, Invariant, Not, Precondition
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
+from skill_model.model import And, Assignment, Comparison, Data, DataIs, Effect, Invariant, Not, Precondition
 
 S = ExecutionState
 FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))

@@ -13,10 +13,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from skill_language.model import Skillset
 from skill_missions.director import EXIT_CODES, End, Outcome
 from skill_missions.files import write_json
 from skill_missions.mocked import FaultRequest, MockedMission
+from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock import Behaviour, load_behaviour
 from uav_missions.plan import SKILLSETS, mapping_plan, write_route

@@ -11,7 +11,7 @@ from typing import Any
 
 from alula_testing.attacks.graph import PATIENCE_S, Graph, LiveGraph
 from alula_testing.navigation import FLYING
-from skill_runtime.core import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.handle import SkillHandle
 
 Found = dict[str, Any]

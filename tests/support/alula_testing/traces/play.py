@@ -11,7 +11,7 @@ from navigation_managers.hooks import ABSTRACT_HOOKS
 from alula_testing.traces.hooks import After, ScriptedHooks
 from alula_testing.traces.script import Script, Step
 from alula_testing.traces.stage import Client, MakeStage, Stage
-from skill_runtime.core.execution import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.handle import SkillHandle
 
 Trace = dict[str, Any]

@@ -11,7 +11,7 @@ import rospy
 from skillset_interfaces.srv import Describe, DescribeResponse, SetPaused, SetPausedResponse, WhyResponse
 from skillset_interfaces.srv import Why as WhyService
 
-from skill_language.json_form import to_json
+from skill_model.json_form import to_json
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.pauses import PauseReply
 from skill_runtime.hooks import SkillHooks

@@ -11,7 +11,7 @@ from typing import Any
 import rospy
 from skillset_interfaces.srv import GetData, GetDataResponse
 
-from skill_language.model import Data, Skillset
+from skill_model.model import Data, Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.plain import carried, message_class, to_plain
 from skill_runtime.staleness import STALE_PERIODS, is_stale

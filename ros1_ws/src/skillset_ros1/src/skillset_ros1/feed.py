@@ -9,7 +9,7 @@ import rospy
 from roslib.message import get_message_class
 from skillset_interfaces.srv import GetData, GetDataRequest
 
-from skill_language.model import Data
+from skill_model.model import Data
 from skill_runtime.plain import carried
 from skill_runtime.samples import SampleFeed
 from skill_runtime.views import Sample

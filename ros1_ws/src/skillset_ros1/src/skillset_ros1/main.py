@@ -8,7 +8,7 @@ from types import FrameType, ModuleType
 
 import rospy
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skillset_ros1.data_manager import DataBindings
 from skillset_ros1.managers import HooksFactory, SkillsetManagers
 

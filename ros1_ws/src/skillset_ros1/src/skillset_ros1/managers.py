@@ -10,7 +10,7 @@ from typing import Protocol
 
 import rospy
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import EngineEvent, ExecutionEvent

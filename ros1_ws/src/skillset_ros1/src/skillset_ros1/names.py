@@ -9,7 +9,7 @@ from typing import Any
 
 import rospy
 
-from skill_language.ros_types import camel
+from skill_model.ros_types import camel
 
 HISTORY = 1000
 """So many events are kept for who subscribes late, as in the ROS 2 world."""

@@ -8,7 +8,7 @@ import uuid
 from collections.abc import Callable
 from typing import Any
 
-from skill_runtime.core.execution import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.handle import SkillHandle
 from skill_runtime.waiting import Host, Pending
 from skillset_ros1.convert import fields_of, fill

@@ -10,8 +10,8 @@ from typing import Any
 import rospy
 from skillset_interfaces.srv import Describe, DescribeRequest
 
-from skill_language.json_form import from_json
-from skill_language.model import Skillset
+from skill_model.json_form import from_json
+from skill_model.model import Skillset
 from skillset_ros1.calls import call
 from skillset_ros1.link import SkillLink, is_connected
 from skillset_ros1.names import action_types, interfaces_of

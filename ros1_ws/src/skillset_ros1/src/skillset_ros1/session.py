@@ -15,8 +15,8 @@ import rospy
 from skillset_interfaces.msg import Event, ResourceStates, SkillStates
 from std_msgs.msg import Header
 
+from skill_model.execution_state import ExecutionState
 from skill_runtime.callbacks import Callbacks
-from skill_runtime.core.execution import ExecutionState
 from skill_runtime.handle import SkillHandle
 from skillset_ros1.news_thread import Job, NewsThread
 from skillset_ros1.pursuit import Pursuit

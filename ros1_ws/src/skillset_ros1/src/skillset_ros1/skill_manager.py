@@ -15,10 +15,10 @@ from actionlib import ActionServer, ServerGoalHandle
 from actionlib_msgs.msg import GoalStatus
 from std_msgs.msg import Header
 
-from skill_language.model import Skill
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skill
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.core.execution import ExecutionState
 from skill_runtime.hooks import SkillHooks
 from skillset_ros1.alarms import Alarms
 from skillset_ros1.convert import fill, values_of

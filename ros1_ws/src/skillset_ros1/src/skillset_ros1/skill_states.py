@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import rospy
 from skillset_interfaces.msg import SkillState, SkillStates
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.records import Records
 from skill_runtime.messages import skill_message

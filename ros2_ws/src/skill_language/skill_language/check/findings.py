@@ -7,7 +7,7 @@ from itertools import chain, islice
 from skill_language.check.skill_rules import SKILL_RULES
 from skill_language.check.skillset_rules import RULES
 from skill_language.errors import Diagnostic
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 
 MAX_FINDINGS = 200
 

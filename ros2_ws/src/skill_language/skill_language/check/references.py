@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
-from skill_language import ros_types
 from skill_language.errors import Diagnostic, Severity, nearest, quoted
-from skill_language.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, SkillRuns, Skillset, Span, atoms
-from skill_language.units import UNIT_IN_SI
+from skill_model import ros_types
+from skill_model.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, SkillRuns, Skillset, Span, atoms
+from skill_model.units import UNIT_IN_SI
 
 
 class Named(Protocol):

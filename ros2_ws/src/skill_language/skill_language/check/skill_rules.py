@@ -19,8 +19,8 @@ from skill_language.check.references import (
     warning,
 )
 from skill_language.errors import Diagnostic
-from skill_language.model import NO_EFFECT, Comparison, DataIs, Effect, Hold, Invariant, Skill, Skillset
-from skill_language.units import UNIT_IN_SI
+from skill_model.model import NO_EFFECT, Comparison, DataIs, Effect, Hold, Invariant, Skill, Skillset
+from skill_model.units import UNIT_IN_SI
 
 
 def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:

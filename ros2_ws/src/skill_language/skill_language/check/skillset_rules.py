@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
-from skill_language import ros_types
 from skill_language.check.references import (
     Named,
     condition_findings,
@@ -20,9 +19,10 @@ from skill_language.check.references import (
     warning,
 )
 from skill_language.errors import Diagnostic, nearest
-from skill_language.model import Resource, Skillset, Span
 from skill_language.syntax.document import typed_elements
 from skill_language.syntax.resources import occurring
+from skill_model import ros_types
+from skill_model.model import Resource, Skillset, Span
 
 
 def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:

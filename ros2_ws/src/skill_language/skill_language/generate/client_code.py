@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator
 from skill_language.generate.client_templates import CLIENT, SKILL
 from skill_language.generate.python_code import WIDTH, annotation, keyword_only, message_imports, tidy, wrapped
 from skill_language.generate.text import comment, fill, header, lines, packages
-from skill_language.model import Data, Parameter, Resource, Skill, Skillset
 from skill_language.robot import Robot
-from skill_language.ros_types import PRIMITIVES, RosType, camel
+from skill_model.model import Data, Parameter, Resource, Skill, Skillset
+from skill_model.ros_types import PRIMITIVES, RosType, camel
 
 TAKEN = ("client", "data")
 """Attributes that every skillset has; a skill or resource of that name gets an underscore behind it."""

@@ -9,7 +9,7 @@ from skill_language.generate.python_code import tidy
 from skill_language.generate.python_package import package_files
 from skill_language.generate.text import fill, lines
 from skill_language.robot import Robot
-from skill_language.ros_types import camel
+from skill_model.ros_types import camel
 
 
 def client_package(robot: Robot) -> dict[str, str]:

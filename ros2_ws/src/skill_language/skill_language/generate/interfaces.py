@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skill_language.generate.text import MAINTAINER, comment, fill, header, lines, packages
-from skill_language.model import Parameter, Skill, Skillset
 from skill_language.robot import Robot
-from skill_language.ros_types import camel
+from skill_model.model import Parameter, Skill, Skillset
+from skill_model.ros_types import camel
 
 PACKAGE_XML = """\
 <?xml version="1.0"?>

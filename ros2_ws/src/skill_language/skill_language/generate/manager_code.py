@@ -5,9 +5,9 @@ from __future__ import annotations
 from skill_language.generate.manager_templates import HOOKS, HOOKS_CLASS, INPUTS, INPUTS_CLASS, TERMINATED
 from skill_language.generate.python_code import annotation, keyword_only, message_imports, tidy, wrapped
 from skill_language.generate.text import comment, fill, header, lines
-from skill_language.model import Result, Skill, Skillset
 from skill_language.robot import Robot
-from skill_language.ros_types import camel
+from skill_model.model import Result, Skill, Skillset
+from skill_model.ros_types import camel
 
 
 def inputs_module(robot: Robot, skillset: Skillset) -> str:

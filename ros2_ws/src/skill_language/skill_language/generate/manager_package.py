@@ -9,9 +9,9 @@ from skill_language.generate.manager_code import hooks_module, inputs_module
 from skill_language.generate.mock_module import mock_module
 from skill_language.generate.python_package import package_files
 from skill_language.generate.text import fill, header, lines, packages
-from skill_language.json_form import to_json
-from skill_language.model import Skillset
 from skill_language.robot import Robot
+from skill_model.json_form import to_json
+from skill_model.model import Skillset
 
 INIT = '''\
 """The skillset ``$skillset``: model, inputs, hooks to be written, client.
@@ -26,7 +26,7 @@ MODEL = '''\
 $header.
 """
 
-from skill_language.json_form import from_json
+from skill_model.json_form import from_json
 
 MODEL_JSON = r"""$model
 """
@@ -66,7 +66,7 @@ def manager_package(robot: Robot, skillset: Skillset) -> dict[str, str]:
         common["header"],
         f"The managers' side of the skillset {skillset.name}",
         "model, inputs, hooks to be written, client",
-        ("skill_language", "skill_runtime", *needed, *packages(types)),
+        ("skill_model", "skill_runtime", *needed, *packages(types)),
         script=f"mock = {package}.mock:main",
     )
     main = {f"{package}/{package}/__main__.py": fill(MAIN, **common, actions=f"{skillset.name}_interfaces.action")}

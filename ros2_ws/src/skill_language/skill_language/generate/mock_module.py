@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from skill_language.generate.text import fill, header
-from skill_language.model import Skillset
 from skill_language.robot import Robot
+from skill_model.model import Skillset
 
 MOCK = '''\
 """The skillset ``$skillset``, mocked: ``python -m ${skillset}_managers.mock [--behaviour FILE] [--seed N] [--ros-args ...]``.

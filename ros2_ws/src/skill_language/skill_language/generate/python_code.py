@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from skill_language.generate.text import lines, packages
-from skill_language.model import Parameter
 from skill_language.robot import Robot
+from skill_model.model import Parameter
 
 WIDTH = 140
 """Longest line of generated code, the formatter's setting of this tree."""

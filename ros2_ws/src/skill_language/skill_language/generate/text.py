@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from string import Template
 
-from skill_language.model import Skillset
 from skill_language.robot import Robot
-from skill_language.ros_types import RosType
+from skill_model.model import Skillset
+from skill_model.ros_types import RosType
 
 MAINTAINER = '<maintainer email="alula@alula-robotics.org">The Alula developers</maintainer>'
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from skill_language.lexer import Source
-from skill_language.model import Skillset
 from skill_language.paper.skill import read_skill
 from skill_language.syntax.conditions import paper_condition
 from skill_language.syntax.document import Dialect, one_skillset, read_document
+from skill_model.model import Skillset
 
 PAPER = Dialect(read_skill, paper_condition)
 

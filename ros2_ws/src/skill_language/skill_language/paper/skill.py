@@ -14,7 +14,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from skill_language.lexer import Kind, Token
-from skill_language.model import (
+from skill_language.syntax.conditions import paper_condition
+from skill_language.syntax.cursor import Cursor, starts_block, starts_member
+from skill_language.syntax.elements import read_parameter
+from skill_language.syntax.quantities import duration, hold, setting
+from skill_language.syntax.skill_reader import SkillReader
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     Effect,
@@ -28,11 +33,6 @@ from skill_language.model import (
     ResultKind,
     Skill,
 )
-from skill_language.syntax.conditions import paper_condition
-from skill_language.syntax.cursor import Cursor, starts_block, starts_member
-from skill_language.syntax.elements import read_parameter
-from skill_language.syntax.quantities import duration, hold, setting
-from skill_language.syntax.skill_reader import SkillReader
 
 BLOCKS = ("progress", "parameter", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
 _OUTSIDE = ("resource", "event", "skill", "property")

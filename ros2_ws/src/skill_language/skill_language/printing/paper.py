@@ -4,7 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from skill_language.model import (
+from skill_language.printing.text import (
+    AND,
+    IMPLIES,
+    NOT,
+    OR,
+    Style,
+    atom_text,
+    bare_text,
+    block,
+    changes_text,
+    comment_text,
+    effect_text,
+    hold_text,
+    parameter_text,
+)
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     And,
@@ -22,21 +37,6 @@ from skill_language.model import (
     ResultKind,
     Skill,
     atoms,
-)
-from skill_language.printing.text import (
-    AND,
-    IMPLIES,
-    NOT,
-    OR,
-    Style,
-    atom_text,
-    bare_text,
-    block,
-    changes_text,
-    comment_text,
-    effect_text,
-    hold_text,
-    parameter_text,
 )
 
 _WORDS_OF_RESULTS = frozenset({"success", "failure", "apply", "post"})

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from skill_language.model import (
+from skill_language.printing.text import (
+    Style,
+    bare_text,
+    block,
+    changes_text,
+    comment_text,
+    effect_text,
+    hold_text,
+    parameter_text,
+)
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     DataIs,
@@ -16,16 +26,6 @@ from skill_language.model import (
     Result,
     Skill,
     atoms,
-)
-from skill_language.printing.text import (
-    Style,
-    bare_text,
-    block,
-    changes_text,
-    comment_text,
-    effect_text,
-    hold_text,
-    parameter_text,
 )
 
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from skill_language.lexer import quote
-from skill_language.model import (
+from skill_language.syntax.resources import every_arrow, occurring
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     And,
@@ -29,8 +30,7 @@ from skill_language.model import (
     SkillRuns,
     Skillset,
 )
-from skill_language.syntax.resources import every_arrow, occurring
-from skill_language.units import UNIT_IN_SI
+from skill_model.units import UNIT_IN_SI
 
 ConditionText = Callable[[Expression], str]
 

@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from skill_language.model import (
+from skill_language.prove.limits import Deadline
+from skill_language.prove.solver import Solver
+from skill_model.model import (
     TRUE,
     And,
     Atom,
@@ -29,8 +31,6 @@ from skill_language.model import (
     Skillset,
     atoms,
 )
-from skill_language.prove.limits import Deadline
-from skill_language.prove.solver import Solver
 
 
 @dataclass(frozen=True)

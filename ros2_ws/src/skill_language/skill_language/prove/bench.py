@@ -16,7 +16,8 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from skill_language.model import (
+from skill_language.prove.prover import prove
+from skill_model.model import (
     And,
     Assignment,
     Effect,
@@ -33,7 +34,6 @@ from skill_language.model import (
     Skillset,
     Transition,
 )
-from skill_language.prove.prover import prove
 
 ALL_ONE_BY_ONE = 10**9
 

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from skill_language.arrows import origins, targets_of
-from skill_language.model import (
+from skill_model.arrows import origins, targets_of
+from skill_model.model import (
     And,
     Constant,
     Effect,

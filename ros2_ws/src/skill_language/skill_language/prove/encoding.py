@@ -1,6 +1,6 @@
 """Encodes a skillset's steps as diagrams (see ``diagrams``).
 
-The steps say the same as ``skill_runtime.core.semantics``; the tests hold them against it. In one thing sets are wider:
+The steps say the same as ``skill_model.semantics``; the tests hold them against it. In one thing sets are wider:
 executions that one change breaks take effect in any order here, in the order of their start there, so that what is proved for
 sets holds, and a counterexample is walked again step by step.
 """
@@ -14,7 +14,9 @@ from typing import Any
 
 from dd import cudd
 
-from skill_language.model import (
+from skill_language.prove.abstract import Abstraction, Breaker
+from skill_language.prove.diagrams import ENDED, Cluster, Encoded, Update, bits, broken_name, runs_name
+from skill_model.model import (
     Effect,
     Event,
     Expression,
@@ -24,8 +26,6 @@ from skill_language.model import (
     Skillset,
     atoms,
 )
-from skill_language.prove.abstract import Abstraction, Breaker
-from skill_language.prove.diagrams import ENDED, Cluster, Encoded, Update, bits, broken_name, runs_name
 
 
 def encode(abstraction: Abstraction, copies: int) -> Encoded:

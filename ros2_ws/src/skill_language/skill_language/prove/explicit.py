@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from skill_language.model import Skillset
 from skill_language.prove.abstract import Abstraction
 from skill_language.prove.explore import explore
 from skill_language.prove.finding import Finding
@@ -11,6 +10,7 @@ from skill_language.prove.local import Suspect
 from skill_language.prove.properties import check_property
 from skill_language.prove.reachable import check_graph, crowded, decide
 from skill_language.prove.steps import World
+from skill_model.model import Skillset
 
 
 def search(

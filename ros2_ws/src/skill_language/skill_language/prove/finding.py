@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from skill_language.errors import Diagnostic, Severity
-from skill_language.model import NOWHERE, Span
+from skill_model.model import NOWHERE, Span
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from skill_language.model import (
+from skill_language.prove.finding import Finding
+from skill_language.prove.limits import Deadline
+from skill_language.prove.solver import Solver
+from skill_model.model import (
     NO_EFFECT,
     NOWHERE,
     TRUE,
@@ -28,9 +31,6 @@ from skill_language.model import (
     Span,
     atoms,
 )
-from skill_language.prove.finding import Finding
-from skill_language.prove.limits import Deadline
-from skill_language.prove.solver import Solver
 
 EFFECT_HINT = "a change must be an arrow from the state that the resource is in, unless it is in the wanted state already"
 

@@ -16,7 +16,11 @@ from collections import deque
 from collections.abc import Callable, Iterator
 
 from skill_language.errors import Severity
-from skill_language.model import (
+from skill_language.prove import story
+from skill_language.prove.explore import Edge, Graph
+from skill_language.prove.finding import Finding
+from skill_language.prove.steps import State, World
+from skill_model.model import (
     And,
     Constant,
     Expression,
@@ -28,10 +32,6 @@ from skill_language.model import (
     ResourceIs,
     SkillRuns,
 )
-from skill_language.prove import story
-from skill_language.prove.explore import Edge, Graph
-from skill_language.prove.finding import Finding
-from skill_language.prove.steps import State, World
 
 
 def check_property(graph: Graph, wanted: Property) -> Finding | None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from skill_language.errors import Severity
-from skill_language.model import Skillset
 from skill_language.prove.abstract import without_data
 from skill_language.prove.finding import Finding, strictly
 from skill_language.prove.limits import Deadline, OutOfTimeError
 from skill_language.prove.local import Suspect, local_checks
+from skill_model.model import Skillset
 
 MOST_SITUATIONS = 2000
 """More situations than this are not looked at one by one, but as sets; see ``bench``."""

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from skill_language.errors import Severity
-from skill_language.model import Resource, Skill, Skillset, Span
 from skill_language.prove import story
 from skill_language.prove.explore import Graph
 from skill_language.prove.finding import Finding
 from skill_language.prove.local import Suspect
 from skill_language.prove.steps import Key, State
+from skill_model.model import Resource, Skill, Skillset, Span
 
 NEVER_SEEN = "no reachable situation shows it"
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import z3
 
-from skill_language.arrows import origins, targets_of
-from skill_language.model import (
+from skill_language.prove.limits import Deadline, OutOfTimeError
+from skill_model.arrows import origins, targets_of
+from skill_model.model import (
     And,
     Comparison,
     Constant,
@@ -24,8 +25,7 @@ from skill_language.model import (
     SkillRuns,
     Skillset,
 )
-from skill_language.prove.limits import Deadline, OutOfTimeError
-from skill_language.units import UNIT_IN_SI
+from skill_model.units import UNIT_IN_SI
 
 Assignment = Mapping[str, str]
 

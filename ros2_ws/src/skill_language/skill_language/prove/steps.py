@@ -1,8 +1,4 @@
-"""All steps out of a situation, each taken by the runtime's own ``skill_runtime.core.semantics``.
-
-This is the one place of the language that imports the runtime, and of the runtime its pure core alone. The direction
-elsewhere is the other (``skill_runtime`` imports ``skill_language.model``), so it is imported when a search begins, not
-when the language is.
+"""All steps out of a situation, each taken by ``skill_model.semantics``, which the managers execute.
 
 A situation is kept as small as its future needs: the states of the resources and the names of the running skills.
 Executions of one skill differ in nothing but their age. The order of the start decides in which order violations take
@@ -14,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from skill_language.model import Effect, Skill, Skillset
 from skill_language.prove.abstract import Abstraction, Breaker
-from skill_runtime.core import semantics
-from skill_runtime.core.conditions import holds
-from skill_runtime.core.effects import effect_changes
-from skill_runtime.core.errors import EffectError
-from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.situation import Entered, Running, Situation, Step
+from skill_model import semantics
+from skill_model.conditions import holds
+from skill_model.effects import effect_changes
+from skill_model.errors import EffectError
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Effect, Skill, Skillset
+from skill_model.situation import Entered, Running, Situation, Step
 
 Key = tuple[str, ...]
 """What fails: ``("effect" | "post", kind, names...)`` or ``("after start", skill, invariant)``, as in ``local.Suspect``."""

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from skill_language.prove.explore import Edge, Graph
 from skill_language.prove.steps import Move, State, World
-from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.situation import Change
+from skill_model.execution_state import ExecutionState
+from skill_model.situation import Change
 
 
 def story(graph: Graph, way: Sequence[Edge], last: Move | None = None) -> tuple[str, ...]:

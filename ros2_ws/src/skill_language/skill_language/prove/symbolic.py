@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from skill_language.errors import Severity
-from skill_language.model import Constant, Property, PropertyKind, Skill, Skillset
 from skill_language.prove import reachable, story
 from skill_language.prove.abstract import Abstraction
 from skill_language.prove.diagrams import Encoded
@@ -19,6 +18,7 @@ from skill_language.prove.properties import failed, lasso, true_in
 from skill_language.prove.sets import Sets
 from skill_language.prove.steps import Key, World
 from skill_language.prove.walk import MOST_IN_A_LOOP, Walker
+from skill_model.model import Constant, Property, PropertyKind, Skill, Skillset
 
 
 def search(skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int) -> list[Finding]:

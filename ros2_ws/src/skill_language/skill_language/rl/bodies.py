@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from skill_language.lexer import Kind, Token
-from skill_language.model import NO_EFFECT, TRUE, Assignment, Effect, Expression, Hold
 from skill_language.syntax.conditions import bare_condition
 from skill_language.syntax.cursor import Cursor, starts_member
 from skill_language.syntax.elements import read_changes
 from skill_language.syntax.quantities import duration, hold
+from skill_model.model import NO_EFFECT, TRUE, Assignment, Effect, Expression, Hold
 
 OUTSIDE = ("resource", "event", "skill", "property")
 """What can't begin inside of a skill."""

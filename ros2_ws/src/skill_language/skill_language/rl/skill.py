@@ -11,7 +11,13 @@ from collections import Counter
 from collections.abc import Callable
 
 from skill_language.lexer import Kind, Token
-from skill_language.model import (
+from skill_language.rl.bodies import outside, read_body, read_effect
+from skill_language.syntax.conditions import bare_condition
+from skill_language.syntax.cursor import Cursor
+from skill_language.syntax.elements import one_or_block, read_parameter
+from skill_language.syntax.quantities import duration, hold, setting
+from skill_language.syntax.skill_reader import SkillReader
+from skill_model.model import (
     NO_EFFECT,
     Assignment,
     Effect,
@@ -24,12 +30,6 @@ from skill_language.model import (
     ResultKind,
     Skill,
 )
-from skill_language.rl.bodies import outside, read_body, read_effect
-from skill_language.syntax.conditions import bare_condition
-from skill_language.syntax.cursor import Cursor
-from skill_language.syntax.elements import one_or_block, read_parameter
-from skill_language.syntax.quantities import duration, hold, setting
-from skill_language.syntax.skill_reader import SkillReader
 
 BLOCKS = (
     "parameter",

@@ -11,7 +11,11 @@ from typing import TypeVar
 
 from skill_language.errors import LanguageError, nearest
 from skill_language.lexer import Kind, Source, Token
-from skill_language.model import (
+from skill_language.syntax.cursor import Cursor, SyntaxFault, starts_member
+from skill_language.syntax.elements import one_or_block, read_changes, read_data, read_parameter
+from skill_language.syntax.properties import read_property
+from skill_language.syntax.resources import read_resource
+from skill_model.model import (
     NO_EFFECT,
     TRUE,
     Assignment,
@@ -26,10 +30,6 @@ from skill_language.model import (
     Skillset,
     Span,
 )
-from skill_language.syntax.cursor import Cursor, SyntaxFault, starts_member
-from skill_language.syntax.elements import one_or_block, read_changes, read_data, read_parameter
-from skill_language.syntax.properties import read_property
-from skill_language.syntax.resources import read_resource
 
 MEMBERS = ("use", "type", "parameter", "data", "resource", "event", "skill", "property")
 _TOP = ("skillset", "type")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from skill_language.lexer import Kind
-from skill_language.model import Assignment, Data, Parameter
 from skill_language.syntax.cursor import Cursor
 from skill_language.syntax.quantities import quantity, setting
+from skill_model.model import Assignment, Data, Parameter
 
 
 def one_or_block(cursor: Cursor, entry: Callable[[], None], outer: Callable[[], bool]) -> None:

@@ -7,9 +7,9 @@ the runs in which an execution never ends are to be left out.
 from __future__ import annotations
 
 from skill_language.lexer import Kind
-from skill_language.model import Property, PropertyKind
 from skill_language.syntax.conditions import bare_condition
 from skill_language.syntax.cursor import Cursor
+from skill_model.model import Property, PropertyKind
 
 _KINDS = (PropertyKind.NEVER, PropertyKind.ALWAYS, PropertyKind.EVENTUALLY)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from skill_language.lexer import Kind, number
-from skill_language.model import Hold
 from skill_language.syntax.cursor import OPERATOR_WORDS, Cursor
-from skill_language.units import UNIT_IN_SI
+from skill_model.model import Hold
+from skill_model.units import UNIT_IN_SI
 
 SECONDS: Mapping[str, float] = {"ms": 0.001, "s": 1.0, "sec": 1.0, "min": 60.0, "h": 3600.0}
 """What a duration may be written in."""

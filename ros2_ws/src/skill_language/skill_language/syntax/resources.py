@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from skill_language.lexer import Kind, Token
-from skill_language.model import Resource, Transition
 from skill_language.syntax.cursor import Cursor
+from skill_model.model import Resource, Transition
 
 MAX_STATES = 250
 """`transition all` of so many states has 62,500 arrows; state machines of people have a dozen states."""

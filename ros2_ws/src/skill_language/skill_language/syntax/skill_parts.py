@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from skill_language.errors import nearest
 from skill_language.lexer import Source, Token
-from skill_language.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, Skill
+from skill_model.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, Skill
 
 
 @dataclass

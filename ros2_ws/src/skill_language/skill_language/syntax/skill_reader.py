@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from skill_language.errors import nearest
 from skill_language.lexer import Kind, Token
-from skill_language.model import Assignment, Effect
 from skill_language.syntax.cursor import Cursor, SyntaxFault
 from skill_language.syntax.elements import read_change
 from skill_language.syntax.skill_parts import SkillParts
+from skill_model.model import Assignment, Effect
 
 
 class SkillReader:

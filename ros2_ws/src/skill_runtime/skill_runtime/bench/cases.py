@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skill_language.model import (
+from skill_model.model import (
     Assignment,
     Effect,
     Interrupt,

@@ -16,7 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.bench.cases import Case, make_skillset
 from skill_runtime.bench.processes import follow
 from skill_runtime.hooks import SkillHooks

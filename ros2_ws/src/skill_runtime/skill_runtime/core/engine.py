@@ -10,8 +10,9 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from skill_language.model import Skillset
-from skill_runtime.core import semantics
+from skill_model import semantics
+from skill_model.errors import UnsupportedModelError
+from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import Listener
 from skill_runtime.core.execution import Execution
@@ -60,8 +61,7 @@ class SkillsetEngine:
         interrupt_timeout_s: how long a stop may take where the model does not say.
 
     Raises:
-        UnsupportedModelError: the model can't be executed.
-        SkillRuntimeError: a skill has no hooks, or hooks have no skill.
+        SkillRuntimeError: the model can't be executed, a skill has no hooks, or hooks have no skill.
     """
 
     def __init__(
@@ -75,7 +75,10 @@ class SkillsetEngine:
         on_error: Callable[[str], None] = log_error,
         interrupt_timeout_s: float = DEFAULT_TIMEOUT_S,
     ) -> None:
-        semantics.check_supported(skillset)
+        try:
+            semantics.check_supported(skillset)
+        except UnsupportedModelError as error:
+            raise SkillRuntimeError(str(error)) from error
         self.skillset = skillset
         self._data_names = tuple(data.name for data in skillset.data)
         caller: HookCaller = LocalHooks(skillset, hooks) if isinstance(hooks, Mapping) else hooks

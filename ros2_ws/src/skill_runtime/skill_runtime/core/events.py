@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from skill_runtime.core.execution import ExecutionState
+from skill_model.execution_state import ExecutionState
 
 
 @dataclass(frozen=True)

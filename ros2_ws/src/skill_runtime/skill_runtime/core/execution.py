@@ -1,38 +1,11 @@
-"""One execution of a skill and its states (paper, Figure 5)."""
+"""One execution of a skill (paper, Figure 5)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import Enum
 from typing import Protocol
 
-
-class ExecutionState(Enum):
-    """Where an execution is. PAUSED and INTERRUPTING are phases of running: invariants are watched and resources held."""
-
-    REQUESTED = "REQUESTED"
-    RUNNING = "RUNNING"
-    PAUSED = "PAUSED"
-    INTERRUPTING = "INTERRUPTING"
-    NOT_VALIDATED = "NOT_VALIDATED"
-    NOT_READY = "NOT_READY"
-    RESOURCE_INVARIANT_VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
-    INTERRUPTED = "INTERRUPTED"
-    TERMINATED = "TERMINATED"
-    FAILED = "FAILED"
-
-    @property
-    def terminal(self) -> bool:
-        """Tell whether nothing follows."""
-        return not (self is ExecutionState.REQUESTED or self.active)
-
-    @property
-    def active(self) -> bool:
-        """Tell whether the execution has started and not ended."""
-        return self in _ACTIVE
-
-
-_ACTIVE = frozenset({ExecutionState.RUNNING, ExecutionState.PAUSED, ExecutionState.INTERRUPTING})
+from skill_model.execution_state import ExecutionState
 
 
 class Controller(Protocol):

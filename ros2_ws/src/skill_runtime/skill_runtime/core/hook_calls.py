@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.execution import Execution
 from skill_runtime.hooks import SkillHooks

@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from skill_language.model import Skillset
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from skill_runtime.core.execution import ExecutionState
 
 HISTORY = 20
 """Transitions that are kept of each resource."""

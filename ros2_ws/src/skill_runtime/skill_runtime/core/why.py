@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from skill_language.model import DataIs, Expression, ResourceIs, Skill, Skillset, atoms
 from skill_language.printing.text import bare_text
-from skill_runtime.core import semantics
-from skill_runtime.core.conditions import Data, States, judge, present, value_of
-from skill_runtime.core.effects import effect_changes
-from skill_runtime.core.errors import EffectError
+from skill_model import semantics
+from skill_model.conditions import Data, States, judge, present, value_of
+from skill_model.effects import effect_changes
+from skill_model.errors import EffectError
+from skill_model.model import DataIs, Expression, ResourceIs, Skill, Skillset, atoms
+from skill_model.situation import Entered, Running, Situation
 from skill_runtime.core.events import TransitionEvent
-from skill_runtime.core.situation import Entered, Running, Situation
 
 START_EFFECT = "start effect"
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakSet
 
-from skill_language.model import Parameter, Skillset
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Parameter, Skillset
 from skill_runtime.callbacks import Callbacks, Forget
 from skill_runtime.client_base import ClientBase
 from skill_runtime.core.engine import TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
-from skill_runtime.core.execution import ExecutionState
 from skill_runtime.core.records import ExecutionRecord
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skill_language.model import Data, Skillset
+from skill_model.model import Data, Skillset
 from skill_runtime.local.clock import VirtualClock
 from skill_runtime.staleness import is_stale
 

@@ -8,8 +8,8 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from skill_language.json_form import to_json
-from skill_language.model import Skill, Skillset
+from skill_model.json_form import to_json
+from skill_model.model import Skill, Skillset
 from skill_runtime.core.engine import SkillsetEngine, TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from skill_runtime.core.pauses import PauseReply

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from skill_language.model import Parameter
-from skill_language.ros_types import PRIMITIVES, RosType
+from skill_model.model import Parameter
+from skill_model.ros_types import PRIMITIVES, RosType
 from skill_runtime import fitting
 
 _VECTOR = ("x", "y", "z")

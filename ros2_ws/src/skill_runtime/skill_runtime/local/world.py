@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from typing import TypeVar
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.local.client import LocalClient, OnEvent
 from skill_runtime.local.clock import NANOSECONDS, Job, VirtualClock, WorldError

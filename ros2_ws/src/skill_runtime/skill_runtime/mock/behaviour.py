@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from skill_language.model import ResultKind, Skill
+from skill_model.model import ResultKind, Skill
 from skill_runtime.mock.formula import Formula
 
 Value = Formula | float | str | bool | Callable[..., object]

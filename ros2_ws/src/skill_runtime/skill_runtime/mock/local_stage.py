@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.local import LocalWorld, Timer
 from skill_runtime.mock.behaviour import Behaviour

@@ -7,7 +7,7 @@ import random
 import threading
 from collections.abc import Callable, Mapping
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Happening, Place, Value
 from skill_runtime.mock.formula import Formula, FormulaError

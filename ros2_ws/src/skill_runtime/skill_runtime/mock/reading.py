@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from skill_language.model import Skill, Skillset
+from skill_model.model import Skill, Skillset
 from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, Fault, Happening, Place, Rule, Value
 from skill_runtime.mock.formula import Formula, FormulaError
 from skill_runtime.mock.located import BehaviourError, Located, choices, read_yaml

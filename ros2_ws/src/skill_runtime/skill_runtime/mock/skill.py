@@ -10,7 +10,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
-from skill_language.model import Skill
+from skill_model.model import Skill
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.mock.behaviour import Rule, Script, cascade, default_script
 from skill_runtime.mock.formula import FormulaError, coordinates

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from skill_language.model import Resource, Skill, Skillset
+from skill_model.model import Resource, Skill, Skillset
 from skill_runtime.mock.behaviour import DEFAULT_DELAY_S, default_script
 
 

@@ -12,10 +12,10 @@ from rclpy.node import Node
 from skillset_interfaces.srv import GetData, SetPaused, Transition
 from skillset_interfaces.srv import Why as WhyService
 
-from skill_language.model import Skillset
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skillset
 from skill_runtime.callbacks import Forget
 from skill_runtime.client_base import ClientBase
-from skill_runtime.core.execution import ExecutionState
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
 from skill_runtime.messages import why_of

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from skillset_interfaces.srv import GetData
 
-from skill_language.model import Data, Skillset
+from skill_model.model import Data, Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.plain import carried, message_class, to_plain
 from skill_runtime.ros2.names import LATCHED

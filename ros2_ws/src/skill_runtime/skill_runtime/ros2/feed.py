@@ -8,7 +8,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from skillset_interfaces.srv import GetData
 
-from skill_language.model import Data
+from skill_model.model import Data
 from skill_runtime.plain import carried, message_class
 from skill_runtime.ros2.names import LATCHED
 from skill_runtime.ros2.questions import Questions

@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2.convert import inputs_from_values, values_from_json

@@ -23,8 +23,8 @@ from rclpy.utilities import remove_ros_args
 
 from skill_language.errors import LanguageError
 from skill_language.load import load_robot
-from skill_language.model import Skillset
 from skill_language.robot import Robot
+from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock import Behaviour, Play, load_behaviour, starter
 from skill_runtime.ros2.data_manager import DataBindings

@@ -13,8 +13,8 @@ from rclpy.node import Node
 from skillset_interfaces.msg import ResourceStates
 from skillset_interfaces.srv import Describe
 
-from skill_language.json_form import from_json
-from skill_language.model import Skillset
+from skill_model.json_form import from_json
+from skill_model.model import Skillset
 from skill_runtime.ros2.names import ALIVE, action_module, action_type
 from skill_runtime.ros2.resting_action import RestingActionClient
 

@@ -17,7 +17,7 @@ from typing import Any
 from rclpy.action.client import ClientGoalHandle
 from unique_identifier_msgs.msg import UUID
 
-from skill_runtime.core.execution import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.handle import SkillHandle
 from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.skill_manager import execution_id

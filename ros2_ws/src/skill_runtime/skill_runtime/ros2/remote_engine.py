@@ -13,10 +13,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from skill_language.model import Skillset
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.core.execution import Execution, ExecutionState
+from skill_runtime.core.execution import Execution
 from skill_runtime.core.hook_calls import HookAnswer, call_hook
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.plain import to_plain

@@ -13,8 +13,8 @@ from typing import Any
 from rclpy.node import Node
 from skillset_interfaces.srv import Describe
 
-from skill_language.json_form import to_json
-from skill_language.model import Skillset
+from skill_model.json_form import to_json
+from skill_model.model import Skillset
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import EngineEvent

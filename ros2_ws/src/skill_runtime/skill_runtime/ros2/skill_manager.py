@@ -15,9 +15,10 @@ from rclpy.action.server import GoalEvent, RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
-from skill_language.model import Skill, Skillset
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skill, Skillset
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.core.execution import Execution, ExecutionState
+from skill_runtime.core.execution import Execution
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2.convert import fill, values_of
 from skill_runtime.ros2.names import GOALS

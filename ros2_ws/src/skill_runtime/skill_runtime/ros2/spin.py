@@ -15,7 +15,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from skill_language.model import Skillset
+from skill_model.model import Skillset
 from skill_runtime.ros2.data_manager import DataBindings
 from skill_runtime.ros2.manager_node import HooksFactory, SkillsetNode
 from skill_runtime.ros2.processes import RESOURCES, end_with, supervise, wait_for

@@ -11,7 +11,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from skillset_interfaces.msg import Event, SkillStates
 
-from skill_language.model import Data
+from skill_model.model import Data
 from skill_runtime.callbacks import Callbacks
 from skill_runtime.handle import SkillHandle
 from skill_runtime.ros2.feed import TopicFeed

@@ -16,9 +16,9 @@ from enum import Enum
 from functools import cache
 from typing import Any
 
-from skill_language import model
-from skill_language.errors import Diagnostic, LanguageError
-from skill_language.model import Skillset, Span
+from skill_model import model
+from skill_model.errors import ModelFormatError
+from skill_model.model import Skillset, Span
 
 _CONDITIONS: dict[str, type] = {
     "resource": model.ResourceIs,
@@ -40,13 +40,13 @@ def to_json(skillset: Skillset, *, indent: int | None = None) -> str:
 
 
 def from_json(text: str) -> Skillset:
-    """Return the model that ``to_json`` wrote; raise LanguageError (ALU004) naming the place when it is none."""
+    """Return the model that ``to_json`` wrote; raise ModelFormatError naming the place when it is none."""
     try:
         value = json.loads(text)
         return typing.cast("Skillset", _decode(value, Skillset, "skillset", 0))
     except (_NoModelError, ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise LanguageError([Diagnostic("ALU004", f"this JSON is no skillset: {reason}")]) from error
+        raise ModelFormatError(f"this JSON is no skillset: {reason}") from error
 
 
 class _NoModelError(Exception):

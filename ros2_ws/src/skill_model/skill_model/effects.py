@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from skill_language.arrows import may_go
-from skill_language.model import Effect, Event, Skillset
-from skill_runtime.core.conditions import States
-from skill_runtime.core.errors import EffectError
-from skill_runtime.core.situation import Change, Running, Situation
+from skill_model.arrows import may_go
+from skill_model.conditions import States
+from skill_model.errors import EffectError
+from skill_model.model import Effect, Event, Skillset
+from skill_model.situation import Change, Running, Situation
 
 
 def effect_changes(skillset: Skillset, execution: Running, effect: Effect, place: str, states: States) -> tuple[Change, ...]:

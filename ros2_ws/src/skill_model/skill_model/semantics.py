@@ -9,7 +9,7 @@ violation's effect and the violated state. Executions break in the order in whic
 after the same change in the order of their start, each by the first false invariant of the model. An execution once found
 broken ends so, even if the effect of another would have mended its invariant: it was false.
 
-What resources alone make false comes first. When nothing of that is left, what data and time have broken (see ``patience``)
+What resources alone make false comes first. When nothing of that is left, what data and time have broken (see ``deadlines``)
 ends one execution after another, in the order of their start, each with all that its end breaks.
 """
 
@@ -18,14 +18,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from skill_language.model import Event, Expression, Skill, Skillset
-from skill_runtime.core import patience
-from skill_runtime.core.conditions import Data, States, data_of, holds, in_si, judge, present
-from skill_runtime.core.effects import after, effect_changes, event_changes, given_back, without
-from skill_runtime.core.errors import DataMissingError, EffectError, UnsupportedModelError
-from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.settling import settle, violate
-from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
+from skill_model import deadlines
+from skill_model.conditions import Data, States, data_of, holds, in_si, judge, present
+from skill_model.effects import after, effect_changes, event_changes, given_back, without
+from skill_model.errors import DataMissingError, EffectError, UnsupportedModelError
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Event, Expression, Skill, Skillset
+from skill_model.propagation import propagate, violate
+from skill_model.situation import Change, Entered, Running, Situation, Step
 
 __all__ = [
     "EXTERN",
@@ -96,7 +96,7 @@ def start(skillset: Skillset, situation: Situation, execution: Running) -> Step:
     except EffectError as error:
         return Step(situation, (Entered(execution, ExecutionState.NOT_READY, "", str(error)),))
     begun = replace(situation, states=after(situation.states, changes), running=(*situation.running, execution))
-    return settle(skillset, Step(progressed(skillset, begun, execution), (*changes, Entered(execution, ExecutionState.RUNNING))))
+    return propagate(skillset, Step(progressed(skillset, begun, execution), (*changes, Entered(execution, ExecutionState.RUNNING))))
 
 
 def extern_refusal(skillset: Skillset, situation: Situation, resource: str, target: str) -> str:
@@ -116,7 +116,7 @@ def extern_refusal(skillset: Skillset, situation: Situation, resource: str, targ
 def transition(skillset: Skillset, situation: Situation, resource: str, target: str) -> Step:
     """Take an extern transition that ``extern_refusal`` does not refuse."""
     change = Change(resource, situation.states[resource], target, EXTERN)
-    return settle(skillset, Step(replace(situation, states=after(situation.states, (change,))), (change,)))
+    return propagate(skillset, Step(replace(situation, states=after(situation.states, (change,))), (change,)))
 
 
 def event_refusal(skillset: Skillset, situation: Situation, name: str) -> str:
@@ -137,17 +137,17 @@ def event(skillset: Skillset, situation: Situation, name: str) -> Step:
     """Take an event that ``event_refusal`` does not refuse."""
     found = _event(skillset, name)
     changes = event_changes(skillset, found, situation.states) if found is not None else ()
-    return settle(skillset, Step(replace(situation, states=after(situation.states, changes)), changes))
+    return propagate(skillset, Step(replace(situation, states=after(situation.states, changes)), changes))
 
 
 def receive(skillset: Skillset, situation: Situation, data: str, value: object | None) -> Step:
     """Take a fresh value of a data, or (None) the loss of it."""
-    return settle(skillset, Step(patience.with_value(skillset, situation, data, value)))
+    return propagate(skillset, Step(deadlines.with_value(skillset, situation, data, value)))
 
 
 def elapse(skillset: Skillset, situation: Situation) -> Step:
     """Let the situation's time have come: what it has broken is ended."""
-    return settle(skillset, Step(situation))
+    return propagate(skillset, Step(situation))
 
 
 def progressed(skillset: Skillset, situation: Situation, execution: Running) -> Situation:
@@ -178,7 +178,7 @@ def terminate(skillset: Skillset, situation: Situation, execution: Running, resu
     states = after(situation.states, changes)
     ended = Entered(execution, ExecutionState.TERMINATED, result.name, message)
     entered = _if_fulfilled(ended, result.postcondition, f"{skill.name} {result.name}", replace(situation, states=states))
-    return settle(skillset, Step(without(situation, execution, states), (*changes, entered)))
+    return propagate(skillset, Step(without(situation, execution, states), (*changes, entered)))
 
 
 def interrupt(skillset: Skillset, situation: Situation, execution: Running, message: str = "") -> Step:
@@ -192,7 +192,7 @@ def interrupt(skillset: Skillset, situation: Situation, execution: Running, mess
     ended = Entered(execution, ExecutionState.INTERRUPTED, "", message)
     where = f"the interruption of {skill.name}"
     entered = _if_fulfilled(ended, skill.interrupt.postcondition, where, replace(situation, states=states))
-    return settle(skillset, Step(without(situation, execution, states), (*changes, entered)))
+    return propagate(skillset, Step(without(situation, execution, states), (*changes, entered)))
 
 
 def fail(skillset: Skillset, situation: Situation, execution: Running, message: str) -> Step:
@@ -203,13 +203,13 @@ def fail(skillset: Skillset, situation: Situation, execution: Running, message: 
     """
     changes = given_back(skillset, execution, situation.states)
     entered = Entered(execution, ExecutionState.FAILED, "", message)
-    return settle(skillset, Step(without(situation, execution, after(situation.states, changes)), (*changes, entered)))
+    return propagate(skillset, Step(without(situation, execution, after(situation.states, changes)), (*changes, entered)))
 
 
 def lose(skillset: Skillset, situation: Situation, execution: Running, invariant_name: str) -> Step:
     """Have data or time break an invariant of one running execution: what ``receive`` and ``elapse`` do, value and time aside."""
     invariant = next(one for one in skillset.skill(execution.skill).invariants if one.name == invariant_name)
-    return settle(skillset, violate(skillset, Step(situation), execution, invariant, invariant_name))
+    return propagate(skillset, violate(skillset, Step(situation), execution, invariant, invariant_name))
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------

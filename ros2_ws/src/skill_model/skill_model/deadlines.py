@@ -17,9 +17,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from skill_language.model import DataIs, Invariant, Skill, Skillset
-from skill_runtime.core.conditions import judge
-from skill_runtime.core.situation import Running, Situation
+from skill_model.conditions import judge
+from skill_model.model import DataIs, Invariant, Skill, Skillset
+from skill_model.situation import Running, Situation
 
 NS_PER_S = 1_000_000_000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from skill_language.model import Effect, Resource
+from skill_model.model import Effect, Resource
 
 
 def may_go(resource: Resource, source: str, target: str, *, any_arrow: bool) -> bool:

@@ -7,9 +7,9 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from skill_language.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
-from skill_language.units import UNIT_IN_SI
-from skill_runtime.core.errors import DataMissingError, UnsupportedModelError
+from skill_model.errors import DataMissingError, UnsupportedModelError
+from skill_model.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
+from skill_model.units import UNIT_IN_SI
 
 States = Mapping[str, str]
 Data = Mapping[str, object]

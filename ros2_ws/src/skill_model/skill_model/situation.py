@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from skill_runtime.core.conditions import NO_DATA, Data, States
-from skill_runtime.core.execution import ExecutionState
+from skill_model.conditions import NO_DATA, Data, States
+from skill_model.execution_state import ExecutionState
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Running:
 class Situation:
     """All that the next step depends on; ``running`` is in the order of the start.
 
-    ``now_ns`` is the mission clock, ``data`` the fresh values by name. What is remembered (see ``patience``): ``fallen``, the
+    ``now_ns`` is the mission clock, ``data`` the fresh values by name. What is remembered (see ``deadlines``): ``fallen``, the
     invariants (skill, name) whose value fell through the threshold and has not recovered; ``false_since``, when an invariant that
     may be false for a while became false for an execution; ``progressed``, when the execution of this id last made progress.
     """

@@ -1,23 +1,23 @@
-"""What a step breaks, until nothing more is broken (see ``semantics`` for the order)."""
+"""Invariant propagation: what a step breaks, until nothing more is broken (see ``semantics`` for the order)."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from skill_language.model import Invariant, Skill, Skillset
-from skill_runtime.core.conditions import NO_DATA, States, judge, present
-from skill_runtime.core.effects import after, effect_changes, given_back, without
-from skill_runtime.core.errors import EffectError
-from skill_runtime.core.execution import ExecutionState
-from skill_runtime.core.patience import good, is_due, is_stuck, waits, watch
-from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
+from skill_model.conditions import NO_DATA, States, judge, present
+from skill_model.deadlines import good, is_due, is_stuck, waits, watch
+from skill_model.effects import after, effect_changes, given_back, without
+from skill_model.errors import EffectError
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Invariant, Skill, Skillset
+from skill_model.situation import Change, Entered, Running, Situation, Step
 
 
-def settle(skillset: Skillset, step: Step) -> Step:
+def propagate(skillset: Skillset, step: Step) -> Step:
     """End every running execution whose invariant is broken, with its effect, and every one that is stuck, until none is left."""
     before = step.situation
     while True:
-        step, undecided = _settle_at_once(skillset, step)
+        step, undecided = _propagate_resources(skillset, step)
         if not (undecided or before.false_since or before.progressed):
             return step
         step = replace(step, situation=watch(skillset, step.situation, before))
@@ -55,8 +55,8 @@ def false_invariant(skill: Skill, states: States) -> tuple[Invariant | None, boo
 # --- what resources decide --------------------------------------------------------------------------------------------
 
 
-def _settle_at_once(skillset: Skillset, step: Step) -> tuple[Step, bool]:
-    """Settle what resources alone decide; tell whether data or time decide anything of what runs on."""
+def _propagate_resources(skillset: Skillset, step: Step) -> tuple[Step, bool]:
+    """End what resources alone have broken; tell whether data or time decide anything of what runs on."""
     found: dict[Running, tuple[Invariant, str]] = {}
     while True:
         undecided = False

@@ -1,0 +1,33 @@
+"""The states of an execution (paper, Figure 5)."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class ExecutionState(Enum):
+    """Where an execution is. PAUSED and INTERRUPTING are phases of running: invariants are watched and resources held."""
+
+    REQUESTED = "REQUESTED"
+    RUNNING = "RUNNING"
+    PAUSED = "PAUSED"
+    INTERRUPTING = "INTERRUPTING"
+    NOT_VALIDATED = "NOT_VALIDATED"
+    NOT_READY = "NOT_READY"
+    RESOURCE_INVARIANT_VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
+    INTERRUPTED = "INTERRUPTED"
+    TERMINATED = "TERMINATED"
+    FAILED = "FAILED"
+
+    @property
+    def terminal(self) -> bool:
+        """Tell whether nothing follows."""
+        return not (self is ExecutionState.REQUESTED or self.active)
+
+    @property
+    def active(self) -> bool:
+        """Tell whether the execution has started and not ended."""
+        return self in _ACTIVE
+
+
+_ACTIVE = frozenset({ExecutionState.RUNNING, ExecutionState.PAUSED, ExecutionState.INTERRUPTING})

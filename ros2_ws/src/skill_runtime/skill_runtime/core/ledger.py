@@ -1,0 +1,154 @@
+"""What is the case in a skillset now: the situation, since when, and the executions that are not through.
+
+Not safe for threads: the engine calls it with its lock held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from skill_model import semantics
+from skill_model.deadlines import due_ns
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skillset
+from skill_model.situation import Change, Entered, Running, Situation, Step
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from skill_runtime.core.execution import Execution
+
+
+@dataclass(frozen=True)
+class ResourceStatus:
+    """A resource at one moment; ``previous`` is empty and ``stamp_ns`` that of the engine's start before the first transition."""
+
+    state: str
+    previous: str
+    stamp_ns: int
+
+
+@dataclass(eq=False)
+class Entry:
+    """An execution that has not ended, or one of whose hooks that no stop overtakes has not returned."""
+
+    execution: Execution
+    key: Running
+    dispatching: bool = False
+    """Whether ``on_dispatch``, ``on_pause`` or ``on_resume`` is being called."""
+    stop_hook: str = ""
+    """The one hook that stops the function, once it is decided on; called at once, or after the hook that is being called."""
+    waiting: list[Callable[[], None]] = field(default_factory=list)
+    """Pauses and resumptions that were asked for while a hook was being called; they come after it, and after a stop."""
+
+
+class Ledger:
+    """Records steps; every change comes out as an event, numbered from 1 without gaps, through ``publish``."""
+
+    def __init__(self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None]) -> None:
+        self._clock_ns = clock_ns
+        self._publish = publish
+        self._skillset = skillset
+        self._situation = semantics.initial(skillset)
+        born_ns = clock_ns()
+        self.resources = {name: ResourceStatus(state, "", born_ns) for name, state in self._situation.states.items()}
+        self.entries: dict[str, Entry] = {}
+        self.sequence = 0
+
+    @property
+    def situation(self) -> Situation:
+        """Return the situation now."""
+        return replace(self._situation, now_ns=self._clock_ns())
+
+    @property
+    def due_ns(self) -> int | None:
+        """Return when time alone next changes something."""
+        return due_ns(self._skillset, self._situation)
+
+    def progressed(self, entry: Entry) -> None:
+        """Record that a running execution has made progress now."""
+        self._situation = semantics.progressed(self._skillset, self.situation, entry.key)
+
+    def interrupting(self, entry: Entry) -> None:
+        """Record that an execution is being interrupted: no progress is expected any more."""
+        self._situation = semantics.interrupting(self._situation, entry.key)
+
+    def add(self, execution: Execution) -> Entry:
+        """Record a request."""
+        entry = Entry(execution, Running(execution.id, execution.skill))
+        self.entries[execution.id] = entry
+        self._publish([self._entered(execution)])
+        return entry
+
+    def running(self, execution_id: str) -> Entry | None:
+        """Return the entry of an execution that has started and not ended."""
+        entry = self.entries.get(execution_id)
+        return entry if entry is not None and entry.execution.state.active else None
+
+    def enter_phase(self, entry: Entry, phase: ExecutionState) -> None:
+        """Record that an execution runs on in another phase."""
+        entry.execution.state = phase
+        self._publish([self._entered(entry.execution)])
+
+    def commit(self, step: Step, *, by_itself: Entry | None = None) -> list[Entry]:
+        """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
+        self._situation = step.situation
+        events: list[EngineEvent] = []
+        ended: list[Entry] = []
+        for happening in step.happenings:
+            if isinstance(happening, Change):
+                events.append(self._changed(happening))
+                continue
+            entry = self.entries[happening.execution.id]
+            _set_state(entry.execution, happening)
+            events.append(self._entered(entry.execution))
+            if entry.execution.done:
+                ended.append(entry)
+        self._publish(events)
+        for entry in ended:
+            self.forget_if_through(entry)
+        return [entry for entry in ended if entry is not by_itself and self._stop_now(entry)]
+
+    def end_request(self, entry: Entry, state: ExecutionState, message: str) -> None:
+        """End an execution that never started."""
+        _set_state(entry.execution, Entered(entry.key, state, "", message))
+        self._publish([self._entered(entry.execution)])
+        self.forget_if_through(entry)
+
+    def forget_if_through(self, entry: Entry) -> None:
+        """Drop an execution of which nothing is to come any more."""
+        if entry.execution.done and not entry.dispatching:
+            self.entries.pop(entry.key.id, None)
+
+    @staticmethod
+    def _stop_now(entry: Entry) -> bool:
+        """Decide on the stop hook of an execution that was ended, unless one is; tell whether it may be called at once."""
+        if entry.stop_hook:
+            return False
+        entry.stop_hook = "on_failure" if entry.execution.state is ExecutionState.FAILED else "on_violation"
+        return not entry.dispatching
+
+    def _changed(self, change: Change) -> TransitionEvent:
+        self.sequence += 1
+        now_ns = self._clock_ns()
+        self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns)
+        return TransitionEvent(self.sequence, now_ns, change.resource, change.source, change.target, change.cause)
+
+    def _entered(self, execution: Execution) -> ExecutionEvent:
+        self.sequence += 1
+        return ExecutionEvent(
+            sequence=self.sequence,
+            stamp_ns=self._clock_ns(),
+            skill=execution.skill,
+            id=execution.id,
+            state=execution.state,
+            result=execution.result,
+            message=execution.message,
+            inputs=execution.inputs,
+            outputs=dict(execution.outputs),
+        )
+
+
+def _set_state(execution: Execution, entered: Entered) -> None:
+    """Write the state last: who sees that the execution has ended sees why."""
+    execution.result = entered.result
+    execution.message = entered.message
+    execution.state = entered.state
