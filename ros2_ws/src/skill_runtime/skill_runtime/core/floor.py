@@ -6,10 +6,10 @@ import functools
 import threading
 from collections.abc import Callable, Sequence
 
-from skill_language.model import Skillset
-from skill_runtime.core import semantics
+from skill_model import semantics
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, Listener
-from skill_runtime.core.execution import ExecutionState
 from skill_runtime.core.hook_calls import HookAnswer, HookCaller
 from skill_runtime.core.ledger import Entry, Ledger
 from skill_runtime.core.outbox import Outbox

@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from skill_language.model import Skillset
-from skill_runtime.core import semantics
+from skill_model import semantics
+from skill_model.deadlines import due_ns
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skillset
+from skill_model.situation import Change, Entered, Running, Situation, Step
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from skill_runtime.core.execution import Execution, ExecutionState
-from skill_runtime.core.patience import due_ns
-from skill_runtime.core.situation import Change, Entered, Running, Situation, Step
+from skill_runtime.core.execution import Execution
 
 
 @dataclass(frozen=True)

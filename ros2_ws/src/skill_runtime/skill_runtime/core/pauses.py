@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from skill_runtime.core.execution import ExecutionState
+from skill_model.execution_state import ExecutionState
 from skill_runtime.core.floor import Floor
 from skill_runtime.core.ledger import Entry
 from skill_runtime.core.stops import Stops

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from skill_runtime.core import semantics
-from skill_runtime.core.execution import ExecutionState
+from skill_model import semantics
+from skill_model.execution_state import ExecutionState
 from skill_runtime.core.floor import Floor
 from skill_runtime.core.ledger import Entry
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from skill_runtime.core import semantics
+from skill_model import semantics
+from skill_model.execution_state import ExecutionState
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.core.execution import Controller, Execution, ExecutionState
+from skill_runtime.core.execution import Controller, Execution
 from skill_runtime.core.floor import Floor, Job
 from skill_runtime.core.ledger import Entry
 from skill_runtime.core.stops import Stops
