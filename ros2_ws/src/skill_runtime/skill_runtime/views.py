@@ -5,6 +5,7 @@ The generated clients (``<skillset>_managers.client``, ``<robot>_client``) are t
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, cast
@@ -46,6 +47,11 @@ class DataReading:
     stale: bool
     stamp_ns: int
     value_json: str
+
+    @property
+    def value(self) -> Any:
+        """The value, as JSON has it; None when nothing was received."""
+        return json.loads(self.value_json) if self.value_json else None
 
 
 class DataFeed(Protocol):

@@ -90,7 +90,7 @@ def test_changes_come_before_events_before_results():
     world.run_for(0.0)
     order: list[str] = []
     client.on_change(lambda resources: order.append(resources["axes"]))
-    client.on_event(lambda _, event: order.append(event.state.value if isinstance(event, ExecutionEvent) else event.resource))
+    client.on_event(lambda event: order.append(event.state.value if isinstance(event, ExecutionEvent) else event.resource))
     handle = client.start("takeoff", height=3.0)
     handle.add_done_callback(lambda _: order.append("result"))
     handle.wait(2.0)

@@ -74,18 +74,18 @@ def test_data_are_fresh_until_three_periods_have_passed():
     world, client = make(skillset)
     values: list = []
     client.data_feed("battery").on_sample(lambda sample: values.append(sample.value))
-    assert not client.get_data("nosuch").known
-    assert not client.get_data("battery").received
+    assert not client.read_data("nosuch").get(1.0).known
+    assert not client.read_data("battery").get(1.0).received
     blind = client.start("takeoff", height=3.0)
     assert blind.wait(0.0)
     assert (blind.outcome, blind.message) == ("NOT_READY", "charged: battery has no fresh value")
     world.managers["flying"].publish("battery", 0.5)
     world.run_for(3.0)
-    reading = client.get_data("battery")
+    reading = client.read_data("battery").get(1.0)
     assert (reading.received, reading.stale, reading.value, reading.stamp_ns) == (True, False, 0.5, 0)
     assert client.start("takeoff", height=3.0).wait(5.0)
     world.run_for(0.1)
-    assert client.get_data("battery").stale
+    assert client.read_data("battery").get(1.0).stale
     assert values == [0.5]
     with pytest.raises(KeyError, match="no data nosuch; it has battery"):
         world.managers["flying"].publish("nosuch", 1)
@@ -138,7 +138,7 @@ def test_missing_outputs_are_as_in_an_empty_message():
 def test_records_are_those_of_the_event_messages():
     _, client = make()
     records: list = []
-    client.on_event(lambda skillset, event: records.append(event_record(skillset, event)))
+    client.on_event(lambda event: records.append(event_record("flying", event)))
     assert client.start("takeoff", height=3.0).wait(2.0)
     requested, taken = records[0], records[1]
     assert json.loads(json.dumps(requested)) == {

@@ -28,7 +28,7 @@ def play(steps, latency_s: float):
     clients = [world.client("flying") for _ in range(2)]
     story, handles = [], []
     for name in world.managers:
-        world.client(name).on_event(lambda skillset, event: story.append(event_record(skillset, event)))
+        world.client(name).on_event(lambda event, name=name: story.append(event_record(name, event)))
     for what, value in steps:
         if what == "start":
             handles.append(clients[value].start("takeoff", height=3.0))

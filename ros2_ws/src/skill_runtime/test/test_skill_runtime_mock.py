@@ -242,14 +242,14 @@ def test_data_follow_their_steps_and_their_formulas(read):
     )
     mocked = Mocked(behaviour)
     seen: list = []
-    first = mocked.client.get_data("battery")
+    first = mocked.client.read_data("battery").get(1.0)
     assert (first.value, first.stamp_ns) == (1.0, 0)
     mocked.client.data_feed("battery").on_sample(lambda sample: seen.append((mocked.world.now_s, sample.value)))
     mocked.world.run_for(20.0)
-    assert [(moment, round(value, 9)) for moment, value in seen] == [(1, 1.0), (2, 1.0), (3, 0.7), (4, 0.6), (5, 0.5)]
-    assert mocked.client.get_data("battery").stale
-    pose = mocked.client.get_data("pose").value
-    assert (pose.place.x, pose.place.y, pose.marks) == (7, 0.5, [1, 7])
+    assert [(moment, round(value, 9)) for moment, value in seen] == [(0, 1.0), (1, 1.0), (2, 1.0), (3, 0.7), (4, 0.6), (5, 0.5)]
+    assert mocked.client.read_data("battery").get(1.0).stale
+    pose = mocked.client.read_data("pose").get(1.0).value
+    assert pose == {"place": {"x": 7, "y": 0.5}, "marks": [1, 7]}
 
 
 def test_a_formula_without_a_value_ends_the_execution_and_says_so(read):
@@ -371,7 +371,7 @@ def test_whatever_the_script_every_execution_ends_once_and_the_story_repeats(rul
     def story():
         mocked = Mocked(Behaviour(rules={("flying", "takeoff"): tuple(rules)}), seed=seed)
         told = []
-        mocked.client.on_event(lambda skillset, event: told.append(event_record(skillset, event)))
+        mocked.client.on_event(lambda event: told.append(event_record("flying", event)))
         handles = []
         for gap_s in gaps:
             handles.append(mocked.client.start("takeoff", height=3.0))

@@ -25,8 +25,8 @@ class NoneStage:
         self._heard: list[dict[str, Any]] = []
         self._world.client(SKILLSET.name).on_event(self._hear)
 
-    def _hear(self, skillset: str, event: EngineEvent) -> None:
-        self._heard.append(event_record(skillset, event))
+    def _hear(self, event: EngineEvent) -> None:
+        self._heard.append(event_record(SKILLSET.name, event))
 
     def client(self) -> Client:
         """Return a new client that is ready."""

@@ -1,14 +1,11 @@
 """The skillset interface without any middleware: managers and clients of many skillsets in one process, in virtual time."""
 
-from skill_runtime.local.client import LocalClient
 from skill_runtime.local.clock import Timer, VirtualClock, WorldError
-from skill_runtime.local.data import DataReading
 from skill_runtime.local.managers import LocalManagers
 from skill_runtime.local.records import event_record
-from skill_runtime.local.world import LocalWorld
+from skill_runtime.local.world import LocalClient, LocalWorld
 
 __all__ = [
-    "DataReading",
     "LocalClient",
     "LocalManagers",
     "LocalWorld",

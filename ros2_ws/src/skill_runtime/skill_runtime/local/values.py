@@ -28,14 +28,14 @@ def fit(parameters: Sequence[Parameter], values: Mapping[str, object], place: st
     declared = {parameter.name: parameter for parameter in parameters}
     for name in values:
         fitting.check_name(name, declared, place)
-    return {name: _fitting(_ros_type(declared[name], types), value, f"{place}, {name}") for name, value in values.items()}
+    return {name: _fitting(ros_type(declared[name], types), value, f"{place}, {name}") for name, value in values.items()}
 
 
 def complete(parameters: Sequence[Parameter], values: Mapping[str, object], types: Types) -> dict[str, object]:
     """Return values with those that are missing as an empty message has them; a message's fields are not known here."""
     empty: dict[str, object] = {}
     for parameter in parameters:
-        ros = _ros_type(parameter, types)
+        ros = ros_type(parameter, types)
         if ros.array:
             empty[parameter.name] = []
         elif not ros.package and ros.name in PRIMITIVES:
@@ -48,7 +48,8 @@ def complete(parameters: Sequence[Parameter], values: Mapping[str, object], type
 _EMPTY: Mapping[str, object] = {"bool": False, "int": 0, "float": 0.0, "str": ""}
 
 
-def _ros_type(parameter: Parameter, types: Types) -> RosType:
+def ros_type(parameter: Parameter, types: Types) -> RosType:
+    """Return what a parameter's type is in ROS."""
     return types.get(parameter.type) or RosType("", parameter.type)
 
 

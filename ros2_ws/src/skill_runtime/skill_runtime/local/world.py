@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-import itertools
+import functools
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from typing import TypeVar
 
 from skill_model.model import Skillset
+from skill_runtime.client import Client
+from skill_runtime.core.events import EngineEvent
 from skill_runtime.hooks import SkillHooks
-from skill_runtime.local.client import LocalClient, OnEvent
-from skill_runtime.local.clock import NANOSECONDS, Job, VirtualClock, WorldError
+from skill_runtime.local.clock import NANOSECONDS, VirtualClock, WorldError
 from skill_runtime.local.managers import HooksFactory, LocalManagers
+from skill_runtime.local.middleware import Bus, VirtualMiddleware
 from skill_runtime.local.values import Types
+from skill_runtime.middleware import EVENTS, Told
 
 T = TypeVar("T")
+OnEvent = Callable[[str, EngineEvent], None]
+
+
+class LocalClient(Client):
+    """The client of a skillset in the same process."""
+
+    def __init__(self, bus: Bus, name: str) -> None:
+        super().__init__(VirtualMiddleware(bus, name), name)
 
 
 class LocalWorld:
@@ -38,11 +49,8 @@ class LocalWorld:
         types: Types | None = None,
     ) -> None:
         self.clock = VirtualClock(start_s)
-        self.types: Types = types or {}
         self.managers: dict[str, LocalManagers] = {}
-        self._latency_s = latency_s
-        self._clients: list[LocalClient] = []
-        self._ids = itertools.count(1)
+        self._bus = Bus(self.clock, lambda condition, timeout_s: self.run_until(condition, timeout_s=timeout_s), types or {}, latency_s)
         self._running = False
         for skillset in skillsets:
             if make_hooks is None:
@@ -71,20 +79,12 @@ class LocalWorld:
         before = self.managers.get(skillset.name)
         if before is not None and before.alive:
             raise WorldError(f"the managers of {skillset.name} are there already; kill them first")
-        managers = self.managers[skillset.name] = LocalManagers(self.clock, skillset, make_hooks)
-        for client in self._clients:
-            if client.skillset == skillset.name:
-                client.meet(managers)
+        managers = self.managers[skillset.name] = LocalManagers(self._bus, skillset, make_hooks)
         return managers
 
     def client(self, name: str) -> LocalClient:
         """Make a client of a skillset, which may be served later."""
-        client = LocalClient(self, name)
-        self._clients.append(client)
-        managers = self.managers.get(name)
-        if managers is not None and managers.alive:
-            client.meet(managers)
-        return client
+        return LocalClient(self._bus, name)
 
     def kill(self, name: str) -> None:
         """End managers without a word, like ``kill -9``; their clients learn that they have gone.
@@ -95,12 +95,12 @@ class LocalWorld:
         managers = self.managers.get(name)
         if managers is None or not managers.alive:
             raise WorldError(f"there are no managers of {name} to kill; there are {', '.join(self.managers) or 'none'}")
-        managers.vanish(f"the managers of {name} have gone")
+        managers.vanish()
 
     def on_event(self, callback: OnEvent) -> None:
         """Have ``callback(skillset, event)`` called for each event of the skillsets that are served now."""
         for name in self.managers:
-            self.client(name).on_event(callback)
+            VirtualMiddleware(self._bus, name).subscribe(EVENTS, functools.partial(_pass_on, callback, name))
 
     # --- time --------------------------------------------------------------------------------------------------------
 
@@ -149,12 +149,6 @@ class LocalWorld:
             raise WorldError(f"the coroutine has not ended within {timeout_s:g} s")
         return returned[0]
 
-    # --- for clients -------------------------------------------------------------------------------------------------
 
-    def send(self, message: Job) -> None:
-        """Have a message arrive after the latency; messages never overtake each other."""
-        self.clock.after(self._latency_s, message)
-
-    def next_id(self) -> str:
-        """Return an execution's id, 12 hexadecimal digits as on ROS 2, but counted."""
-        return f"{next(self._ids):012x}"
+def _pass_on(callback: OnEvent, name: str, told: Told) -> None:
+    callback(name, told.event)

@@ -1,0 +1,177 @@
+"""Follows one goal from its sending to its end."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from skill_model.execution_state import ExecutionState
+from skill_runtime.core.events import ExecutionEvent
+from skill_runtime.handle import SkillHandle
+from skill_runtime.middleware import ActionLink, Ending, Middleware
+from skill_runtime.waiting import Pending
+
+ACKNOWLEDGE_S = 5.0
+"""Managers take any goal at once; no sign of it or of anything else for so long (wall clock) means that there will be none."""
+ACKNOWLEDGE_LIMIT = 12
+"""So many times as long where the managers are heard of other goals all the time."""
+SILENCE_S = 10.0
+"""Managers that took a goal tell of it; after so long without a word its ending is asked for."""
+GRACE_S = 0.5
+"""An end waits so long for what belongs to it and comes another way: the resources after the step, the event."""
+
+
+class News(Protocol):
+    """What a goal needs to know of its client."""
+
+    @property
+    def states_after(self) -> int:
+        """The number of the last event that the known resources include."""
+        ...
+
+    @property
+    def heard(self) -> int:
+        """How many messages of the managers were heard."""
+        ...
+
+
+class GoalTracker:
+    """One goal; ``handle`` is what the caller gets. All but ``_interrupt`` runs on the middleware's loop.
+
+    ``on_over(tracker, orphan)`` is called at its end; ``orphan``: the handle gave up, and the managers may still run the goal.
+    """
+
+    def __init__(
+        self,
+        middleware: Middleware,
+        skillset: str,
+        skill: str,
+        link: ActionLink,
+        news: News,
+        *,
+        pause: Callable[[str, bool], Pending[str]],
+        on_over: Callable[[GoalTracker, bool], None],
+    ) -> None:
+        identifier = middleware.new_id()
+        self.handle = SkillHandle(skill, identifier, self._interrupt, pause=lambda paused: pause(identifier, paused), host=middleware.host)
+        self.link = link
+        self.life = ""
+        """The managers that have acknowledged it; empty before."""
+        self._middleware = middleware
+        self._skillset = skillset
+        self._news = news
+        self._on_over = on_over
+        self._lock = threading.Lock()
+        self._acknowledged = False
+        self._interrupt_wanted = False
+        self._end: tuple[int, Ending] | None = None
+        self._looks = 0
+        self._heard = news.heard
+        self._timer = middleware.later(ACKNOWLEDGE_S, self._look)
+        self._feedback: tuple[float, Mapping[str, object]] = (0.0, {})
+
+    def send(self, goal: Any) -> None:
+        """Send the goal."""
+        self.link.send(self.handle.id, goal, self._on_answer)
+
+    def on_event(self, event: ExecutionEvent, life: str, after: int) -> None:
+        """Take an event of this execution; its end is told when the resources are known as they were after event ``after``."""
+        self.life = life
+        self._acknowledge()
+        self._timer.cancel()
+        if not event.state.terminal:
+            if event.state is not ExecutionState.REQUESTED:
+                self.handle.enter(event.state)
+            return
+        outputs = self.link.outputs_of(_plain(event.outputs))
+        self._end = (after, Ending(event.state, event.result, event.message, outputs))
+        self.settle()
+        if not self.handle.done:
+            self._timer = self._middleware.later(GRACE_S, self._finish)
+
+    def on_feedback(self, progress: float, outputs: Mapping[str, object]) -> None:
+        """Take a feedback of this execution."""
+        self._acknowledge()
+        if (progress, outputs) != self._feedback or self.handle.state is ExecutionState.REQUESTED:
+            self._feedback = (progress, dict(outputs))
+            self.handle.run(progress, outputs)
+
+    def on_ending(self, ending: Ending | None) -> None:
+        """Take the ending as the action tells it; the event of the same end, which says when it was, is waited for a little."""
+        if ending is None:
+            self.abandon(f"the managers of {self._skillset} do not know this execution; were they started anew?")
+        elif self._end is None and not self.handle.done:
+            self._acknowledge()
+            self._end = (2**63, ending)
+            self._timer.cancel()
+            self._timer = self._middleware.later(GRACE_S, self._finish)
+
+    def settle(self) -> None:
+        """End if that was told and the resources are known as they were then."""
+        if self._end is not None and self._news.states_after >= self._end[0]:
+            self._finish()
+
+    def abandon(self, reason: str, *, orphan: bool = False) -> None:
+        """End because no news will come: as was told last, or else as FAILED for this reason."""
+        if self._end is not None:
+            self._finish()
+            return
+        self._timer.cancel()
+        self._on_over(self, orphan)
+        self.handle.fail(reason)
+
+    # --- inside ------------------------------------------------------------------------------------------------------
+
+    def _on_answer(self, taken: bool) -> None:  # noqa: FBT001 - as the answer has it
+        if taken:
+            self._acknowledge()
+        elif not self._acknowledged:
+            self.abandon(f"the managers of {self._skillset} did not take the goal")
+
+    def _acknowledge(self) -> None:
+        with self._lock:
+            first, self._acknowledged = not self._acknowledged, True
+            cancel = first and self._interrupt_wanted
+        if first and not self.handle.done:
+            self._timer.cancel()
+            self._timer = self._middleware.later(SILENCE_S, self._look)
+        if cancel:
+            self.link.cancel(self.handle.id)
+
+    def _interrupt(self) -> None:
+        """Cancel; not before the goal was acknowledged, as the cancellation might overtake it."""
+        with self._lock:
+            self._interrupt_wanted = True
+            now = self._acknowledged
+        if now:
+            self.link.cancel(self.handle.id)
+
+    def _look(self) -> None:
+        """See what time has brought: nothing was heard of this goal for a while."""
+        if self.handle.done:
+            return
+        if self._acknowledged:
+            # What was told of it may have got lost; who does not know the goal says so.
+            self.link.ask_ending(self.handle.id)
+            self._timer = self._middleware.later(SILENCE_S, self._look)
+            return
+        self._looks += 1
+        heard, self._heard = self._heard, self._news.heard
+        if heard != self._heard and self._looks < ACKNOWLEDGE_LIMIT:
+            self._timer = self._middleware.later(ACKNOWLEDGE_S, self._look)
+        else:
+            self.abandon(f"the managers of {self._skillset} did not answer within {self._looks * ACKNOWLEDGE_S:g} s", orphan=True)
+
+    def _finish(self) -> None:
+        if self._end is None or self.handle.done:
+            return
+        self._timer.cancel()
+        ending = self._end[1]
+        self._on_over(self, False)
+        self.handle.end(ending.state, ending.result, ending.message, ending.outputs)
+
+
+def _plain(outputs: Mapping[str, object]) -> dict[str, object]:
+    """Return outputs without those that JSON has no number for."""
+    return {name: value for name, value in outputs.items() if value is not None}

@@ -1,0 +1,204 @@
+"""What a client hears of the managers of one skillset, dealt with in one order on the middleware's loop.
+
+Topics come in no order with one another. The managers number their events, and tell with their states after which event these are;
+so whoever is told of an execution's end can see the resources as they are after it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+from weakref import WeakSet
+
+from skill_runtime.callbacks import Callbacks
+from skill_runtime.client.connection import Connection
+from skill_runtime.client.goal import GoalTracker
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from skill_runtime.core.records import ExecutionRecord, SkillRecord
+from skill_runtime.middleware import (
+    EVENTS,
+    RESOURCE_STATES,
+    SKILL_STATES,
+    ActionLink,
+    Ending,
+    Middleware,
+    ResourceStates,
+    SkillStates,
+    Told,
+)
+from skill_runtime.waiting import Pending
+
+OnChange = Callable[[dict[str, str]], None]
+OnEvent = Callable[[EngineEvent], None]
+OnSkills = Callable[[dict[str, SkillRecord]], None]
+
+
+class ClientNews:
+    """All that a client knows; the goals that it follows, and those that it has given up and the managers have not."""
+
+    def __init__(self, middleware: Middleware, skillset: str) -> None:
+        self.skillset = skillset
+        self.resources: dict[str, str] = {}
+        self.skills: dict[str, SkillRecord] = {}
+        self.last: dict[str, tuple[int, ExecutionEvent | ExecutionRecord]] = {}
+        self.on_changes: Callbacks[OnChange] = Callbacks()
+        self.on_events: Callbacks[OnEvent] = Callbacks()
+        self.on_skills: Callbacks[OnSkills] = Callbacks()
+        self.states_after = -1
+        self.heard = 0
+        self.closed = ""
+        self.connection = Connection(
+            middleware, skillset, self, on_life=self._on_life, on_alive=self._cancel_orphans, on_gone=self._on_gone
+        )
+        self._middleware = middleware
+        self._lock = threading.Lock()
+        self._open: dict[str, GoalTracker] = {}
+        self._orphans: dict[str, ActionLink] = {}
+        self._pending: WeakSet[Pending[Any]] = WeakSet()
+        self._last_event = self._last_transition = 0
+        self.connection.subscriptions = [
+            middleware.subscribe(RESOURCE_STATES, self._on_states),
+            middleware.subscribe(EVENTS, self._on_told),
+            middleware.subscribe(SKILL_STATES, self._on_skills),
+        ]
+        middleware.watch(self.connection.on_sign, self.connection.on_doubt)
+
+    # --- for the client, from any thread -----------------------------------------------------------------------------
+
+    def follow(self, tracker: GoalTracker, goal: Any) -> None:
+        """Send a goal and follow it to its end."""
+        with self._lock:
+            self._open[tracker.handle.id] = tracker
+        tracker.send(goal)
+
+    def over(self, tracker: GoalTracker, orphan: bool) -> None:  # noqa: FBT001 - as trackers tell it
+        """Follow a goal no more; have it cancelled as soon as the managers are heard of it, when its handle gave up."""
+        with self._lock:
+            self._open.pop(tracker.handle.id, None)
+            if orphan:
+                self._orphans[tracker.handle.id] = tracker.link
+        if not orphan:
+            tracker.link.release(tracker.handle.id)
+
+    def moment(self) -> Pending[Any]:
+        """Return an answer that nobody has given yet; it fails when the managers go."""
+        pending: Pending[Any] = Pending(self._middleware.host)
+        with self._lock:
+            self._pending.add(pending)
+        return pending
+
+    def close(self, reason: str) -> None:
+        """End every wait for this reason; what runs goes on running."""
+        self.closed = self.closed or reason
+        self.connection.close()
+        self._abandon(reason, orphans=False)
+
+    # --- what goals tell ---------------------------------------------------------------------------------------------
+
+    def on_feedback(self, goal_id: str, progress: float, outputs: Mapping[str, object]) -> None:
+        """Take a report of a goal that runs."""
+        tracker = self._open.get(goal_id)
+        if tracker is not None:
+            tracker.on_feedback(progress, outputs)
+
+    def on_ending(self, goal_id: str, ending: Ending | None) -> None:
+        """Take the ending of a goal."""
+        tracker = self._open.get(goal_id)
+        if tracker is not None:
+            tracker.on_ending(ending)
+
+    # --- what topics tell --------------------------------------------------------------------------------------------
+
+    def _on_states(self, states: ResourceStates) -> None:
+        if self.closed or not self.connection.heard(states.life, states.stamp_ns) or states.after <= self.states_after:
+            return
+        self.heard += 1
+        self.states_after = states.after
+        self.resources = {name: value.state for name, value in states.resources.items()}
+        for callback in self.on_changes:
+            callback(dict(self.resources))
+        for tracker in self._trackers():
+            tracker.settle()
+        self.connection.heard_states()
+
+    def _on_told(self, told: Told) -> None:
+        event = told.event
+        # Twice comes what was published while the history of earlier events was on its way.
+        if self.closed or not self.connection.heard(told.life, event.stamp_ns) or event.sequence <= self._last_event:
+            return
+        self.heard += 1
+        gap = event.sequence > self._last_event + 1 and self._last_event > 0
+        self._last_event = event.sequence
+        if isinstance(event, TransitionEvent):
+            self._last_transition = event.sequence
+        if gap:
+            self._ask_endings()
+        # A goal that has ended by an event ends after all others know of the event.
+        for callback in self.on_events:
+            callback(event)
+        if isinstance(event, ExecutionEvent):
+            self._follow_event(event, told.life)
+
+    def _follow_event(self, event: ExecutionEvent, life: str) -> None:
+        if event.state.terminal:
+            self._keep_last(event.skill, event.stamp_ns, event)
+            link = self._orphans.pop(event.id, None)
+            if link is not None:
+                link.release(event.id)
+        elif event.id in self._orphans:
+            self._orphans[event.id].cancel(event.id)
+        tracker = self._open.get(event.id)
+        if tracker is not None:
+            tracker.on_event(event, life, self._last_transition)
+
+    def _on_skills(self, states: SkillStates) -> None:
+        if self.closed or not self.connection.heard(states.life, states.stamp_ns):
+            return
+        self.skills = dict(states.skills)
+        for name, skill in states.skills.items():
+            if skill.last is not None:
+                self._keep_last(name, skill.last.ended_ns, skill.last)
+        for callback in self.on_skills:
+            callback(dict(self.skills))
+
+    def _keep_last(self, skill: str, stamp_ns: int, ended: ExecutionEvent | ExecutionRecord) -> None:
+        if skill not in self.last or self.last[skill][0] <= stamp_ns:
+            self.last[skill] = (stamp_ns, ended)
+
+    # --- life and death ----------------------------------------------------------------------------------------------
+
+    def _on_life(self) -> None:
+        """Forget what was known of earlier managers: these are others."""
+        self._last_event, self._last_transition, self.states_after = 0, 0, -1
+        self.last.clear()
+        self._orphans.clear()
+        for tracker in self._trackers():
+            if tracker.life:
+                tracker.abandon(f"the managers of {self.skillset} were started anew and do not know this execution")
+
+    def _on_gone(self) -> None:
+        self.resources, self.skills = {}, {}
+        self.states_after = -1
+        self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life", orphans=True)
+
+    def _cancel_orphans(self) -> None:
+        for goal_id, link in list(self._orphans.items()):
+            link.cancel(goal_id)
+
+    def _ask_endings(self) -> None:
+        """Make good for events that got lost."""
+        for tracker in self._trackers():
+            tracker.link.ask_ending(tracker.handle.id)
+
+    def _abandon(self, reason: str, *, orphans: bool) -> None:
+        for tracker in self._trackers():
+            tracker.abandon(reason, orphan=orphans)
+        with self._lock:
+            pending = list(self._pending)
+        for one in pending:
+            one.fail(reason)
+
+    def _trackers(self) -> list[GoalTracker]:
+        with self._lock:
+            return list(self._open.values())

@@ -1,0 +1,271 @@
+"""Between the values of the port and the static messages of the skillset interface, in either ROS world.
+
+Their classes take the same words in both worlds; an adapter makes the message and gives it here to be filled, or read.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from skillset_interfaces.msg import (
+    DataValue,
+    Event,
+    ResourceState,
+    ResourceTransition,
+    SkillExecution,
+    SkillState,
+    Unmet,
+)
+from skillset_interfaces.msg import ResourceStates as ResourceStatesMessage
+from skillset_interfaces.msg import SkillStates as SkillStatesMessage
+from skillset_interfaces.srv import Describe, GetData, SetPaused, Transition, TriggerEvent
+from skillset_interfaces.srv import Why as WhyService
+
+from skill_model.execution_state import ExecutionState
+from skill_runtime.core.engine import TransitionReply
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from skill_runtime.core.pauses import PauseReply
+from skill_runtime.core.records import ExecutionRecord, SkillRecord
+from skill_runtime.core.why import Unmet as UnmetPrecondition
+from skill_runtime.core.why import Why
+from skill_runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, ResourceStates, ResourceValue, SkillStates, Told, WhyReply
+from skill_runtime.plain import to_plain
+from skill_runtime.views import DataReading
+
+NANOSECONDS = 1_000_000_000
+
+
+def set_stamp(stamp: Any, stamp_ns: int) -> None:
+    """Set a time of either world."""
+    seconds, rest = divmod(stamp_ns, NANOSECONDS)
+    if hasattr(stamp, "nanosec"):
+        stamp.sec, stamp.nanosec = seconds, rest
+    else:
+        stamp.secs, stamp.nsecs = seconds, rest
+
+
+def stamp_ns_of(stamp: Any) -> int:
+    """Return a time of either world."""
+    seconds, rest = (stamp.sec, stamp.nanosec) if hasattr(stamp, "nanosec") else (stamp.secs, stamp.nsecs)
+    return int(seconds) * NANOSECONDS + int(rest)
+
+
+# --- topics ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TopicCodec:
+    """``encode(skillset, value)`` makes a message, ``decode(message)`` the value again."""
+
+    kind: type
+    encode: Callable[[str, Any], Any]
+    decode: Callable[[Any], Any]
+
+
+def event_message(skillset: str, told: Told) -> Any:
+    """Return an event as a message; its outputs are there when it is the last of its execution."""
+    event = told.event
+    message = Event(skillset=skillset, sequence=event.sequence)
+    set_stamp(message.header.stamp, event.stamp_ns)
+    message.header.frame_id = told.life
+    if isinstance(event, ExecutionEvent):
+        message.kind = Event.EXECUTION
+        message.skill, message.id, message.state = event.skill, event.id, event.state.value
+        message.result, message.message = event.result, event.message
+        message.inputs_json = json.dumps(to_plain(event.inputs))
+        if event.state.terminal:
+            message.outputs_json = json.dumps(to_plain(event.outputs))
+    else:
+        message.kind = Event.TRANSITION
+        message.resource, message.cause = event.resource, event.cause
+        message.from_state, message.to_state = event.from_state, event.to_state
+    return message
+
+
+def told_of(message: Any) -> Told:
+    """Return an event; inputs and outputs are plain values."""
+    return Told(message.header.frame_id, event_of(message))
+
+
+def event_of(message: Any) -> EngineEvent:
+    """Return an event without the name of its managers."""
+    stamp_ns = stamp_ns_of(message.header.stamp)
+    if message.kind == Event.TRANSITION:
+        return TransitionEvent(message.sequence, stamp_ns, message.resource, message.from_state, message.to_state, message.cause)
+    return ExecutionEvent(
+        message.sequence,
+        stamp_ns,
+        message.skill,
+        message.id,
+        ExecutionState(message.state),
+        message.result,
+        message.message,
+        json.loads(message.inputs_json or "null"),
+        json.loads(message.outputs_json or "{}"),
+    )
+
+
+def states_message(skillset: str, states: ResourceStates) -> Any:
+    """Return resource states as a message; ``frame_id`` says whose they are, and after which event."""
+    message = ResourceStatesMessage(skillset=skillset, resources=[_resource(name, one) for name, one in states.resources.items()])
+    set_stamp(message.header.stamp, states.stamp_ns)
+    message.header.frame_id = f"{states.life} {states.after}"
+    return message
+
+
+def states_of(message: Any) -> ResourceStates:
+    """Return resource states."""
+    life, _, after = message.header.frame_id.partition(" ")
+    values = {one.name: ResourceValue(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
+    return ResourceStates(life, int(after or 0), stamp_ns_of(message.header.stamp), values)
+
+
+def skills_message(skillset: str, states: SkillStates) -> Any:
+    """Return skill states as a message."""
+    message = SkillStatesMessage(skillset=skillset, skills=[_skill(name, one) for name, one in states.skills.items()])
+    set_stamp(message.header.stamp, states.stamp_ns)
+    message.header.frame_id = states.life
+    return message
+
+
+def skills_of(message: Any) -> SkillStates:
+    """Return skill states; inputs and outputs are plain values."""
+    skills = {}
+    for one in message.skills:
+        last = [_record_of(one.name, execution) for execution in one.last]
+        skills[one.name] = SkillRecord(tuple(_record_of(one.name, execution) for execution in one.open), last[0] if last else None)
+    return SkillStates(message.header.frame_id, stamp_ns_of(message.header.stamp), skills)
+
+
+TOPICS: Mapping[str, TopicCodec] = {
+    EVENTS.name: TopicCodec(Event, event_message, told_of),
+    RESOURCE_STATES.name: TopicCodec(ResourceStatesMessage, states_message, states_of),
+    SKILL_STATES.name: TopicCodec(SkillStatesMessage, skills_message, skills_of),
+}
+
+
+def _resource(name: str, value: ResourceValue) -> Any:
+    return ResourceState(name=name, state=value.state, previous_state=value.previous, stamp_ns=value.stamp_ns)
+
+
+def _skill(name: str, skill: SkillRecord) -> Any:
+    last = [] if skill.last is None else [_execution(skill.last)]
+    return SkillState(name=name, open=[_execution(record) for record in skill.open], last=last)
+
+
+def _execution(record: ExecutionRecord) -> Any:
+    return SkillExecution(
+        id=record.id,
+        state=record.state.value,
+        result=record.result,
+        message=record.message,
+        inputs_json=json.dumps(to_plain(record.inputs)),
+        outputs_json=json.dumps(to_plain(record.outputs) if record.state.terminal else {}),
+        requested_ns=record.requested_ns,
+        started_ns=record.started_ns,
+        ended_ns=record.ended_ns,
+    )
+
+
+def _record_of(skill: str, message: Any) -> ExecutionRecord:
+    return ExecutionRecord(
+        message.id,
+        skill,
+        ExecutionState(message.state),
+        message.result,
+        message.message,
+        json.loads(message.inputs_json or "null"),
+        json.loads(message.outputs_json or "{}"),
+        message.requested_ns,
+        message.started_ns,
+        message.ended_ns,
+    )
+
+
+# --- services ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ServiceCodec:
+    """``encode(value, response)`` fills a response, ``decode(response)`` makes the value; a request has the fields of its type."""
+
+    kind: Any
+    fields: tuple[str, ...]
+    encode: Callable[[Any, Any], None]
+    decode: Callable[[Any], Any]
+
+
+def _encode_transition(reply: TransitionReply, response: Any) -> None:
+    response.accepted, response.reason, response.state = reply.accepted, reply.reason, reply.state
+
+
+def _encode_trigger(reply: TransitionReply | PauseReply, response: Any) -> None:
+    response.accepted, response.reason = reply.accepted, reply.reason
+
+
+def _encode_describe(model_json: str, response: Any) -> None:
+    response.model_json = model_json
+
+
+def _encode_data(reading: DataReading, response: Any) -> None:
+    response.known, response.received, response.stale = reading.known, reading.received, reading.stale
+    response.stamp_ns, response.value_json = reading.stamp_ns, reading.value_json
+
+
+def _encode_why(reply: WhyReply, response: Any) -> None:
+    response.known = reply.why is not None
+    if reply.why is None:
+        response.reason = reply.error
+        return
+    why = reply.why
+    response.ready, response.reason, response.refusal = why.ready, why.reason, why.refusal
+    response.unmet = [_unmet(one, reply) for one in why.unmet]
+    response.history = [
+        ResourceTransition(stamp_ns=e.stamp_ns, resource=e.resource, from_state=e.from_state, to_state=e.to_state, cause=e.cause)
+        for e in why.history
+    ]
+
+
+def _unmet(one: UnmetPrecondition, reply: WhyReply) -> Any:
+    known = [(name, state, reply.resources[name]) for name, state in one.states.items()]
+    return Unmet(
+        name=one.name,
+        condition=one.condition,
+        reason=one.reason,
+        resources=[ResourceState(name=name, state=state, previous_state=s.previous, stamp_ns=s.stamp_ns) for name, state, s in known],
+        data=[DataValue(name=name, value_json="" if value is None else json.dumps(to_plain(value))) for name, value in one.data.items()],
+    )
+
+
+def _decode_why(response: Any) -> WhyReply:
+    if not response.known:
+        return WhyReply(response.reason)
+    found = tuple(
+        UnmetPrecondition(
+            one.name,
+            one.condition,
+            one.reason,
+            {resource.name: resource.state for resource in one.resources},
+            {data.name: json.loads(data.value_json) if data.value_json else None for data in one.data},
+        )
+        for one in response.unmet
+    )
+    history = tuple(TransitionEvent(0, e.stamp_ns, e.resource, e.from_state, e.to_state, e.cause) for e in response.history)
+    return WhyReply("", Why("", response.ready, response.reason, response.refusal, found, history))
+
+
+SERVICES: Mapping[str, ServiceCodec] = {
+    "describe": ServiceCodec(Describe, (), _encode_describe, lambda response: response.model_json),
+    "get_data": ServiceCodec(
+        GetData, ("name",), _encode_data, lambda r: DataReading(r.known, r.received, r.stale, r.stamp_ns, r.value_json)
+    ),
+    "pause": ServiceCodec(SetPaused, ("id", "paused"), _encode_trigger, lambda r: PauseReply(r.accepted, r.reason)),
+    "transition": ServiceCodec(
+        Transition, ("resource", "to"), _encode_transition, lambda r: TransitionReply(r.accepted, r.reason, r.state)
+    ),
+    "trigger": ServiceCodec(TriggerEvent, ("event",), _encode_trigger, lambda r: TransitionReply(r.accepted, r.reason, "")),
+    "why": ServiceCodec(WhyService, ("skill", "inputs_json"), _encode_why, _decode_why),
+}

@@ -1,0 +1,121 @@
+"""All managers of one skillset: the engine, and what stands between it and the middleware."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Mapping, Sequence
+
+from skill_model.model import Skillset
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.core.events import EngineEvent, ExecutionEvent
+from skill_runtime.core.hook_calls import HookCaller
+from skill_runtime.core.stops import DEFAULT_TIMEOUT_S
+from skill_runtime.hooks import SkillHooks
+from skill_runtime.managers.data import DataBindings, DataManager
+from skill_runtime.managers.deadline import EngineAlarm
+from skill_runtime.managers.questions import Questions
+from skill_runtime.managers.records import SkillStatesPublisher
+from skill_runtime.managers.resources import ResourceManager
+from skill_runtime.managers.skill import SkillManager
+from skill_runtime.middleware import EVENTS, Middleware, Told
+
+FLUSH_S = 1.0
+HOOKS_RETURN_S = 5.0
+"""How long (wall clock) the end of the managers waits for hooks that have not returned."""
+MakeInputs = Callable[[str, Mapping[str, object]], object]
+"""Makes what the hooks of a skill get from the values of its inputs."""
+OnStep = Callable[[Sequence[EngineEvent]], None]
+
+
+class Managers:
+    """The data manager, the resource manager and the skill managers.
+
+    Hooks are called on threads of their own; nothing of the middleware's loop waits for one.
+
+    Args:
+        middleware: serves them.
+        skillset: the model.
+        hooks: one a skill, or who calls them elsewhere.
+        bindings: where each data comes from; None: nowhere but by ``data.receive``.
+        make_inputs: by default the hooks' own ``make_inputs``; the plain values where the hooks are elsewhere.
+        interrupt_timeout_s: how long a stop may take where the model does not say.
+        on_rival: called with the reason when other managers of this skillset are there.
+
+    Raises:
+        SkillRuntimeError: a skill has no hooks, a data no binding, or the time-out is no time.
+    """
+
+    def __init__(
+        self,
+        middleware: Middleware,
+        skillset: Skillset,
+        hooks: Mapping[str, SkillHooks] | HookCaller,
+        *,
+        bindings: DataBindings | None,
+        make_inputs: MakeInputs | None = None,
+        interrupt_timeout_s: float = DEFAULT_TIMEOUT_S,
+        on_rival: Callable[[str], None] | None = None,
+    ) -> None:
+        if not interrupt_timeout_s > 0:
+            raise SkillRuntimeError(f"parameter interrupt_timeout_s is {interrupt_timeout_s:g}; a stop needs a positive time")
+        self.skillset = skillset
+        self.middleware = middleware
+        self.life = uuid.uuid4().hex[:12]
+        self.on_step: list[OnStep] = []
+        """Called at each step, within it, before it is told to anybody else."""
+        make = make_inputs or _maker(hooks)
+        self.engine = SkillsetEngine(
+            skillset,
+            middleware.now_ns,
+            hooks,
+            self._on_events,
+            defer=middleware.defer,
+            on_error=middleware.log,
+            interrupt_timeout_s=interrupt_timeout_s,
+        )
+        self._alarm = EngineAlarm(middleware, self.engine)
+        self.data = DataManager(middleware, skillset, bindings, self._update_data)
+        self.resources = ResourceManager(middleware, self.engine, self.life)
+        self._events = middleware.advertise(EVENTS)
+        self.skills = {skill.name: SkillManager(middleware, self.engine, skill, make) for skill in skillset.skills}
+        self._records = SkillStatesPublisher(middleware, skillset, self.life)
+        servers = {name: manager.server for name, manager in self.skills.items()}
+        Questions(middleware, self.engine, servers, make)
+        # The sign of life comes last: who hears it finds everything there.
+        middleware.announce(self.life, on_rival or self._on_rival)
+
+    def close(self, reason: str) -> None:
+        """Fail whatever runs for this reason, so that functions are stopped, and take no more requests."""
+        self.engine.close(reason)
+        if not self.middleware.close_hooks(HOOKS_RETURN_S):
+            self.middleware.log(f"a hook has not returned within {HOOKS_RETURN_S:g} s; it is left behind")
+        self._records.publish()
+        self._events.flush(FLUSH_S)
+
+    def _on_events(self, events: Sequence[EngineEvent]) -> None:
+        """Pass on one step: resources before events before results, so that who sees a result sees its effects."""
+        for on_step in self.on_step:
+            on_step(events)
+        self.resources.on_events(events)
+        for event in events:
+            self._events.publish(Told(self.life, event))
+        for event in events:
+            if isinstance(event, ExecutionEvent):
+                self.skills[event.skill].on_event(event)
+        self._records.on_events(events)
+        self._alarm.look()
+
+    def _update_data(self, name: str, value: object | None) -> None:
+        self.engine.update_data(name, value)
+        self._alarm.look()
+
+    def _on_rival(self, reason: str) -> None:
+        self.middleware.log(reason)
+        self.close(reason)
+
+
+def _maker(hooks: Mapping[str, SkillHooks] | HookCaller) -> MakeInputs:
+    if isinstance(hooks, Mapping):
+        return lambda skill, values: hooks[skill].make_inputs(values)
+    return lambda _, values: dict(values)

@@ -1,0 +1,96 @@
+"""The services that answer questions and take wishes: ``describe``, ``why`` and ``pause``."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from skill_model.json_form import to_json
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.pauses import PauseReply
+from skill_runtime.middleware import ActionServer, Middleware, Reply, ResourceValue, Timer, WhyReply
+
+HOOK_ANSWERS_S = 10.0
+"""A hook that has not answered after so long (wall clock) is said to be silent."""
+
+
+class Questions:
+    """Serves the questions; a hook that takes its time holds up nobody else."""
+
+    def __init__(
+        self,
+        middleware: Middleware,
+        engine: SkillsetEngine,
+        servers: Mapping[str, ActionServer],
+        make_inputs: Callable[[str, Mapping[str, object]], object],
+    ) -> None:
+        self._middleware = middleware
+        self._engine = engine
+        self._servers = servers
+        self._make_inputs = make_inputs
+        self._model_json = to_json(engine.skillset)
+        middleware.serve("describe", lambda _, reply: reply(self._model_json))
+        middleware.serve("why", self._why)
+        middleware.serve("pause", self._pause)
+
+    def _why(self, request: Mapping[str, Any], reply: Reply) -> None:
+        skill = request["skill"]
+        if skill not in self._servers:
+            reply(WhyReply(f"skillset {self._engine.skillset.name} has no skill {skill}; it has {', '.join(self._servers)}"))
+            return
+        if not request["inputs_json"]:
+            self._explain(skill, "", reply)
+            return
+        try:
+            inputs = self._inputs(skill, request["inputs_json"])
+        except ValueError as error:
+            reply(WhyReply(str(error)))
+            return
+        silent = f"validate has not answered for {HOOK_ANSWERS_S:g} s"
+        once = _Once(lambda refusal: self._explain(skill, refusal, reply))
+        once.give_up(self._middleware, silent)
+        self._middleware.defer(lambda: self._engine.ask_validate(skill, inputs, once))
+
+    def _explain(self, skill: str, refusal: str, reply: Reply) -> None:
+        resources = {name: ResourceValue(one.state, one.previous, one.stamp_ns) for name, one in self._engine.resources.items()}
+        reply(WhyReply("", self._engine.explain(skill, refusal), resources))
+
+    def _pause(self, request: Mapping[str, Any], reply: Reply) -> None:
+        silent = PauseReply(accepted=False, reason=f"the hook has not answered for {HOOK_ANSWERS_S:g} s")
+        once = _Once(reply)
+        once.give_up(self._middleware, silent)
+        self._middleware.defer(lambda: self._engine.set_paused(request["id"], once, paused=request["paused"]))
+
+    def _inputs(self, skill: str, inputs_json: str) -> object:
+        """Make what ``validate`` gets; raise ValueError where the JSON does not fit."""
+        try:
+            values = json.loads(inputs_json)
+        except json.JSONDecodeError as error:
+            raise ValueError(f"inputs of {skill}: this is no JSON: {error}") from error
+        if not isinstance(values, dict):
+            raise ValueError(f"inputs of {skill} are a JSON object, not {inputs_json}")  # noqa: TRY004 - of the caller's text, not of a type
+        return self._make_inputs(skill, self._servers[skill].inputs_of(values))
+
+
+class _Once:
+    """Passes on the first answer: the hook's, or that it is silent."""
+
+    def __init__(self, reply: Callable[[Any], None]) -> None:
+        self._reply = reply
+        self._lock = threading.Lock()
+        self._given = False
+        self._timer: Timer | None = None
+
+    def give_up(self, middleware: Middleware, silent: object) -> None:
+        """Answer for a hook that stays silent."""
+        self._timer = middleware.later(HOOK_ANSWERS_S, lambda: self(silent))
+
+    def __call__(self, answer: Any) -> None:
+        with self._lock:
+            first, self._given = not self._given, True
+        if first:
+            if self._timer is not None:
+                self._timer.cancel()
+            self._reply(answer)

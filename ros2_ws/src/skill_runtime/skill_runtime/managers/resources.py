@@ -1,0 +1,41 @@
+"""The resource manager's interface (paper, section 4.2): states latched, services for extern transitions and events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.events import EngineEvent, TransitionEvent
+from skill_runtime.middleware import RESOURCE_STATES, Middleware, Reply, ResourceStates, ResourceValue
+
+
+class ResourceManager:
+    """Publishes ``resource_states`` once a step, and serves ``transition`` and ``trigger``."""
+
+    def __init__(self, middleware: Middleware, engine: SkillsetEngine, life: str) -> None:
+        self._engine = engine
+        self._life = life
+        self._publisher = middleware.advertise(RESOURCE_STATES)
+        # Kept apart from the engine's, so that each message is the state after the step that it is sent for.
+        self._latest = {name: ResourceValue(status.state, "", status.stamp_ns) for name, status in engine.resources.items()}
+        self._publish(0, middleware.now_ns())
+        middleware.serve("transition", self._transition)
+        middleware.serve("trigger", self._trigger)
+
+    def on_events(self, events: Sequence[EngineEvent]) -> None:
+        """Follow the transitions of one step."""
+        transitions = [event for event in events if isinstance(event, TransitionEvent)]
+        for event in transitions:
+            self._latest[event.resource] = ResourceValue(event.to_state, event.from_state, event.stamp_ns)
+        if transitions:
+            self._publish(transitions[-1].sequence, transitions[-1].stamp_ns)
+
+    def _publish(self, after: int, stamp_ns: int) -> None:
+        self._publisher.publish(ResourceStates(self._life, after, stamp_ns, dict(self._latest)))
+
+    def _transition(self, request: Mapping[str, Any], reply: Reply) -> None:
+        reply(self._engine.transition(request["resource"], request["to"]))
+
+    def _trigger(self, request: Mapping[str, Any], reply: Reply) -> None:
+        reply(self._engine.trigger(request["event"]))
