@@ -75,20 +75,23 @@ install_packages() {
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing
 }
 
+# The environment of a world; one that is there already, of the same Python and in the same place, gets the differences only.
 make_venv() { # WORLD OPTIONS...
-  local world=$1; shift
-  rm -rf "$ALULA_STATE/venv$world"
+  local world=$1 venv="$ALULA_STATE/venv$1"; shift
   # A virtual environment of the user's own must not leak into these two.
-  env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME /usr/bin/python3 -m venv "$@" "$ALULA_STATE/venv$world" &&
-    env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME "$ALULA_STATE/venv$world/bin/pip" install --no-input --disable-pip-version-check \
-      --progress-bar off --no-deps -r "$ALULA_ROOT/setup/ros$world.txt"
+  local clean=(env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME)
+  local version='import sys; print(sys.version)'
+  [ "$(head -n 1 "$venv/bin/pip" 2>/dev/null)" = "#!$venv/bin/python3" ] &&
+    [ "$("${clean[@]}" "$venv/bin/python3" -c "$version" 2>/dev/null)" = "$(/usr/bin/python3 -c "$version")" ] ||
+    { rm -rf "$venv" && "${clean[@]}" /usr/bin/python3 -m venv "$@" "$venv" || return 1; }
+  "${clean[@]}" "$venv/bin/python3" "$ALULA_ROOT/setup/sync_packages.py" "$ALULA_ROOT/setup/ros$world.txt"
 }
 make_venv1() { make_venv 1 --system-site-packages; }
 make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup/repair_wheels.py"; }
 
 generate() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
-    export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/skill_model:$ALULA_ROOT/ros2_ws/src/skill_language"
+    export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/alula_common:$ALULA_ROOT/ros2_ws/src/skill_model:$ALULA_ROOT/ros2_ws/src/skill_language"
     # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
     python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune )
 }
@@ -135,8 +138,8 @@ if [ -n "$(missing_packages)" ]; then
   rm -f "$ALULA_STATE/stamps/apt"
 fi
 step apt "$(digest "$ALULA_ROOT/setup/apt.txt")" install_packages "Debian packages (ROS 1, build tools)"
-step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt")-$ALULA_STATE" make_venv1 "Python packages of the ROS 1 world"
-step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
+step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt" "$ALULA_ROOT/setup/sync_packages.py")-$ALULA_STATE" make_venv1 "Python packages of the ROS 1 world"
+step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py" "$ALULA_ROOT/setup/sync_packages.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
 step generated "$(model_digest)" \
   generate "skillsets: interfaces, managers, bridge configuration"
 step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"

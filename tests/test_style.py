@@ -19,7 +19,16 @@ ROS1_PACKAGES = (
     "lidar_mapping",
     "uav_simulator",
 )
-ROS2_PACKAGES = ("skill_model", "skill_language", "skill_runtime", "skill_panel", "skill_missions", "uav_skills", "uav_missions")
+ROS2_PACKAGES = (
+    "alula_common",
+    "skill_model",
+    "skill_language",
+    "skill_runtime",
+    "skill_panel",
+    "skill_missions",
+    "uav_skills",
+    "uav_missions",
+)
 TYPED = [
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",

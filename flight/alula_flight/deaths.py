@@ -25,21 +25,24 @@ CONSEQUENCES = {
     "uav_simulator": Consequence.END,
     "master": Consequence.ABORT,
 }
-RESPAWNED = ("uav_guidance", "zed_depth", "lidar_obstacles", "lidar_mapping", "ros_bridge", "navigation", "perception", "mapping")
 
 
 @dataclass(frozen=True)
 class Death:
-    """A process that ended although nobody had told it to. ``when_s``: absolute mission clock, None before it runs."""
+    """A process that ended although nobody had told it to.
+
+    ``when_s``: absolute mission clock, None before it runs. ``respawned``: the launch file has it started again.
+    """
 
     name: str
     how: str
     when_s: float | None
+    respawned: bool = False
 
     def sentence(self) -> str:
         """Return what a person wants to read."""
         when = "" if self.when_s is None else f" at {self.when_s:.1f} s of mission clock"
-        again = "; it was started again" if self.name in RESPAWNED else ""
+        again = "; it was started again" if self.respawned else ""
         return f"{self.name} died ({self.how}){when}{again}"
 
 

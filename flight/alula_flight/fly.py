@@ -20,11 +20,15 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from alula_flight.claims import DomainClaim, NoFreeDomainError, claim_domain, free_port
+import psutil
+
+from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port
+from alula_common.processes import RUN_ID_VARIABLE, command_line, end_run, processes_of_run
+from alula_common.shared_memory import sweep_shared_memory
+from alula_common.signals import Interrupts
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
-from alula_flight.mocked import MockFront
-from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run, sweep_shared_memory
+from alula_flight.mocked import STOPPING, MockFront
 from alula_flight.spec import SCENARIOS, SENSORS, RequestError, RunSpec, parse_fault
 
 CANNOT_START = 2
@@ -32,8 +36,7 @@ GIVEN_UP = 1
 PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
-KILL_AT = 2  # interrupts: the first lands the vehicle, the second ends everything
-MISSION_MODULE = b"uav_missions"
+MISSION_NODE = "__name:=mission"  # as roslaunch writes it on the command line
 
 
 class Arguments(argparse.Namespace):
@@ -147,17 +150,16 @@ class Front:
         self._spec = spec
         self._claim = claim
         self._say = say
-        self._interrupts = 0
+        self._interrupts = Interrupts(self._land, lambda: say("ending everything at once"))
         self._supervisor: subprocess.Popen[bytes] | None = None
 
     def fly(self, spec_path: Path) -> int:
         """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards."""
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda *_: self._interrupted())
+        self._interrupts.install()
         supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
         live = LiveEvents(Path(self._spec.out_dir), self._say)
         try:
-            while supervisor.poll() is None and self._interrupts < KILL_AT:
+            while supervisor.poll() is None and not self._interrupts.at_once:
                 live.show_new()
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     supervisor.wait(0.2)
@@ -166,40 +168,29 @@ class Front:
             live.show_new()
         finally:
             # At the second Ctrl-C nobody is asked: a supervisor that is told politely would still try to land.
-            end_run(self._spec.run_id, patience_s=0.0 if self._interrupts >= KILL_AT else PATIENCE_S)
+            end_run(self._spec.run_id, patience_s=0.0 if self._interrupts.at_once else PATIENCE_S)
             supervisor.wait()
             sweep_shared_memory()
         return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
 
-    def _interrupted(self) -> None:
-        self._interrupts += 1
-        if self._interrupts == 1:
-            self._say("stopping: the vehicle lands first; Ctrl-C again ends everything at once")
-            if self._supervisor is not None and self._supervisor.poll() is None:
-                self._supervisor.send_signal(signal.SIGINT)
-        else:
-            self._say("ending everything at once")
+    def _land(self) -> None:
+        self._say(STOPPING)
+        if self._supervisor is not None and self._supervisor.poll() is None:
+            self._supervisor.send_signal(signal.SIGINT)
 
     def _supervisor_died(self, code: int, live: LiveEvents) -> None:
         """Let the mission land the vehicle; it lives in a session of its own and knows nothing of its parents."""
         record = DeathRecord(Path(self._spec.out_dir) / "deaths.jsonl")
         record.add(Death("supervisor", describe_exit(code), None))
         self._say("the supervisor died; the mission lands the vehicle")
-        missions = [pid for pid in processes_of_run(self._spec.run_id) if _is_mission(pid)]
-        for pid in missions:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGINT)
+        missions = [process for process in processes_of_run(self._spec.run_id) if MISSION_NODE in command_line(process)]
+        for mission in missions:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                mission.send_signal(signal.SIGINT)
         end = time.monotonic() + MISSION_PATIENCE_S
-        while any(map(_is_mission, missions)) and time.monotonic() < end and self._interrupts < KILL_AT:
+        while missions and time.monotonic() < end and not self._interrupts.at_once:
+            _, missions = psutil.wait_procs(missions, timeout=0.2)
             live.show_new()
-            time.sleep(0.2)
-
-
-def _is_mission(pid: int) -> bool:
-    try:
-        return MISSION_MODULE in Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return False
 
 
 def finish(spec: RunSpec, mission_exit: int | None) -> int:

@@ -9,11 +9,12 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from alula_common.signals import Interrupts
 from alula_flight.live import LiveEvents
 from alula_flight.spec import RunSpec
 
 CANNOT_START = 2
-KILL_AT = 2  # interrupts, as in a flight: the first lands the vehicle, the second ends everything
+STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at once"
 
 
 def shipped_behaviour(root: Path) -> Path:
@@ -39,7 +40,7 @@ class MockFront:
     def __init__(self, spec: RunSpec, say: Callable[[str], None]) -> None:
         self._spec = spec
         self._say = say
-        self._interrupts = 0
+        self._interrupts = Interrupts(self._land, self._kill)
         self._flight: subprocess.Popen[str] | None = None
 
     def fly(self) -> tuple[int, str]:
@@ -54,8 +55,7 @@ class MockFront:
             start_new_session=True,
         ) as flight:
             self._flight = flight
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-                signal.signal(number, lambda *_: self._interrupted())
+            self._interrupts.install()
             words = ""
             while flight.poll() is None:
                 live.show_new()
@@ -64,12 +64,11 @@ class MockFront:
         live.show_new()
         return flight.returncode if flight.returncode in {0, 1, CANNOT_START} else 1, words
 
-    def _interrupted(self) -> None:
-        self._interrupts += 1
-        if self._flight is None or self._flight.poll() is not None:
-            return
-        if self._interrupts < KILL_AT:
-            self._say("stopping: the vehicle lands first; Ctrl-C again ends everything at once")
+    def _land(self) -> None:
+        if self._flight is not None and self._flight.poll() is None:
+            self._say(STOPPING)
             self._flight.send_signal(signal.SIGINT)
-        else:
+
+    def _kill(self) -> None:
+        if self._flight is not None and self._flight.poll() is None:
             self._flight.kill()

@@ -8,6 +8,8 @@ from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from alula_common.files import write_json
+
 SCENARIOS = {"mapping": "map the yard; watch ahead with the ZED, or with the LiDAR when the ZED has failed (paper, section 2.2)"}
 SENSORS = ("zed", "lidar", "imu")
 _FAULT = re.compile(r"^(?P<sensor>[a-z0-9_]+)(@(?P<seconds>\d+(\.\d+)?))?$")
@@ -61,7 +63,7 @@ class RunSpec:
 
     def save(self, path: Path) -> None:
         """Write the specification beside the results."""
-        path.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        write_json(path, asdict(self))
 
     @classmethod
     def load(cls, path: Path) -> RunSpec:

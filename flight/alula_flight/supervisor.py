@@ -16,8 +16,9 @@ import time
 from pathlib import Path
 from typing import Any
 
+from alula_common.processes import end_run
+from alula_common.signals import on_end_signal
 from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
-from alula_flight.processes import end_run
 from alula_flight.spec import RunSpec
 
 GIVEN_UP = 1
@@ -56,7 +57,8 @@ class Watch:
         if name == "mission" and exit_code is not None and exit_code >= 0:
             self.mission_exit = exit_code
         else:
-            self._record.add(Death(name=name, how=describe_exit(exit_code), when_s=self._clock.now_s))
+            respawned = bool(getattr(process, "respawn", False))
+            self._record.add(Death(name=name, how=describe_exit(exit_code), when_s=self._clock.now_s, respawned=respawned))
             consequence = CONSEQUENCES.get(name, Consequence.GO_ON)
             order = list(Consequence)
             self.worst = max(self.worst, consequence, key=order.index)
@@ -139,8 +141,7 @@ class Supervisor:
         launch.start()
         self._watch.monitor = launch.pm
         # roslaunch has put its own handlers; ours let the vehicle land first.
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda *_: self._end_asked())
+        on_end_signal(self._end_asked)
         rospy.init_node("alula_supervisor", disable_signals=True)
         self._clock.listen()
         return launch

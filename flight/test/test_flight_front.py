@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula_flight.claims import NoFreeDomainError, claim_domain, free_port
+from alula_common.network import NoFreeDomainError, claim_domain, free_port
+from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import command
-from alula_flight.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula_flight.spec import Fault, RequestError, RunSpec, parse_fault
 
 
@@ -174,7 +174,7 @@ def test_everything_of_a_run_ends_and_nothing_else(tmp_path):
 
 def test_deaths_are_written_at_once_and_a_cut_line_is_left_out(tmp_path):
     record = DeathRecord(tmp_path / "deaths.jsonl")
-    death = Death("zed_depth", describe_exit(-9), 12.5)
+    death = Death("zed_depth", describe_exit(-9), 12.5, respawned=True)
     record.add(death)
     with (tmp_path / "deaths.jsonl").open("a") as file:
         file.write('{"name": "ros_br')
@@ -209,5 +209,4 @@ def test_event_line_tells_transitions_and_hides_requests():
 
 def test_the_package_needs_no_ros_to_be_imported():
     code = "import alula_flight.fly, sys; assert not {'rospy', 'rclpy', 'open3d', 'matplotlib'} & set(sys.modules), 'imported too early'"
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from alula_flight.claims import free_port
+from alula_common.network import free_port
 from ros_bridge.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Master

@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from alula_flight.claims import free_port
+from alula_common.network import free_port
 from ros_bridge import two_worlds
 from ros_bridge.fuzz import memory_mb
 

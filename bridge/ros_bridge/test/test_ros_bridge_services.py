@@ -20,7 +20,7 @@ from ros_bridge_wire import exactly, header, read_header
 from std_srvs.srv import Empty, SetBool
 from uav_msgs.srv import SetSensor
 
-from alula_flight.claims import free_port
+from alula_common.network import free_port
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.later import LaterService
 from ros_bridge.services import refusal, refusal_around

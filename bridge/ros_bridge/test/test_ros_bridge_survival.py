@@ -15,7 +15,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from alula_flight.claims import free_port
+from alula_common.network import free_port
 from ros_bridge.fuzz import Fuzzer
 from ros_bridge.hostile import LENGTH, HostilePublisher, header
 

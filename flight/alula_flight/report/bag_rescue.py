@@ -7,7 +7,8 @@ from pathlib import Path
 
 import rosbag
 
-from alula_flight.report.files import Problems, ReportError, write_aside
+from alula_common.files import write_aside
+from alula_flight.report.files import Problems, ReportError
 
 BAG = "functional.bag"
 

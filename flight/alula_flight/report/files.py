@@ -1,10 +1,10 @@
-"""Read files that a crash may have cut off, write files that no crash can cut off."""
+"""Read files that a crash may have cut off."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -66,36 +66,3 @@ def read_json(path: Path) -> object:
     except (OSError, ValueError) as error:
         raise ReportError(f"{path.name} can't be read: {error}") from error
     return value
-
-
-def write_aside(path: Path, write: Callable[[Path], None]) -> None:
-    """Let ``write`` make the file under another name (same suffix), then rename it: the final name never holds half a file."""
-    aside = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        write(aside)
-        aside.replace(path)
-    finally:
-        aside.unlink(missing_ok=True)
-
-
-def strict(value: object) -> object:
-    """Return a copy of a JSON value with null where it holds NaN or infinities, which JSON does not have."""
-    match value:
-        case dict():
-            return {str(key): strict(entry) for key, entry in value.items()}
-        case list() | tuple():
-            return [strict(entry) for entry in value]
-        case float() if not math.isfinite(value):
-            return None
-        case _:
-            return value
-
-
-def write_json(path: Path, value: object) -> None:
-    """Write strict JSON aside and rename."""
-    text = json.dumps(strict(value), indent=2, allow_nan=False) + "\n"
-
-    def write(aside: Path) -> None:
-        aside.write_text(text, encoding="utf-8")
-
-    write_aside(path, write)

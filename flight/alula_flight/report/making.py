@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from alula_common.files import write_aside, write_json
 from alula_flight.report.events import History, fold, read_events
 from alula_flight.report.facts import RunFacts
-from alula_flight.report.files import Problems, write_aside, write_json
+from alula_flight.report.files import Problems
 from alula_flight.report.map_picture import MapScene, draw_map
 from alula_flight.report.map_quality import Floats, MapQuality, judge_map, load_map, load_route
 from alula_flight.report.mocked import read_mock

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from alula_flight.processes import end_run, processes_of_run
+from alula_common.processes import command_line, end_run, processes_of_run
 
 ALULA_ROOT = Path(__file__).resolve().parents[3]
 FLIGHT_LIMIT_S = 900.0  # wall clock; several times what a flight takes, so that a hang fails and a slow machine does not
@@ -50,28 +50,14 @@ class Flight:
         return found
 
     def processes(self) -> dict[str, int]:
-        """Map each living process of the run to its id, by a word of its command line."""
-        words = {
-            "mission": "uav_missions",
-            "uav_simulator": "uav_simulator_node",
-            "uav_guidance": "uav_guidance_node",
-            "zed_depth": "zed_depth_node",
-            "lidar_obstacles": "lidar_obstacles_node",
-            "lidar_mapping": "lidar_mapping_node",
-            "ros_bridge": "ros_bridge",
-            "navigation": "uav_skills.navigation",
-            "perception": "uav_skills.perception",
-            "mapping": "uav_skills.mapping",
-            "supervisor": "alula_flight.supervisor",
-            "record": "rosbag/record",
-        }
-        found = {}
-        for pid in processes_of_run(self.run_id):
-            with contextlib.suppress(OSError):
-                command = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace")
-                for name, word in words.items():
-                    if word in command and name not in found:
-                        found[name] = pid
+        """Map each living node of the run (by the name that roslaunch gave it) and the supervisor to its process id."""
+        found: dict[str, int] = {}
+        for process in processes_of_run(self.run_id):
+            words = command_line(process)
+            names = [word.removeprefix("__name:=") for word in words if word.startswith("__name:=")]
+            names += ["supervisor"] if "alula_flight.supervisor" in words else []
+            for name in names:
+                found.setdefault(name, process.pid)
         return found
 
     def wait_for(self, what: str, condition: Callable[[], bool], *, limit_s: float = FLIGHT_LIMIT_S) -> None:
@@ -105,7 +91,7 @@ class Flight:
         """Return processes of the run that live although it has ended."""
         if not (self.out / "run.json").exists():
             return {}
-        return {pid: Path(f"/proc/{pid}/cmdline").read_text(encoding="utf-8") for pid in processes_of_run(self.run_id)}
+        return {process.pid: " ".join(command_line(process)) for process in processes_of_run(self.run_id)}
 
     def give_up(self) -> None:
         """End whatever is left after a failed test."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from alula_flight.claims import claim_domain
+from alula_common.network import claim_domain
 
 
 @pytest.fixture(scope="session")

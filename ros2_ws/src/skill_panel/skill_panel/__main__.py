@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from alula_flight.running import NoRunError, Run, find_run, live_runs
+from alula_common.runs import NoRunError, Run, find_run, live_runs
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watcher, skillsets_in, wait_for
 from skill_runtime.ros2.session import Session

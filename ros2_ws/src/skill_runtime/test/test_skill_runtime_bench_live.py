@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("navigation_interfaces.action")
 
-from alula_flight.claims import is_claimed
+from alula_common.network import is_claimed
 from alula_testing.waits import until
 from skill_model.execution_state import ExecutionState
 from skill_runtime.bench.cases import CASES

@@ -30,7 +30,7 @@ def ros1() -> Iterator[LiveGraph]:
 @contextmanager
 def ros2() -> Iterator[LiveGraph]:
     """Claim a DDS domain, and initialise rclpy in it."""
-    from alula_flight.claims import claim_domain
+    from alula_common.network import claim_domain
 
     claim = claim_domain()
     os.environ["ROS_DOMAIN_ID"] = str(claim.domain)

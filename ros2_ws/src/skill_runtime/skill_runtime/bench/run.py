@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from alula_flight.claims import claim_domain
+from alula_common.network import claim_domain
 from skill_runtime.bench.cases import Case
 from skill_runtime.bench.clients import follow_bare, follow_skills
 from skill_runtime.bench.figures import Load, Measured, Samples, idle_percent, join, times_of

@@ -1,9 +1,9 @@
 """Mocks: skills whose behaviour is a script, over the same managers and the same interface as the real ones."""
 
 from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, Fault, Happening, Rule
+from skill_runtime.mock.errors import BehaviourError
 from skill_runtime.mock.formula import Formula, FormulaError
 from skill_runtime.mock.local_stage import LocalStage, mock_world
-from skill_runtime.mock.located import BehaviourError
 from skill_runtime.mock.play import Play
 from skill_runtime.mock.reading import load_behaviour
 from skill_runtime.mock.skill import MockSkill

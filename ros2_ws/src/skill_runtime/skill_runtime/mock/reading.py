@@ -8,10 +8,11 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from alula_common.located_yaml import Located, choices, read_yaml
 from skill_model.model import Skill, Skillset
 from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, Fault, Happening, Place, Rule, Value
+from skill_runtime.mock.errors import BehaviourError
 from skill_runtime.mock.formula import Formula, FormulaError
-from skill_runtime.mock.located import BehaviourError, Located, choices, read_yaml
 
 SECTIONS = ("memory", "skills", "timeline", "faults", "data")
 CONDITIONS = ("call", "when", "chance")
@@ -27,7 +28,7 @@ def load_behaviour(paths: Sequence[Path], skillsets: Sequence[Skillset]) -> Beha
     Raises:
         BehaviourError: with file, line, what is wrong and what would be right.
     """
-    documents = [(path, read_yaml(path)) for path in paths]
+    documents = [(path, read_yaml(path, BehaviourError)) for path in paths]
     sections = [(path, {} if top is None else top.record("a behaviour file", SECTIONS)) for path, top in documents]
     memory: dict[str, object] = {}
     for _, parts in sections:

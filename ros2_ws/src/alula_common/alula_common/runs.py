@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from alula_flight.claims import is_claimed
+from alula_common.network import is_claimed
 
 LATEST = "latest"
 

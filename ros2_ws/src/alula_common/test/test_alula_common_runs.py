@@ -7,8 +7,8 @@ import os
 
 import pytest
 
-from alula_flight.claims import claim_domain, is_claimed
-from alula_flight.running import NoRunError, find_run, live_runs, load_run
+from alula_common.network import claim_domain, is_claimed
+from alula_common.runs import NoRunError, find_run, live_runs, load_run
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Ports and DDS domains for parallel runs on one machine, so that they never meet."""
+"""TCP ports and DDS domains for parallel runs on one machine, so that they never meet."""
 
 from __future__ import annotations
 

@@ -1,0 +1,10 @@
+"""Plain Python below everything else: files, processes, signals, ports and domains. Imports no ROS and no other package of the project.
+
+- `files`: JSON and text files that are never seen half written
+- `located_yaml`: YAML whose errors name file and line
+- `network`: TCP ports and DDS domains of this machine
+- `processes`, `shared_memory`: the processes of a run, and what killed ones leave behind
+- `runs`: the runs that are under way
+- `signals`: Ctrl-C once and twice
+- `suggestions`: "did you mean"
+"""

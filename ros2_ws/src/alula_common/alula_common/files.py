@@ -1,0 +1,46 @@
+"""Write files that no crash can cut off: the final name never holds half a file."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+
+def write_aside(path: Path, write: Callable[[Path], None]) -> None:
+    """Let ``write`` make the file under a hidden name with the same suffix, then rename it; raises what ``write`` raises."""
+    aside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        write(aside)
+        aside.replace(path)
+    finally:
+        aside.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace a text file (UTF-8) in one step."""
+
+    def write(aside: Path) -> None:
+        aside.write_text(text, encoding="utf-8")
+
+    write_aside(path, write)
+
+
+def strict(value: object) -> object:
+    """Return a copy of a JSON value with null where it holds NaN or infinities, which JSON does not have."""
+    match value:
+        case dict():
+            return {str(key): strict(entry) for key, entry in value.items()}
+        case list() | tuple():
+            return [strict(entry) for entry in value]
+        case float() if not math.isfinite(value):
+            return None
+        case _:
+            return value
+
+
+def write_json(path: Path, value: object) -> None:
+    """Replace a file with strict JSON in one step."""
+    write_text(path, json.dumps(strict(value), indent=2, allow_nan=False) + "\n")

@@ -1,0 +1,61 @@
+"""Find and end every process of a run, whoever started it and however its parents died.
+
+All processes of a run inherit ``ALULA_RUN_ID``; a process is of the run if, and only if, its environment carries that id.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Callable
+
+import psutil
+
+RUN_ID_VARIABLE = "ALULA_RUN_ID"
+KILL_S = 5.0
+LOOK_S = 0.05
+
+
+def processes_of_run(run_id: str) -> list[psutil.Process]:
+    """Return all living processes of the run, this one excepted; zombies don't count."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, OSError):  # gone meanwhile, or another user's
+            if process.pid != os.getpid() and process.environ().get(RUN_ID_VARIABLE) == run_id:
+                found.append(process)
+    return found
+
+
+def end_run(run_id: str, *, patience_s: float = 3.0) -> list[int]:
+    """End all processes of the run: SIGTERM and ``patience_s`` of wall clock, then SIGKILL; 0: SIGKILL at once.
+
+    Returns:
+        The ids of those that still ran.
+    """
+    told = processes_of_run(run_id)
+    if patience_s > 0.0:
+        _signal_all(run_id, psutil.Process.terminate, patience_s)
+    _signal_all(run_id, psutil.Process.kill, KILL_S)
+    return [process.pid for process in told]
+
+
+def _signal_all(run_id: str, send: Callable[[psutil.Process], None], wait_s: float) -> None:
+    """Signal the run's processes and wait for their ends, also for those of processes born meanwhile.
+
+    Looks again and again, because waiting by psutil would take a child's exit code away from whoever started it.
+    """
+    for process in processes_of_run(run_id):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            send(process)
+    end_s = time.monotonic() + wait_s
+    while processes_of_run(run_id) and time.monotonic() < end_s:
+        time.sleep(LOOK_S)
+
+
+def command_line(process: psutil.Process) -> list[str]:
+    """Return a process's words, none when it has ended."""
+    try:
+        return list(process.cmdline())
+    except psutil.Error:
+        return []

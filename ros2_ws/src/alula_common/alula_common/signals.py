@@ -1,0 +1,48 @@
+"""Ctrl-C, once and twice."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+
+END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupts:
+    """Counts the requests to end (Ctrl-C, SIGTERM, SIGHUP): the first ends in order, the second at once.
+
+    ``on_first`` and ``on_second`` are called in the main thread, between two instructions of what it does: they must not wait.
+    """
+
+    def __init__(self, on_first: Callable[[], None], on_second: Callable[[], None]) -> None:
+        self._on_first = on_first
+        self._on_second = on_second
+        self._count = 0
+
+    def install(self) -> None:
+        """Handle the signals from now on; call it in the main thread."""
+        for number in END_SIGNALS:
+            signal.signal(number, lambda *_: self._note())
+
+    @property
+    def asked(self) -> bool:
+        """Tell whether the end was asked for."""
+        return self._count > 0
+
+    @property
+    def at_once(self) -> bool:
+        """Tell whether it was asked for twice."""
+        return self._count > 1
+
+    def _note(self) -> None:
+        self._count += 1
+        if self._count == 1:
+            self._on_first()
+        else:
+            self._on_second()
+
+
+def on_end_signal(callback: Callable[[], None]) -> None:
+    """Call back at each SIGINT, SIGTERM or SIGHUP, in the main thread; call this there, too."""
+    for number in END_SIGNALS:
+        signal.signal(number, lambda *_: callback())
