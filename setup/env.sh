@@ -30,7 +30,7 @@ case "$1" in
     export AMENT_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export CMAKE_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export LD_LIBRARY_PATH="$_alula_install/lib"
-    export PYTHONPATH="$_alula_install/$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support"
+    export PYTHONPATH="$_alula_install/$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support:$ALULA_ROOT/tools"
     # colcon links Python packages to their sources (--symlink-install) by hooks of its setup files, which take a second to source.
     for _alula_package in "$ALULA_ROOT"/ros2_ws/src/*/setup.py "$ALULA_ROOT"/bridge/*/setup.py "$ALULA_STATE"/generated/*/setup.py; do
       PYTHONPATH="$PYTHONPATH:${_alula_package%/setup.py}"

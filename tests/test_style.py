@@ -32,6 +32,7 @@ ROS2_PACKAGES = (
 TYPED = [
     "flight/alula_flight",
     "bridge/ros_bridge/ros_bridge",
+    "tools/bridge_tools",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
 ]

@@ -3,7 +3,7 @@ from setuptools import setup
 setup(
     name="ros_bridge",
     version="0.1.0",
-    packages=["ros_bridge", "ros_bridge.bench_ends"],
+    packages=["ros_bridge"],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/ros_bridge"]),
         ("share/ros_bridge", ["package.xml"]),

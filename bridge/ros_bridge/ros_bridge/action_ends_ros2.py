@@ -19,7 +19,7 @@ from unique_identifier_msgs.msg import UUID
 
 from ros_bridge.action_states import CancelCode, Ros2Status
 from ros_bridge.actionlib_wire import SECOND_NS
-from ros_bridge.later import Header, LaterService, Take
+from ros_bridge.deferred_service import DeferredService, Header, Take
 from ros_bridge.services import TEXTS
 
 if TYPE_CHECKING:
@@ -67,9 +67,9 @@ class Ros2ClientsEnd:
         kinds = action_class.Impl
         self._feedback = node.create_publisher(kinds.FeedbackMessage, f"{name}/_action/feedback", QoSProfile(depth=FEEDBACK_DEPTH))
         self._status = node.create_publisher(GoalStatusArray, f"{name}/_action/status", qos_profile_action_status_default)
-        self._results = LaterService(node, kinds.GetResultService, f"{name}/_action/get_result", on_result)
-        self._cancels = LaterService(node, CancelGoal, f"{name}/_action/cancel_goal", on_cancel)
-        self._goals = LaterService(node, kinds.SendGoalService, f"{name}/_action/send_goal", on_goal)
+        self._results = DeferredService(node, kinds.GetResultService, f"{name}/_action/get_result", on_result)
+        self._cancels = DeferredService(node, CancelGoal, f"{name}/_action/cancel_goal", on_cancel)
+        self._goals = DeferredService(node, kinds.SendGoalService, f"{name}/_action/send_goal", on_goal)
 
     def reply_goal(self, caller: Header, *, accepted: bool, stamp_ns: int) -> None:
         """Accept or reject a goal."""

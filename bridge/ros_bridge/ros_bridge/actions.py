@@ -1,7 +1,7 @@
 """Actions: a route an action, one class for each side that the server can be on. They join the goals (pure) to the ends in both worlds.
 
-Ends deliver from rospy's threads and from the executor's; a thread of the route brings time. All of them meet in the goals' lock, and
-nothing done under it waits for anybody.
+Ends deliver from the data plane's thread for Python and from the executor's; a thread of the route brings time. All of them take
+the goals' lock, and nothing done under it waits for anybody.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from ros_bridge.config import ActionRoute, World
 from ros_bridge.conversion import ament_prefixes
 from ros_bridge.goals_to_ros1 import GoalsToRos1
 from ros_bridge.goals_to_ros2 import GoalsToRos2
+from ros_bridge.ros2_types import interface_class
 from ros_bridge.stats import RouteStats
-from ros_bridge.topics import interface_class
 
 if TYPE_CHECKING:
     from ros_bridge.conversion import TypePair
-    from ros_bridge.later import Header
+    from ros_bridge.deferred_service import Header
     from ros_bridge.routes import Context, Route
     from ros_bridge.stats import Figures
 
@@ -148,7 +148,7 @@ class ServerInRos1(_ActionBridge[GoalsToRos1]):
         self._server = ActionlibServerEnd(
             self._spec.ros1_name,
             self._type,
-            self._context.types,
+            self._context,
             on_status=self._on_status,
             on_feedback=self._on_feedback,
             on_result=self._on_result,
@@ -213,7 +213,7 @@ class ServerInRos2(_ActionBridge[GoalsToRos2]):
             on_status=lambda states: self._goals.on_status(states, time.monotonic()),
         )
         self._clients = ActionlibClientsEnd(
-            self._spec.ros1_name, self._type, self._context.types, on_goal=self._on_goal, on_cancel=self._on_cancel, empty_result=empty
+            self._spec.ros1_name, self._type, self._context, on_goal=self._on_goal, on_cancel=self._on_cancel, empty_result=empty
         )
         self._goals.connect(self._server, self._clients)
 

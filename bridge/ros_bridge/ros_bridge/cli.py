@@ -11,9 +11,10 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-from ros_bridge import two_worlds
 from ros_bridge.config_file import NAME, load_config
 from ros_bridge.errors import BridgeError, ConfigError, NoMasterError
+from ros_bridge.master import Connection
+from ros_bridge.ros1_node import own_name
 from ros_bridge.selection import Selection
 
 logger = logging.getLogger("ros_bridge")
@@ -24,7 +25,7 @@ LOOPBACK = ("http://127.0.0.1", "http://localhost")
 
 
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the command line; what roslaunch adds (``__name:=``, ``__log:=``, remappings) is rospy's business."""
+    """Read the command line; what roslaunch adds is not in it: ``__name:=`` is read by ``own_name``, all else means nothing here."""
     parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
     parser.add_argument("--config", type=Path, action="append", default=[], help="what to bridge (YAML); several files are read as one")
     parser.add_argument("--all", action="store_true", help="bridge every topic, service and action that appears in either world")
@@ -55,7 +56,7 @@ def selection(options: argparse.Namespace) -> Selection:
 
 
 def set_up_logging() -> None:
-    """Log to standard error; rospy's logging set-up leaves it alone."""
+    """Log to standard error."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("[%(levelname)s] ros_bridge: %(message)s"))
     logger.addHandler(handler)
@@ -63,16 +64,22 @@ def set_up_logging() -> None:
     logger.propagate = False
 
 
-def set_up_ros1_environment() -> str:
-    """Fill in what the ROS 2 world does not set: the master, and loopback as our address if the master is there. Return the master."""
+def connect_master() -> Connection:
+    """Return the connection to the master; raises ConfigError when ROS_MASTER_URI is no address.
+
+    What the ROS 2 world does not set is filled in: the master, and loopback as our own address if the master is there.
+    """
     master_uri = os.environ.setdefault("ROS_MASTER_URI", DEFAULT_MASTER)
     if master_uri.startswith(LOOPBACK) and "ROS_HOSTNAME" not in os.environ:
         os.environ.setdefault("ROS_IP", "127.0.0.1")
-    return master_uri
+    try:
+        return Connection(master_uri)
+    except OSError as error:
+        raise ConfigError(f"ROS_MASTER_URI: {error}") from error
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Run the bridge until SIGINT or SIGTERM; return 0, 1 when a type or world is missing, 2 for bad options or no master."""
+def main(arguments: list[str]) -> int:
+    """Run the bridge until SIGINT or SIGTERM; return 0, 1 when a type or the data plane is missing, 2 for bad options or no master."""
     set_up_logging()
     options = parse_arguments(arguments)
     stop = threading.Event()
@@ -84,14 +91,14 @@ def main(arguments: Sequence[str]) -> int:
         logger.error("%s", error)
         return EXIT_CONFIG
     try:
-        two_worlds.import_ros1()
-        from ros_bridge.session import list_session, run_session
+        from ros_bridge.session import list_session, run_session  # rclpy takes its time: a wrong option is told before
 
+        master, name = connect_master(), own_name(arguments)
         if options.list:
-            sys.stdout.write(list_session(config, set_up_ros1_environment()))
+            sys.stdout.write(list_session(config, master, name))
         else:
-            run_session(config, options.stats, stop, set_up_ros1_environment(), wait=bool(options.config))
-    except NoMasterError as error:
+            run_session(config, options.stats, stop, master, name, wait=bool(options.config))
+    except (NoMasterError, ConfigError) as error:
         logger.error("%s", error)
         return EXIT_CONFIG
     except BridgeError as error:
@@ -101,7 +108,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def entry() -> None:
-    """Run as a program. rospy leaves threads that sleep up to 32 s and that Python would wait for, so the process ends itself."""
+    """Run as a program. Threads that ask a peer which hangs would be waited for, so the process ends itself."""
     code = main(sys.argv[1:])
     sys.stderr.flush()
     sys.stdout.flush()

@@ -35,7 +35,7 @@ BYTES = frozenset({"uint8", "int8", "byte", "char"})
 PART = re.compile(r"^MSG: *(\S+)$")
 
 
-BytesConverter = Callable[[bytes], memoryview]
+BytesConverter = Callable[[bytes], bytes | memoryview]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class TypePair:
     """A message type of ROS 1 and the one of ROS 2 that it becomes, both ``package/Name``.
 
     ``same_layout``: both have the same kinds of fields in the same order, but for ``Header.seq``; then the definition of either world
-    tells the bytes of both, and ``program`` is what converts them natively. ``notes``: fields without a counterpart.
+    tells the bytes of both. ``program`` is what the data plane runs between CDR and ROS 2's layout: the fields of the ROS 2 type as ROS 1
+    serializes them, which with the same layout is a message of ROS 1. ``notes``: fields without a counterpart.
     """
 
     ros1_name: str
@@ -56,6 +57,8 @@ class TypePair:
     program: tuple[int, ...]
     _ros1_to_ros2: BytesConverter
     _ros2_to_ros1: BytesConverter
+    _cdr_to_layout: BytesConverter
+    _layout_to_cdr: BytesConverter
 
     def to_ros2(self, ros1: bytes) -> bytes:
         """Convert a ROS 1 message to little-endian CDR with its 4 bytes of encapsulation; ``Header.seq`` falls away."""
@@ -66,8 +69,20 @@ class TypePair:
         ros1 = self._ros2_to_ros1(cdr)
         if self.begins_with_header and seq:
             # The view is read-only, what it views is not: no second copy of an image for four bytes.
-            struct.pack_into("<I", cast("bytearray", ros1.obj), 0, seq & 0xFFFFFFFF)
-        return ros1
+            struct.pack_into("<I", cast("bytearray", cast("memoryview", ros1).obj), 0, seq & 0xFFFFFFFF)
+        return cast("memoryview", ros1)
+
+    def to_layout(self, cdr: bytes) -> bytes:
+        """Convert CDR to ROS 2's layout."""
+        return bytes(self._cdr_to_layout(cdr))
+
+    def to_ros2_layout(self, ros1: bytes) -> bytes:
+        """Convert a ROS 1 message to ROS 2's layout."""
+        return ros1 if self.same_layout else self.to_layout(self.to_ros2(ros1))
+
+    def to_ros1_from_layout(self, content: bytes, *, seq: int = 0) -> bytes:
+        """Convert ROS 2's layout to a ROS 1 message; ``seq`` as in ``to_ros1``."""
+        return content if self.same_layout else bytes(self.to_ros1(bytes(self._layout_to_cdr(content)), seq=seq))
 
 
 @dataclass(frozen=True)
@@ -163,6 +178,7 @@ class Types:
     def _message(self, ros1_name: str, ros2_name: str) -> TypePair:
         definition = self._definitions[ros1_name]
         to_ros2, to_ros1, same_layout, notes = self._converters(ros1_name, ros2_name)
+        name2 = msg_name(ros2_name)
         return TypePair(
             ros1_name,
             ros2_name,
@@ -171,9 +187,11 @@ class Types:
             begins_with_header=bool(definition.fields) and definition.fields[0].base + definition.fields[0].array == "std_msgs/Header",
             same_layout=same_layout,
             notes=notes,
-            program=layout.compile_program(self._ros2.fielddefs, msg_name(ros2_name)) if same_layout else (),
+            program=layout.compile_program(self._ros2.fielddefs, name2),
             _ros1_to_ros2=to_ros2,
             _ros2_to_ros1=to_ros1,
+            _cdr_to_layout=lambda raw: self._ros2.cdr_to_ros1(raw, name2),
+            _layout_to_cdr=lambda raw: self._ros2.ros1_to_cdr(raw, name2),
         )
 
     def _converters(self, ros1_name: str, ros2_name: str) -> tuple[BytesConverter, BytesConverter, bool, tuple[str, ...]]:

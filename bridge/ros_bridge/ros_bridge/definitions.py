@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 SHARES_VARIABLE = "ROS_BRIDGE_ROS1_SHARE"
+MODULES_VARIABLE = "ROS_BRIDGE_ROS1_PATH"
 DIVIDER = "---"
 
 
@@ -23,13 +24,20 @@ def ros1_shares() -> list[Path]:
     return [*(Path(entry) for entry in told if entry), Path("/usr/share"), *sorted(Path("/opt/ros").glob("*/share"))]
 
 
+def ros1_modules() -> list[Path]:
+    """Return the folders in which genpy's modules of ROS 1 lie: told by the environment, then Debian's and those of /opt/ros."""
+    told = os.environ.get(MODULES_VARIABLE)
+    places = [Path("/usr/lib/python3/dist-packages"), *sorted(Path("/opt/ros").glob("*/lib/python3/dist-packages"))]
+    return [*([Path(told)] if told else []), *places]
+
+
 class DefinitionFiles:
     """Definition texts by ``package/Name``, from ``<folder>/<package>/{msg,srv}/<Name>.{msg,srv}``; the first folder that has it wins."""
 
-    def __init__(self, folders: Iterable[Path], modules: Path | None = None) -> None:
-        """Look in the folders in this order, then in the genpy modules below ``modules`` (a Python path of ROS 1)."""
+    def __init__(self, folders: Iterable[Path], modules: Iterable[Path] = ()) -> None:
+        """Look in the folders in this order, then in the genpy modules below ``modules`` (Python paths of ROS 1)."""
         self._folders = tuple(folders)
-        self._modules = modules
+        self._modules = tuple(modules)
 
     def message(self, name: str) -> str | None:
         """Return a message's text, or None when it is nowhere."""
@@ -57,10 +65,9 @@ class DefinitionFiles:
     def _from_module(self, name: str) -> str | None:
         """Read ``_full_text`` out of a generated module without importing it; its first part is the definition as it was written."""
         package, short = name.split("/")
-        path = self._modules / package / "msg" / f"_{short}.py" if self._modules is not None else None
-        if path is None or not path.is_file():
-            return None
-        return next((text.split("=" * 80)[0] for text in _full_texts(path, short)), None)
+        paths = (folder / package / "msg" / f"_{short}.py" for folder in self._modules)
+        path = next((path for path in paths if path.is_file()), None)
+        return None if path is None else next((text.split("=" * 80)[0] for text in _full_texts(path, short)), None)
 
 
 def _full_texts(path: Path, class_name: str) -> Iterator[str]:

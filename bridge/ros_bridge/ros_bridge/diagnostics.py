@@ -7,20 +7,18 @@ import time
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ros_bridge import raw, topics
-from ros_bridge.config import Direction, Spec, TopicRoute
-from ros_bridge.errors import BridgeError
-from ros_bridge.rows import SECTION_OF, quality_text, type_text, up
-from ros_bridge.stats import Figures
-from ros_bridge.wanted import Decision, Refused
+from rclpy.serialization import serialize_message
 
-import rospy  # isort: skip - after ros_bridge.raw, which fetches it
-from rclpy.serialization import serialize_message  # isort: skip
+from ros_bridge.config import Spec
+from ros_bridge.decisions import Decision, Refused
+from ros_bridge.endpoints import Ros1Publisher
+from ros_bridge.errors import BridgeError
+from ros_bridge.ros2_types import interface_class
+from ros_bridge.stats import Figures
+from ros_bridge.tables import SECTION_OF, quality_text, to_ros2, type_text
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
-    from ros_bridge.conversion import Types
+    from ros_bridge.routes import Context
 
 logger = logging.getLogger("ros_bridge")
 
@@ -33,16 +31,14 @@ OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 class Diagnostics:
     """The two publishers."""
 
-    def __init__(self, node: Node, types: Types) -> None:
+    def __init__(self, context: Context) -> None:
         """Advertise in both worlds; raises BridgeError where diagnostic_msgs is missing."""
-        self._pair = types.message(TYPE)
-        self._array = topics.interface_class(TYPE, "msg")
-        self._status = topics.interface_class("diagnostic_msgs/DiagnosticStatus", "msg")
-        self._item = topics.interface_class("diagnostic_msgs/KeyValue", "msg")
-        route = TopicRoute(TOPIC, TOPIC, Direction.ROS1_TO_ROS2, TYPE, depth=QUEUE)
-        self._ros2 = node.create_publisher(self._array, TOPIC, topics.qos_profile(route))
-        self._raw_class = raw.message_class(self._pair)
-        self._ros1 = rospy.Publisher(TOPIC, self._raw_class, queue_size=QUEUE)
+        self._pair = context.types.message(TYPE)
+        self._array = interface_class(TYPE, "msg")
+        self._status = interface_class("diagnostic_msgs/DiagnosticStatus", "msg")
+        self._item = interface_class("diagnostic_msgs/KeyValue", "msg")
+        self._ros2 = context.node.create_publisher(self._array, TOPIC, QUEUE)
+        self._ros1 = Ros1Publisher(context.plane, TOPIC, self._pair, depth=QUEUE)
         self._before: dict[Spec, tuple[int, int]] = {}
 
     def publish(
@@ -60,14 +56,14 @@ class Diagnostics:
         array.header.stamp.sec, array.header.stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)  # the bridge has wall time alone
         cdr = serialize_message(array)
         self._ros2.publish(cdr)
-        self._ros1.publish(self._raw_class(self._pair.to_ros1(cdr)))
+        self._ros1.publish(self._pair.to_ros1(cdr))
 
     def _of_route(self, spec: Spec, figures: Figures, rate_hz: float) -> Any:
         lost = (sum(figures.dropped.values()), figures.errors)
         losing = any(now > then for now, then in zip(lost, self._before.get(spec, lost), strict=True))
         self._before[spec] = lost
         values = {
-            "direction": "ros1_to_ros2" if up(spec) else "ros2_to_ros1",
+            "direction": "ros1_to_ros2" if to_ros2(spec) else "ros2_to_ros1",
             "ros2_name": spec.ros2_name,
             "type": type_text(spec),
             "quality": quality_text(spec),
@@ -88,11 +84,15 @@ class Diagnostics:
             values=[self._item(key=key, value=str(value)) for key, value in values.items()],
         )
 
+    def close(self) -> None:
+        """Withdraw the topic from ROS 1."""
+        self._ros1.close()
 
-def open_diagnostics(node: Node, types: Types) -> Diagnostics | None:
+
+def open_diagnostics(context: Context) -> Diagnostics | None:
     """Return the publishers, or None where diagnostic_msgs is not installed: bridging does not depend on them."""
     try:
-        return Diagnostics(node, types)
+        return Diagnostics(context)
     except BridgeError as error:
         logger.warning("there are no diagnostics: %s", error)
         return None

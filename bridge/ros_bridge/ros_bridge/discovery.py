@@ -1,6 +1,6 @@
 """Follow both worlds' graphs and keep the table of routes equal to what they want: one thread.
 
-ROS 2 says when its graph changes; the ROS 1 master is asked five times a second, on a kept connection. A new route first offers its
+ROS 2 tells when its graph changes, and the monitor of the master when ROS 1's does. A new route first offers its
 target's end and begins to flow when the subscribers over there have connected to it (or after a second), so that the only message of
 a short-lived publisher finds them.
 """
@@ -13,28 +13,29 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, cast
 
-from ros_bridge import ros1_probe
+from ros_bridge import tcpros
+from ros_bridge.checked_types import CheckedTypes
 from ros_bridge.config import Direction, Spec, TopicRoute
-from ros_bridge.graph import Graphs, Ros1Graph
+from ros_bridge.decisions import Decision, Refused, RouteDecision, decide
+from ros_bridge.graph import Graphs
 from ros_bridge.graph_events import GraphEvents
-from ros_bridge.lingering import Lingering
-from ros_bridge.ros1_graph import MasterClient, MasterUnreachableError, Ros1Reader
+from ros_bridge.keep_alive import KeepAlive
+from ros_bridge.ros1_graph import Ros1Reader
 from ros_bridge.ros2_graph import read_ros2_graph
 from ros_bridge.routes import key_of
-from ros_bridge.type_book import CheckedTypes
-from ros_bridge.wanted import Decision, Refused, Wanted, decide
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
     from ros_bridge.conversion import Types
+    from ros_bridge.master import Connection, MasterMonitor
     from ros_bridge.routes import RouteTable, TopicBridge
     from ros_bridge.selection import Selection
 
 logger = logging.getLogger("ros_bridge")
 
-ASK_MASTER_EVERY_S = 0.2
 LOOK_EVERY_S = 0.02  # while a route waits for its target's subscribers
+IDLE_S = 0.2  # routes that nobody wants any more end after a while
 CONNECT_WITHIN_S = 1.0
 AGAIN_AFTER_S = 0.5
 
@@ -42,52 +43,49 @@ AGAIN_AFTER_S = 0.5
 class GraphReader:
     """Both graphs, and what can be asked about their types."""
 
-    def __init__(self, node: Node, types: Types, master_uri: str, caller_id: str) -> None:
+    def __init__(self, node: Node, types: Types, master: Connection, caller_id: str) -> None:
         """Ask nothing yet."""
         self._node = node
+        self._master = master
         self._caller_id = caller_id
-        self._client = MasterClient(master_uri, caller_id)
-        self._ros1_reader = Ros1Reader(self._client, lambda name, uri: ros1_probe.service_type(name, uri, caller_id))
-        self.ros1 = Ros1Graph()
+        self._ros1 = Ros1Reader(master, caller_id, lambda name, uri: tcpros.service_type(name, uri, caller_id))
         self.types = CheckedTypes(types, self._publisher_headers)
 
-    def read_ros1(self) -> bool:
-        """Read ROS 1's graph; tell whether it has changed. Raises MasterUnreachableError."""
-        before, self.ros1 = self.ros1, self._ros1_reader.read()
-        return before is not self.ros1
+    def read_ros1(self, system: bytes) -> bool:
+        """Read ROS 1's graph from the master's answer to getSystemState; tell whether it has changed. Raises OSError."""
+        return self._ros1.read(system)
 
     def graphs(self) -> Graphs:
         """Return ROS 1's graph as it was last read, and ROS 2's of now."""
-        return Graphs(self.ros1, read_ros2_graph(self._node))
+        return Graphs(self._ros1.graph, read_ros2_graph(self._node))
 
     def _publisher_headers(self, topic: str) -> Iterator[dict[str, str]]:
-        for node in sorted(self.ros1.publishers.get(topic, ())):
+        for node in sorted(self._ros1.graph.publishers.get(topic, ())):
             try:
-                uri = str(self._client.ask("lookupNode", node))
-            except MasterUnreachableError:
-                return
-            if (header := ros1_probe.publisher_header(uri, topic, self._caller_id)) is not None:
+                uri = str(self._master.call("lookupNode", self._caller_id, node))
+            except OSError:
+                continue
+            if (header := tcpros.publisher_header(uri, topic, self._caller_id)) is not None:
                 yield header
-
-    def close(self) -> None:
-        """Close the connection to the master."""
-        self._client.close()
 
 
 class Discovery:
     """The thread. ``configured`` routes run always; discovery leaves their names alone."""
 
-    def __init__(self, reader: GraphReader, node: Node, selection: Selection, table: RouteTable, configured: Iterable[Spec]) -> None:
+    def __init__(
+        self, reader: GraphReader, node: Node, monitor: MasterMonitor, selection: Selection, table: RouteTable, configured: Iterable[Spec]
+    ) -> None:
         """Get ready."""
         self._reader = reader
+        self._monitor = monitor
         self._selection = selection
         self._table = table
         self._configured = tuple(configured)
         self._events = GraphEvents(node)
-        self._lingering = Lingering()
+        self._keep_alive = KeepAlive()
         self._made_s: dict[Spec, float] = {}
         self._said: set[str] = set()
-        self._lost_master = False
+        self._losses = 0
         self._kept_after_loss: set[Spec] = set()
         self.decisions: list[Decision] = []
         self._stop = threading.Event()
@@ -95,6 +93,7 @@ class Discovery:
 
     def start(self) -> None:
         """Begin."""
+        self._monitor.on_graph = self._events.wake
         self._thread.start()
 
     def _run(self) -> None:
@@ -106,28 +105,26 @@ class Discovery:
                     logger.exception("discovery begins again after an error")
 
     def _follow(self) -> None:
-        ask_at_s = 0.0
         changed = True
         while not self._stop.is_set():
-            now_s = time.monotonic()
-            if now_s >= ask_at_s:
-                changed = self._ask_master() or changed
-                ask_at_s = now_s + ASK_MASTER_EVERY_S
+            changed = self._read_ros1() or changed
             if changed:
                 self.decisions = decide(self._reader.graphs(), self._selection, self._reader.types, self._configured)
                 self._report()
-            waiting = self._apply(now_s)
-            changed = self._events.wait(LOOK_EVERY_S if waiting else max(ask_at_s - time.monotonic(), 0.0))
+            waiting = self._apply(time.monotonic())
+            changed = self._events.wait(LOOK_EVERY_S if waiting else IDLE_S)
 
-    def _ask_master(self) -> bool:
+    def _read_ros1(self) -> bool:
         """Read ROS 1's graph. A master that was away knows less than before: what still has connections then goes on."""
-        try:
-            changed = self._reader.read_ros1()
-        except MasterUnreachableError:
-            self._lost_master = True
+        state = self._monitor.state
+        if not state.reachable or not state.system:
             return False
-        if self._lost_master:
-            self._lost_master = False
+        try:
+            changed = self._reader.read_ros1(state.system)
+        except OSError:
+            return False
+        if state.losses != self._losses:
+            self._losses = state.losses
             self._kept_after_loss = set(self._table.running())
         return changed
 
@@ -140,7 +137,7 @@ class Discovery:
 
     def _apply(self, now_s: float) -> bool:
         """Make, start, park and close routes; tell whether one waits for its target's subscribers."""
-        wanted = self._lingering.update([one for one in self.decisions if isinstance(one, Wanted)], now_s)
+        wanted = self._keep_alive.update([one for one in self.decisions if isinstance(one, RouteDecision)], now_s)
         wanted += self._still_connected({one.spec for one in wanted})
         self._table.reconcile((*self._configured, *(one.spec for one in wanted)))
         running = self._table.running()
@@ -151,7 +148,7 @@ class Discovery:
                 waiting = self._let_flow(one, now_s) or waiting
         return waiting
 
-    def _let_flow(self, one: Wanted, now_s: float) -> bool:
+    def _let_flow(self, one: RouteDecision, now_s: float) -> bool:
         """Start a route whose subscribers have connected, park one that has none; tell whether it waits."""
         flows = self._table.started(one.spec)
         if not one.flows:
@@ -173,7 +170,7 @@ class Discovery:
         route = self._table.running().get(spec) if spec in self._kept_after_loss and isinstance(spec, TopicRoute) else None
         return route is not None and cast("TopicBridge", route).target_peers() > 0
 
-    def _still_connected(self, wanted: set[Spec]) -> list[Wanted]:
+    def _still_connected(self, wanted: set[Spec]) -> list[RouteDecision]:
         """Return the routes that a restarted master has forgotten the peers of, while these are still connected."""
         running = self._table.running()
         superseded = {key_of(spec) for spec in wanted}
@@ -182,14 +179,14 @@ class Discovery:
             route = cast("TopicBridge | None", running.get(spec))
             peers = 0 if route is None else route.source_peers() if spec.direction is Direction.ROS1_TO_ROS2 else route.target_peers()
             if peers and key_of(spec) not in superseded:
-                kept.append(Wanted(spec, peers))
+                kept.append(RouteDecision(spec, peers))
         self._kept_after_loss = {one.spec for one in kept} | (self._kept_after_loss & wanted)
         return kept
 
     def close(self) -> None:
         """Stop following; the routes are the table's."""
+        self._monitor.on_graph = lambda: None
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join(CONNECT_WITHIN_S)
         self._events.close()
-        self._reader.close()

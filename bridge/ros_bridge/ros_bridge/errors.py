@@ -12,7 +12,7 @@ class ConfigError(BridgeError):
 
 
 class WorldError(BridgeError):
-    """One of the two ROS worlds can't be imported."""
+    """Something of the ROS 2 world is not as the bridge needs it."""
 
 
 class NoMasterError(BridgeError):
@@ -25,14 +25,6 @@ class TypeUnknownError(BridgeError):
 
 class TypeDiffersError(BridgeError):
     """ROS 1 and ROS 2 lay out a type of the same name differently."""
-
-
-class CallError(BridgeError):
-    """A service call across the bridge got no answer; the message is meant for the caller."""
-
-
-class CallTimeoutError(CallError):
-    """The time that the configuration gives a service call is over."""
 
 
 class WireError(BridgeError):

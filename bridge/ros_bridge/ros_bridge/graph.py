@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 LIST_NODE = "ros_bridge_list"
-BRIDGE_NODES = frozenset({"ros_bridge", "ros_bridge_topics", LIST_NODE, "ros1_parameters"})
+BRIDGE_NODES = frozenset({"ros_bridge", LIST_NODE, "ros1_parameters"})
 ANY_TYPE = "*"  # what the ROS master has for a topic that only subscribers of any type have named
 ACTION_PARTS = ("goal", "cancel", "status", "feedback", "result")
 

@@ -58,6 +58,10 @@ class GraphEvents:
             raise WorldError(f"rcl stopped waiting for graph events ({result})")
         return bool(result == RCL_RET_OK)
 
+    def wake(self) -> None:
+        """Have ``wait`` return True, from another thread."""
+        self._rcl.rcl_trigger_guard_condition(self._condition)
+
     def close(self) -> None:
         """Free what rcl allocated."""
         self._rcl.rcl_wait_set_fini(ctypes.byref(self._set))

@@ -8,17 +8,14 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from ros_bridge import raw
-
-import rospy  # isort: skip - after ros_bridge.raw, which fetches it
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
-if TYPE_CHECKING:
-    from rclpy.node import Node
+from ros_bridge.endpoints import Ros1Publisher
 
-    from ros_bridge.conversion import Types
+if TYPE_CHECKING:
+    from ros_bridge.routes import Context
 
 logger = logging.getLogger("ros_bridge")
 
@@ -31,13 +28,12 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 class Heartbeat:
     """Publishes the state every ``PERIOD_S``, and at once when told that it has changed."""
 
-    def __init__(self, node: Node, types: Types, state: Callable[[], Mapping[str, object]]) -> None:
+    def __init__(self, context: Context, state: Callable[[], Mapping[str, object]]) -> None:
         """Open both ends; ``state`` is called for each beat."""
         self._state = state
-        self._type = types.message(STATE_TYPE)
-        self._class = raw.message_class(self._type)
-        self._ros2 = node.create_publisher(String, STATE_TOPIC, LATCHED)
-        self._ros1 = rospy.Publisher(STATE_TOPIC, self._class, latch=True, queue_size=1)
+        self._type = context.types.message(STATE_TYPE)
+        self._ros2 = context.node.create_publisher(String, STATE_TOPIC, LATCHED)
+        self._ros1 = Ros1Publisher(context.plane, STATE_TOPIC, self._type, latched=True, depth=1)
         self._sequence = 0
         self._wake = threading.Event()
         self._ending = threading.Event()
@@ -64,7 +60,7 @@ class Heartbeat:
         cdr = serialize_message(String(data=text))
         try:
             self._ros2.publish(cdr)
-            self._ros1.publish(self._class(self._type.to_ros1(cdr)))
+            self._ros1.publish(self._type.to_ros1(cdr))
         except Exception as error:  # noqa: BLE001 - of a world that is going away; the other one still has to hear
             logger.warning("a heartbeat failed: %s", error)
 
@@ -74,3 +70,4 @@ class Heartbeat:
         self._wake.set()
         if self._thread.is_alive():
             self._thread.join(within_s)
+        self._ros1.close()

@@ -8,37 +8,37 @@ from typing import TYPE_CHECKING
 import rclpy
 
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
+from ros_bridge.decisions import decide
 from ros_bridge.discovery import GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.graph import LIST_NODE
 from ros_bridge.graph_events import GraphEvents
-from ros_bridge.rows import list_table, render
-from ros_bridge.topics import interface_class
-from ros_bridge.wanted import decide
+from ros_bridge.ros2_types import interface_class
+from ros_bridge.tables import list_table, render
 
 if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig, Spec
     from ros_bridge.conversion import Types
+    from ros_bridge.master import Connection
 
 QUIET_S = 1.0
 AT_MOST_S = 5.0
 
 
-def list_routes(config: BridgeConfig, types: Types, master_uri: str) -> str:
-    """Return the table as text. rclpy has to be initialised, and the master has to answer."""
+def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:
+    """Return the table as text. rclpy has to be initialised. Raises OSError when the master does not answer any more."""
     node = rclpy.create_node(LIST_NODE)
     events = GraphEvents(node)
-    reader = GraphReader(node, types, master_uri, f"/{LIST_NODE}")
+    reader = GraphReader(node, types, master, f"/{LIST_NODE}")
     try:
         end_s = time.monotonic() + AT_MOST_S
         while time.monotonic() < end_s and events.wait(QUIET_S):  # DDS finds everybody in its own time
             time.sleep(QUIET_S / 10)
-        reader.read_ros1()
+        reader.read_ros1(master.call_raw("getSystemState", f"/{LIST_NODE}"))
         decisions = decide(reader.graphs(), config.selection, reader.types, config.routes)
         return render(list_table(decisions, {spec: problem(spec, types) for spec in config.routes}))
     finally:
         events.close()
-        reader.close()
         node.destroy_node()
 
 

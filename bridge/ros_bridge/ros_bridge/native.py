@@ -1,4 +1,4 @@
-"""The native data plane's C interface (ros_bridge_native, ``c_api.cpp`` and ``c_api_services.cpp``) as Python sees it.
+"""The data plane's C interface (ros_bridge_native, ``c_api.cpp`` and ``c_api_services.cpp``) as Python sees it.
 
 Functions that make or end something of rcl's node keep Python's lock (``PyDLL``), because rclpy works on the same node under that
 lock; those that may wait, and those that only read, let it go (``CDLL``).
@@ -14,10 +14,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, ClassVar
 
-from rclpy.type_support import check_for_type_support
-
 from ros_bridge.definitions import ament_prefixes
-from ros_bridge.errors import BridgeError
+from ros_bridge.errors import BridgeError, WorldError
 from ros_bridge.stats import BINS
 
 LIBRARY = "libros_bridge_native.so"
@@ -53,6 +51,7 @@ class Specification(Structure):
         ("token", c_uint64),
         ("reliable", c_int32),
         ("latched", c_int32),
+        ("converts", c_int32),
     ]
 
 
@@ -72,6 +71,7 @@ class ServiceSpecification(Structure):
         ("response_operations", c_uint64),
         ("timeout_ns", c_int64),
         ("token", c_uint64),
+        ("converts", c_int32),
         ("refusal_has_flag", c_int32),
         ("refusal_has_text", c_int32),
         ("refusal_before", c_char_p),
@@ -91,9 +91,22 @@ class RouteFigures(Structure):
         ("dropped_slow", c_uint64),
         ("dropped_overrun", c_uint64),
         ("peers", c_uint64),
-        ("latching", c_uint64),
         ("bins", c_uint32 * BINS),
     ]
+
+
+class MessageKind(IntEnum):
+    """What a message for Python is (``python_queue.hpp``)."""
+
+    MESSAGE = 0
+    REQUEST = 1
+    RESPONSE = 2
+
+
+class PythonMessage(Structure):
+    """A message for Python, as ``PlanePythonMessage``."""
+
+    _fields_: ClassVar = [("message", c_void_p), ("token", c_uint64), ("kind", c_int32), ("bytes", c_void_p), ("size", c_uint64)]
 
 
 class Event(Structure):
@@ -106,12 +119,11 @@ KEEPING_THE_LOCK = {
     "plane_error": (c_char_p, []),
     "plane_new": (c_void_p, [c_char_p, c_char_p]),
     "plane_delete": (None, [c_void_p]),
-    "plane_up_new": (c_void_p, [c_void_p, POINTER(Specification)]),
-    "plane_up_connect": (c_int32, [c_void_p, c_uint64, c_char_p, c_uint16]),
-    "plane_up_disconnect": (None, [c_void_p, c_uint64]),
-    "plane_up_grant": (c_int32, [c_void_p, c_uint64]),
-    "plane_down_new": (c_void_p, [c_void_p, POINTER(Specification)]),
-    "plane_down_start": (c_int32, [c_void_p]),
+    "plane_ros1_to_ros2_new": (c_void_p, [c_void_p, POINTER(Specification)]),
+    "plane_connect_publisher": (c_int32, [c_void_p, c_uint64, c_char_p, c_uint16]),
+    "plane_add_writer": (c_int32, [c_void_p, c_uint64]),
+    "plane_ros2_to_ros1_new": (c_void_p, [c_void_p, POINTER(Specification)]),
+    "plane_ros2_to_ros1_start": (c_int32, [c_void_p]),
     "plane_route_delete": (None, [c_void_p]),
     "plane_route_target_peers": (c_uint64, [c_void_p]),
     "plane_route_source_peers": (c_uint64, [c_void_p]),
@@ -120,9 +132,14 @@ KEEPING_THE_LOCK = {
     "plane_service_in_ros2_new": (c_void_p, [c_void_p, POINTER(ServiceSpecification)]),
     "plane_service_found": (None, [c_void_p, c_char_p, c_uint16]),
     "plane_service_not_found": (None, [c_void_p, c_char_p]),
+    "plane_python_done": (None, [c_void_p]),
+    "plane_python_close": (None, [c_void_p]),
     "plane_port": (c_int32, [c_void_p]),
 }
 LETTING_IT_GO = {
+    "plane_python_next": (c_int32, [c_void_p, c_int32, POINTER(PythonMessage)]),
+    "plane_python_converted": (None, [c_void_p, c_void_p, c_char_p, c_uint64, c_char_p]),
+    "plane_publish": (None, [c_void_p, c_char_p, c_uint64]),
     "plane_next_event": (c_int32, [c_void_p, c_int32, POINTER(Event)]),
     "plane_to_cdr": (c_int64, [POINTER(c_uint32), c_uint64, c_char_p, c_uint64, POINTER(c_uint8)]),
     "plane_to_ros1": (c_int64, [POINTER(c_uint32), c_uint64, c_char_p, c_uint64, c_uint32, POINTER(c_uint8)]),
@@ -156,23 +173,16 @@ class Native:
         return result
 
 
-def find_library() -> Path | None:
-    """Return where the library is, among this environment's prefixes; None when it was not built."""
+def load_library() -> Native:
+    """Load the library from this environment's prefixes; ROS_BRIDGE_NATIVE names another one. Raises WorldError."""
     told = os.environ.get("ROS_BRIDGE_NATIVE")
     candidates = [Path(told)] if told else [prefix / "lib" / LIBRARY for prefix in ament_prefixes()]
-    return next((path for path in candidates if path.is_file()), None)
+    for path in candidates:
+        if path.is_file():
+            return Native(path)
+    raise WorldError(f"no {told or LIBRARY} in {', '.join(map(str, candidates))}: build bridge/ros_bridge_native (./alula setup)")
 
 
 def words_of(program: Sequence[int]) -> Any:
     """Return a layout program as the library takes it."""
     return (c_uint32 * len(program))(*program)
-
-
-def type_support_of(interface: Any) -> int:
-    """Return the address of the type support that rclpy uses for a message or service class."""
-    check_for_type_support(interface)
-    capsule = interface.__class__._TYPE_SUPPORT  # noqa: SLF001 - rclpy reads it the same way
-    get_name, get_pointer = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer
-    get_name.restype, get_name.argtypes = c_char_p, [ctypes.py_object]
-    get_pointer.restype, get_pointer.argtypes = c_void_p, [ctypes.py_object, c_char_p]
-    return int(get_pointer(capsule, get_name(capsule)))

@@ -11,6 +11,9 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
 from ros_bridge import actions, services, topics
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
@@ -18,19 +21,14 @@ from ros_bridge.diagnostics import open_diagnostics
 from ros_bridge.discovery import Discovery, GraphReader
 from ros_bridge.errors import BridgeError
 from ros_bridge.heartbeat import Heartbeat
-from ros_bridge.master import Master, MasterWatch
+from ros_bridge.master import Connection, MasterMonitor
+from ros_bridge.native import load_library
 from ros_bridge.parameters import ParameterMirror
-from ros_bridge.plane import open_plane
+from ros_bridge.plane import Plane
 from ros_bridge.routes import Context, Maker, RouteTable
-from ros_bridge.rows import SECTION_OF, Rates, live_table, render, summary
 from ros_bridge.spinning import spin
 from ros_bridge.stats import write_json
-
-import rclpy  # isort: skip
-import rospy  # isort: skip - after ros_bridge.raw, which fetches it
-from rclpy.executors import SingleThreadedExecutor  # isort: skip
-
-from rospy.impl.registration import Registration, get_registration_listeners, get_service_manager, get_topic_manager  # isort: skip
+from ros_bridge.tables import SECTION_OF, Rates, live_table, render, summary
 
 if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig, Spec
@@ -43,51 +41,36 @@ CLEAR_SCREEN = "\x1b[H\x1b[J"
 SPIN_END_S = 1.0
 
 
-def register_again() -> None:
-    """Tell the master about every topic and service of this process; publishers that it names in return get connected."""
-    listeners = get_registration_listeners()
-    for name, kind in get_topic_manager().get_publications():
-        listeners.notify_added(name, kind, Registration.PUB)
-    for name, kind in get_topic_manager().get_subscriptions():
-        listeners.notify_added(name, kind, Registration.SUB)
-    for name, uri in get_service_manager().get_services():
-        listeners.notify_added(name, uri, Registration.SRV)
-
-
 MAKERS: dict[type, Maker] = {TopicRoute: topics.make, ServiceRoute: services.make, ActionRoute: actions.make}
 
 
 class Bridge:
-    """All routes, running. rospy and rclpy have to be initialised, and the types checked."""
+    """All routes, running. rclpy has to be initialised."""
 
-    def __init__(self, config: BridgeConfig, types: Types, master: Master) -> None:
-        """Start both nodes' ends of the heartbeat; no route yet."""
+    def __init__(self, config: BridgeConfig, types: Types, master: Connection, name: str) -> None:
+        """Start both nodes and their ends of the heartbeat; no route yet. ``name`` is that of the ROS 1 node. Raises BridgeError."""
         self._rates = Rates()
         self._rates_hz: dict[Spec, float] = {}
         self._config = config
         self._node = rclpy.create_node("ros_bridge")
-        caller_id = rospy.get_caller_id()
-        self._plane = open_plane(caller_id, master.uri, lambda: {rospy.get_node_uri()})
-        self.table = RouteTable(MAKERS, Context(self._node, types, master.uri, caller_id, self._plane))
+        self._plane = Plane(load_library(), name, master)
+        self._monitor = MasterMonitor(master, self._plane.node)
+        context = Context(self._node, types, self._plane)
+        self.table = RouteTable(MAKERS, context)
         self._discovery: Discovery | None = None
         self._parameters: ParameterMirror | None = None
         if config.selection.include:
-            reader = GraphReader(self._node, types, master.uri, caller_id)
-            self._parameters = ParameterMirror(master.uri, caller_id) if config.selection.parameters else None
-            self._discovery = Discovery(reader, self._node, config.selection, self.table, config.routes)
-        self._heartbeat = Heartbeat(self._node, types, self._state)
+            reader = GraphReader(self._node, types, master, name)
+            self._parameters = ParameterMirror(self._plane.node, master) if config.selection.parameters else None
+            self._discovery = Discovery(reader, self._node, self._monitor, config.selection, self.table, config.routes)
+        self._heartbeat = Heartbeat(context, self._state)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         if self._parameters is not None:
             self._executor.add_node(self._parameters.node)
-        self._diagnostics = open_diagnostics(self._node, types)
+        self._diagnostics = open_diagnostics(context)
         self._spinner = threading.Thread(target=spin, args=(self._executor,), name="ros2", daemon=True)
-        self._watch = MasterWatch(master, caller_id, self._register_again, self._heartbeat.changed)
-
-    def _register_again(self) -> None:
-        register_again()
-        if self._plane is not None:
-            self._plane.register_again()
+        self._monitor.on_reachable = self._heartbeat.changed
 
     def _open_configured(self) -> None:
         """Open what the configuration names.
@@ -102,9 +85,11 @@ class Bridge:
             self.table.start(spec)
 
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
-        """Bridge until asked to stop; figures are this thread's."""
+        """Bridge until asked to stop, also by ROS 1; figures are this thread's."""
+        self._plane.node.on_shutdown = stop.set
         self._spinner.start()
         self._heartbeat.start()
+        self._monitor.start()
         self._open_configured()
         counts = f"{len(self._config.topics)} topics and {len(self._config.services)} services"
         logger.info("bridging %s%s", counts, " and what discovery finds" if self._discovery is not None else "")
@@ -145,21 +130,22 @@ class Bridge:
         routes = self.table.running()
         return {
             "pid": os.getpid(),
-            "ros1_master": self._watch.reachable,
+            "ros1_master": self._monitor.state.reachable,
             **{section: sum(SECTION_OF[type(spec)] == section for spec in routes) for section in SECTION_OF.values()},
             "errors": sum(route.figures().errors for route in routes.values()),
         }
 
     def close(self) -> None:
         """End the routes, first the callers' side, then the executor."""
-        self._watch.close()
+        self._monitor.close()
         if self._discovery is not None:
             self._discovery.close()
         if self._parameters is not None:
             self._parameters.close()
         self.table.close()
-        if self._plane is not None:
-            self._plane.close()
+        if self._diagnostics is not None:
+            self._diagnostics.close()
+        self._plane.close()
         self._executor.shutdown(timeout_sec=SPIN_END_S)
         if self._spinner.is_alive():
             self._spinner.join(SPIN_END_S)

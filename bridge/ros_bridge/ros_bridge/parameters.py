@@ -1,7 +1,7 @@
 """ROS 1's parameters as parameters of a ROS 2 node, ``/ros1_parameters``: ``/camera/rate`` is its ``camera.rate``.
 
-The master's whole tree is asked for twice a second on a kept connection and looked at only when the answer is another; each change
-goes through the node, so that ``/parameter_events`` tells it. They can't be set from ROS 2: their owner is the ROS 1 master.
+The master tells the node when a parameter changes; then its whole tree is read. Each change goes through the ROS 2 node, so that
+``/parameter_events`` tells it. They can't be set from ROS 2: their owner is the ROS 1 master.
 """
 
 from __future__ import annotations
@@ -12,19 +12,21 @@ import threading
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ros_bridge.ros1_graph import MasterClient, MasterUnreachableError, value_of
-
-import rclpy  # isort: skip
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult  # isort: skip
-from rclpy.parameter import Parameter  # isort: skip
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
+    from ros_bridge.master import Connection
+    from ros_bridge.ros1_node import Ros1Node
+
 logger = logging.getLogger("ros_bridge")
 
 NODE_NAME = "ros1_parameters"
-ASK_EVERY_S = 0.5
+AGAIN_AFTER_S = 0.5
+SETTLE_S = 0.02  # a file that is loaded changes many at once
 SIM_TIME = "use_sim_time"  # every ROS 2 node has it from the start
 Value = bool | int | float | str | list[bool] | list[int] | list[float] | list[str]
 
@@ -53,20 +55,22 @@ def as_value(value: object) -> Value:
 
 
 class ParameterMirror:
-    """The node, to be spun by an executor, and the thread that asks the master."""
+    """The node, to be spun by an executor, and the thread that reads the parameters when they have changed."""
 
-    def __init__(self, master_uri: str, caller_id: str) -> None:
+    def __init__(self, ros1_node: Ros1Node, master: Connection) -> None:
         """Make the node; nothing is asked before ``start``."""
         self.node: Node = rclpy.create_node(NODE_NAME)
-        self._client = MasterClient(master_uri, caller_id)
-        self._answer = b""
+        self._ros1_node = ros1_node
+        self._master = master
         self._ours = threading.local()
+        self._changed = threading.Event()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="ros1_parameters", daemon=True)
         self.node.add_on_set_parameters_callback(self._allow)
 
     def start(self) -> None:
         """Begin."""
+        self._ros1_node.subscribe_parameters(self._changed.set)
         self._thread.start()
 
     def _allow(self, _parameters: list[Parameter[Any]]) -> SetParametersResult:
@@ -75,19 +79,16 @@ class ParameterMirror:
 
     def _run(self) -> None:
         self._ours.setting = True
-        while not self._stop.is_set():
+        while self._changed.wait() and not self._stop.wait(SETTLE_S):
+            self._changed.clear()
             try:
-                answer = self._client.ask_raw("getParam", "/")
-                if answer != self._answer:
-                    tree = value_of(answer)
-                    self._show(dict(flatten(tree)) if isinstance(tree, Mapping) else {})
-                    self._answer = answer
-            except MasterUnreachableError:
-                pass  # the last known values stay
+                tree = self._master.call("getParam", self._ros1_node.name, "/")
+                self._show(dict(flatten(tree)) if isinstance(tree, Mapping) else {})
+            except OSError:  # the last known values stay
+                self._stop.wait(AGAIN_AFTER_S)
+                self._changed.set()
             except Exception:  # one odd value must not end the mirror
                 logger.exception("ROS 1's parameters can't be shown in ROS 2")
-                self._answer = answer
-            self._stop.wait(ASK_EVERY_S)
 
     def _show(self, wanted: Mapping[str, Value]) -> None:
         shown = {
@@ -103,8 +104,8 @@ class ParameterMirror:
                 self.node.declare_parameter(name, value, ParameterDescriptor(dynamic_typing=True, description="set in ROS 1"))
 
     def close(self) -> None:
-        """Stop asking."""
+        """Read no more."""
         self._stop.set()
+        self._changed.set()
         if self._thread.is_alive():
             self._thread.join(1.0)
-        self._client.close()

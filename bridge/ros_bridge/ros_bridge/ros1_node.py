@@ -1,50 +1,65 @@
-"""A ROS 1 node without rospy: it registers what it publishes, subscribes to and serves with the master, and answers other nodes' questions.
+"""The bridge's node in ROS 1: it registers what it publishes, subscribes to and serves with the master, and answers other nodes' questions.
 
-It speaks the master and slave APIs (ROS wiki, "ROS/Master_API", "ROS/Slave_API"); messages themselves go through the native data plane.
+It speaks the master and slave APIs (ROS wiki, "ROS/Master_API", "ROS/Slave_API"); messages and calls go through the data plane.
 """
 
 from __future__ import annotations
 
-import http.client
 import logging
 import os
+import socket
 import threading
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
 from socketserver import ThreadingMixIn
 from typing import Any
-from xmlrpc.client import Error as XmlRpcError
-from xmlrpc.client import ServerProxy
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
-from ros_bridge.ros1_call import TimedTransport
+from ros_bridge.master import OK, Connection, RefusedError, call_node
 
 logger = logging.getLogger("ros_bridge")
 
+NODE_NAME = "ros_bridge"
 ANSWER_WITHIN_S = 2.0
-OK, FAILED = 1, 0
+FAILED = 0
+LOOPBACK = ("localhost", "127.")
 PublishersChanged = Callable[[str, list[str]], None]
-UNREACHABLE = (OSError, XmlRpcError, http.client.HTTPException)
 
 
-class SaysNoError(OSError):
-    """A master or node has answered, and says no."""
+def own_name(arguments: list[str]) -> str:
+    """Return the node's full name: ``ros_bridge``, or what roslaunch says by ``__name:=`` and ``__ns:=`` (or ROS_NAMESPACE)."""
+    told = dict(argument.split(":=", 1) for argument in arguments if ":=" in argument)
+    namespace = told.get("__ns", os.environ.get("ROS_NAMESPACE", "")).strip("/")
+    return "/" + "/".join(part for part in (namespace, told.get("__name", NODE_NAME)) if part)
 
 
-def ask(uri: str, method: str, *arguments: object) -> Any:
-    """Call a master's or node's method; return the value of its answer.
+def own_host() -> str:
+    """Return the name or address under which other nodes reach this one: ROS_HOSTNAME, ROS_IP, else this machine's name."""
+    return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
 
-    Raises:
-        SaysNoError: It says no.
-        OSError: It does not answer.
-    """
-    try:
-        with ServerProxy(uri, transport=TimedTransport(ANSWER_WITHIN_S)) as proxy:
-            code, text, value = getattr(proxy, method)(*arguments)
-    except (XmlRpcError, http.client.HTTPException, ValueError, TypeError) as error:
-        raise OSError(f"{uri}: {error}") from error
-    if code != OK:
-        raise SaysNoError(f"{uri}: {text}")
-    return value
+
+def bind_address(host: str) -> str:
+    """Return the address to listen on: loopback when others are told to come there, else all."""
+    return "127.0.0.1" if host.startswith(LOOPBACK) else "0.0.0.0"  # noqa: S104 - other machines' nodes are peers
+
+
+class Kind(Enum):
+    """What a node registers; the value is the end of the master's methods ``register...`` and ``unregister...``."""
+
+    PUBLISHER = "Publisher"
+    SUBSCRIBER = "Subscriber"
+    SERVICE = "Service"
+
+
+@dataclass(frozen=True)
+class Registration:
+    """One of them. ``type_name`` is empty for a service."""
+
+    kind: Kind
+    name: str
+    type_name: str = ""
 
 
 class _Handler(SimpleXMLRPCRequestHandler):
@@ -65,115 +80,114 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
 class Ros1Node:
     """The node. Safe from several threads; what the master does not hear now it hears when ``register_again`` is called."""
 
-    def __init__(self, name: str, master_uri: str, *, host: str, bind_address: str, topics_port: int, changed: PublishersChanged) -> None:
+    def __init__(self, name: str, master: Connection, *, host: str, topics_port: int, changed: PublishersChanged) -> None:
         """Listen for other nodes. ``changed`` is called with a topic and its publishers' URIs, from any thread."""
         self.name = name
-        self._master_uri = master_uri
+        self.on_shutdown: Callable[[], None] = lambda: None
+        self._on_parameters: Callable[[], None] | None = None
+        self._master = master
         self._host = host
         self._topics_port = topics_port
         self._changed = changed
         self._lock = threading.Lock()
-        self._subscribed: dict[str, str] = {}
-        self._published: dict[str, str] = {}
-        self._served: dict[str, str] = {}
-        self._untold: set[tuple[str, str]] = set()
-        self._server = _Server((bind_address, 0), _Handler, logRequests=False, allow_none=True)
-        self._server.register_instance(_Answers(self))
+        self._registered: Counter[Registration] = Counter()  # several routes may share one
+        self._untold: set[Registration] = set()
+        self._server = _Server((bind_address(host), 0), _Handler, logRequests=False, allow_none=True)
+        self._server.register_instance(_SlaveApi(self))
         self.uri = f"http://{host}:{self._server.server_address[1]}/"
         threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.2}, name="ros1_node", daemon=True).start()
 
     @property
     def master_uri(self) -> str:
         """Where the master is."""
-        return self._master_uri
+        return self._master.uri
 
-    def topics(self, kind: str) -> list[list[str]]:
-        """Return names and types of what is ``published`` or ``subscribed``."""
+    def topics(self, kind: Kind) -> list[list[str]]:
+        """Return names and types of what is published or subscribed to."""
         with self._lock:
-            return [[name, type_name] for name, type_name in (self._published if kind == "published" else self._subscribed).items()]
+            return [[one.name, one.type_name] for one in self._registered if one.kind is kind]
 
-    def subscribe(self, topic: str, type_name: str) -> None:
-        """Tell the master; its publishers are told to ``changed``."""
+    def register(self, kind: Kind, name: str, type_name: str = "") -> None:
+        """Tell the master; a subscribed topic's publishers are told to ``changed``. Calls of a service go to the port of the topics."""
+        registration = Registration(kind, name, type_name)
         with self._lock:
-            self._subscribed[topic] = type_name
-        self._tell("Subscriber", topic, type_name)
+            self._registered[registration] += 1
+        self._tell(registration)
 
-    def publish(self, topic: str, type_name: str) -> None:
-        """Tell the master."""
+    def unregister(self, kind: Kind, name: str, type_name: str = "") -> None:
+        """Tell the master that it is over, when nobody else has registered the same."""
+        registration = Registration(kind, name, type_name)
         with self._lock:
-            self._published[topic] = type_name
-        self._tell("Publisher", topic, type_name)
-
-    def serve(self, service: str) -> None:
-        """Tell the master that calls of a service go to the port of the topics."""
-        with self._lock:
-            uri = self._served[service] = f"rosrpc://{self._host}:{self._topics_port}"
-        self._tell("Service", service, uri)
-
-    def unsubscribe(self, topic: str) -> None:
-        """Tell the master that it is over."""
-        self._forget("Subscriber", self._subscribed, topic, self.uri)
-
-    def unpublish(self, topic: str) -> None:
-        """Tell the master that it is over."""
-        self._forget("Publisher", self._published, topic, self.uri)
-
-    def unserve(self, service: str) -> None:
-        """Tell the master that it is over."""
-        self._forget("Service", self._served, service, f"rosrpc://{self._host}:{self._topics_port}")
+            self._registered[registration] -= 1
+            if self._registered[registration] > 0:
+                return
+            del self._registered[registration]
+            self._untold.discard(registration)
+        try:
+            self._master.call(f"unregister{kind.value}", self.name, name, self._service_uri if kind is Kind.SERVICE else self.uri)
+        except OSError as error:
+            logger.debug("%s: %s", name, error)
 
     def register_again(self, *, only_untold: bool = False) -> None:
         """Tell the master everything, or what it has not heard yet."""
         with self._lock:
-            kinds = {"Publisher": self._published, "Subscriber": self._subscribed, "Service": self._served}
-            todo = [(kind, *entry) for kind, table in kinds.items() for entry in table.items()]
-            todo = [entry for entry in todo if not only_untold or entry[:2] in self._untold]
-        for entry in todo:
-            self._tell(*entry)
+            todo = [one for one in self._registered if not only_untold or one in self._untold]
+        for registration in todo:
+            self._tell(registration)
+        if self._on_parameters is not None and not only_untold:
+            self.subscribe_parameters(self._on_parameters)
 
-    def _tell(self, kind: str, name: str, type_or_uri: str) -> None:
-        """Register a topic with its type, or a service with where it is."""
+    def _tell(self, one: Registration) -> None:
+        what = self._service_uri if one.kind is Kind.SERVICE else one.type_name
         try:
-            answer = ask(self._master_uri, f"register{kind}", self.name, name, type_or_uri, self.uri)
+            answer = self._master.call(f"register{one.kind.value}", self.name, one.name, what, self.uri)
         except OSError:
             with self._lock:
-                self._untold.add((kind, name))
+                self._untold.add(one)
             return
         with self._lock:
-            self._untold.discard((kind, name))
-        if kind == "Subscriber":
-            self._changed(name, list(answer))
+            self._untold.discard(one)
+        if one.kind is Kind.SUBSCRIBER:
+            self._changed(one.name, list(answer))
 
-    def _forget(self, kind: str, table: dict[str, str], name: str, uri: str) -> None:
-        with self._lock:
-            self._untold.discard((kind, name))
-            if table.pop(name, None) is None:
-                return
+    @property
+    def _service_uri(self) -> str:
+        return f"rosrpc://{self._host}:{self._topics_port}"
+
+    def subscribe_parameters(self, changed: Callable[[], None]) -> None:
+        """Have ``changed`` called now, after a restart of the master, and whenever the master tells that a parameter has changed."""
+        self._on_parameters = changed
         try:
-            ask(self._master_uri, f"unregister{kind}", self.name, name, uri)
+            self._master.call("subscribeParam", self.name, self.uri, "/")
         except OSError as error:
-            logger.debug("%s: %s", name, error)
+            logger.debug("parameters: %s", error)
+        changed()
+
+    def parameter_changed(self) -> None:
+        """Take the master's word that a parameter has changed."""
+        if self._on_parameters is not None:
+            self._on_parameters()
 
     def place_of_service(self, service: str) -> tuple[str, int] | None:
         """Ask the master where a service's server is: host and port; None when it knows none. Raises OSError or ValueError."""
         try:
-            uri = str(ask(self._master_uri, "lookupService", self.name, service))
-        except SaysNoError:
+            uri = str(self._master.call("lookupService", self.name, service))
+        except RefusedError:
             return None
         host, _, port = uri.removeprefix("rosrpc://").rstrip("/").rpartition(":")
         return host, int(port)
 
     def place_of(self, topic: str, publisher_uri: str) -> tuple[str, int]:
         """Ask a publisher where it sends a topic from: host and port. Raises OSError."""
-        protocol = ask(publisher_uri, "requestTopic", self.name, topic, [["TCPROS"]])
+        protocol = call_node(publisher_uri, "requestTopic", self.name, topic, [["TCPROS"]], within_s=ANSWER_WITHIN_S)
         if not protocol or protocol[0] != "TCPROS":
             raise OSError(f"{publisher_uri} does not speak TCPROS: {protocol}")
         return str(protocol[1]), int(protocol[2])
 
     def offers(self, topic: str) -> tuple[str, int] | None:
         """Return where subscribers connect to; None when the topic is not published here."""
-        with self._lock:
-            return (self._host, self._topics_port) if topic in self._published else None
+        published = any(name == topic for name, _ in self.topics(Kind.PUBLISHER))
+        return (self._host, self._topics_port) if published else None
 
     def changed(self, topic: str, publishers: list[str]) -> None:
         """Take the master's word on who publishes a topic."""
@@ -181,17 +195,22 @@ class Ros1Node:
 
     def close(self) -> None:
         """Unregister everything and stop answering."""
-        for topic, _ in self.topics("subscribed"):
-            self.unsubscribe(topic)
-        for topic, _ in self.topics("published"):
-            self.unpublish(topic)
-        for service in tuple(self._served):
-            self.unserve(service)
+        if self._on_parameters is not None:
+            self._on_parameters = None
+            try:
+                self._master.call("unsubscribeParam", self.name, self.uri, "/")
+            except OSError as error:
+                logger.debug("parameters: %s", error)
+        with self._lock:
+            left = dict(self._registered)
+        for one, number in left.items():
+            for _ in range(number):
+                self.unregister(one.kind, one.name, one.type_name)
         self._server.shutdown()
         self._server.server_close()
 
 
-class _Answers:
+class _SlaveApi:
     """The slave API; each answer is ``[code, text, value]``. Names are the protocol's."""
 
     def __init__(self, node: Ros1Node) -> None:
@@ -221,11 +240,11 @@ class _Answers:
 
     def getSubscriptions(self, _caller: str) -> list[Any]:  # noqa: N802
         """Tell what is subscribed to."""
-        return [OK, "", self._node.topics("subscribed")]
+        return [OK, "", self._node.topics(Kind.SUBSCRIBER)]
 
     def getPublications(self, _caller: str) -> list[Any]:  # noqa: N802
         """Tell what is published."""
-        return [OK, "", self._node.topics("published")]
+        return [OK, "", self._node.topics(Kind.PUBLISHER)]
 
     def getBusStats(self, _caller: str) -> list[Any]:  # noqa: N802
         """Tell nothing about connections: the bridge's own figures do."""
@@ -236,10 +255,12 @@ class _Answers:
         return [OK, "see the bridge's figures", []]
 
     def paramUpdate(self, _caller: str, _key: str, _value: object) -> list[Any]:  # noqa: N802
-        """Take a parameter's change; none was subscribed to."""
+        """Hear from the master that a parameter has changed."""
+        self._node.parameter_changed()
         return [OK, "", 0]
 
     def shutdown(self, caller: str, reason: str = "") -> list[Any]:
-        """Refuse: the bridge ends by its own node (``/ros_bridge``), with both halves together."""
-        logger.warning("%s asks %s to shut down (%s): ask the bridge's main node", caller, self._node.name, reason)
-        return [FAILED, "ask the bridge's main node", 0]
+        """End the bridge: another node has taken the name, or somebody asks for it (rosnode kill)."""
+        logger.warning("%s asks %s to shut down: %s", caller, self._node.name, reason or "no reason given")
+        self._node.on_shutdown()
+        return [OK, "", 0]

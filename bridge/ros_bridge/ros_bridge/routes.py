@@ -55,9 +55,7 @@ class Context:
 
     node: Node
     types: Types
-    master_uri: str
-    caller_id: str
-    plane: Plane | None = None
+    plane: Plane
 
 
 class Maker(Protocol):

@@ -1,6 +1,4 @@
-"""Services through rospy and rclpy: one class for each side that the server can be on. Every call ends within its time.
-
-It is for types whose layouts differ, and where the native data plane was not built; all others are ``fast_services``.
+"""Services: a route of the data plane each, whichever world the server is in. Every call ends within its time.
 
 What a caller gets when there is no answer: in ROS 1 a service error with the reason. ROS 2 knows no such error: a response with
 a flag ``accepted`` or ``success`` gets it false and the reason in ``reason`` or ``message``; one without gets no response, so the
@@ -9,169 +7,96 @@ caller's own timeout ends its wait (and the bridge's log says why).
 
 from __future__ import annotations
 
-import logging
-import threading
-import time
+import ctypes
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 
-from ros_bridge import raw
+from ros_bridge import native
 from ros_bridge.config import ServiceRoute, World
-from ros_bridge.errors import CallError, CallTimeoutError
-from ros_bridge.fast_services import FastService
-from ros_bridge.later import Header, LaterService
-from ros_bridge.ros1_call import POLL_S, Deadline, Ros1Service
-from ros_bridge.stats import RouteStats
-from ros_bridge.topics import interface_class
-
-import rospy  # isort: skip - after ros_bridge.raw, which fetches it
-import rosgraph  # isort: skip
+from ros_bridge.native import MessageKind
+from ros_bridge.native_route import NativeRoute
+from ros_bridge.ros1_node import Kind
+from ros_bridge.ros2_types import interface_class, type_support_of
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
     from ros_bridge.conversion import ServiceType
-    from ros_bridge.raw import RawMessage
     from ros_bridge.routes import Context, Route
-    from ros_bridge.stats import Figures
 
-logger = logging.getLogger("ros_bridge")
-
-CONCURRENT_CALLS = 16  # of one service towards ROS 1, each in a thread
-WAITING_CALLS = 32  # of one service; more are refused at once
 FLAGS = ("accepted", "success")
 TEXTS = ("reason", "message")
 LENGTH_BYTES = 4  # before a string in ROS 1
 
 
-class Ros2Server:
-    """A service whose server lives in ROS 2, offered in ROS 1. rospy gives each caller a thread; it waits here for the answer."""
+@dataclass(frozen=True)
+class Refusal:
+    """How a response says no: bytes, as ROS 1 serializes, before and behind the reason. Without a flag it can't, without a text not why."""
 
-    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node) -> None:
-        """Offer the service; calls are answered as soon as the node is spun."""
-        self._route = route
-        self._node = node
-        self._type = service
-        self._stats = RouteStats()
-        self._ros2_class = interface_class(service.ros2_name, "srv")
-        self._closed = threading.Event()
-        self._client = node.create_client(self._ros2_class, route.ros2_name)
-        self._raw_service = raw.service_class(service)
-        self._service = rospy.Service(route.ros1_name, self._raw_service, self._handle)
-
-    def _handle(self, request: RawMessage) -> RawMessage:
-        start_ns = time.perf_counter_ns()
-        try:
-            response = self._call(bytes(request.data))
-        except CallError as error:
-            self._stats.failed()
-            raise rospy.ServiceException(f"{self._route.ros1_name} by the bridge: {error}") from error
-        self._stats.crossed(time.perf_counter_ns() - start_ns)
-        answer: RawMessage = self._raw_service._response_class(response)  # noqa: SLF001 - rospy's attribute
-        return answer
-
-    def _call(self, ros1_request: bytes) -> memoryview:
-        """Call the server in ROS 2 with a serialized request; return the serialized response."""
-        deadline = Deadline.after(self._route.timeout_s)
-        request = deserialize_message(self._type.request.to_ros2(ros1_request), self._ros2_class.Request)
-        self._wait_for_server(deadline)
-        answered = threading.Event()
-        future = self._client.call_async(request)
-        future._set_executor = lambda _: None  # noqa: SLF001 - else its callback waits for another round of the executor
-        future.add_done_callback(lambda _: answered.set())
-        try:
-            while not answered.wait(min(POLL_S, deadline.remaining_s("the server in ROS 2 has not answered"))):
-                self._require_alive()
-        finally:
-            self._client.remove_pending_request(future)
-        return self._type.response.to_ros1(serialize_message(future.result()))
-
-    def _wait_for_server(self, deadline: Deadline) -> None:
-        while not self._client.service_is_ready():
-            if self._closed.wait(min(POLL_S, deadline.remaining_s(f"no server for {self._route.ros2_name} in ROS 2"))):
-                raise CallError("the bridge is shutting down")
-
-    def _require_alive(self) -> None:
-        if self._closed.is_set():
-            raise CallError("the bridge is shutting down")
-        if not self._client.service_is_ready():
-            raise CallError("the server in ROS 2 ended in the call")
-
-    def start(self) -> None:
-        """Do nothing: a call reaches for the server when it comes."""
-
-    def figures(self) -> Figures:
-        """Return what was called."""
-        return self._stats.figures()
-
-    def close(self) -> None:
-        """Withdraw the service; callers get an error."""
-        self._closed.set()
-        self._service.shutdown()
-        self._node.destroy_client(self._client)
+    has_flag: bool = False
+    has_text: bool = False
+    before: bytes = b""
+    after: bytes = b""
 
 
-class Ros1Server:
-    """A service whose server lives in ROS 1, offered in ROS 2. The executor only takes the request; threads wait for the answer."""
+class NativeService(NativeRoute):
+    """One route."""
 
-    def __init__(self, route: ServiceRoute, service: ServiceType, node: Node) -> None:
-        """Offer the service; calls are taken as soon as the node is spun."""
-        self._route = route
-        self._node = node
-        self._type = service
-        self._stats = RouteStats()
-        self._ros2_class = interface_class(service.ros2_name, "srv")
-        self._link = Ros1Service(route.ros1_name, service.md5sum, master_uri=rosgraph.get_master_uri(), caller_id=rospy.get_caller_id())
-        self._threads = ThreadPoolExecutor(CONCURRENT_CALLS, thread_name_prefix=route.ros2_name)
-        self._vacancies = threading.Semaphore(CONCURRENT_CALLS + WAITING_CALLS)
-        self._service = LaterService(node, self._ros2_class, route.ros2_name, self._take)
-
-    def _take(self, request: Any, header: Header) -> None:
-        deadline = Deadline.after(self._route.timeout_s)
-        if self._vacancies.acquire(blocking=False):
-            self._threads.submit(self._answer, request, header, deadline)
+    def __init__(self, spec: ServiceRoute, service: ServiceType, context: Context) -> None:
+        """Offer the service; calls cross from here on. Raises BridgeError."""
+        super().__init__(context.plane, spec.label)
+        self._spec = spec
+        self._in_ros1 = spec.server is World.ROS1
+        request, response = service.request, service.response
+        same_layout = request.same_layout and response.same_layout
+        if not same_layout:
+            to_server = request.to_ros1_from_layout if self._in_ros1 else request.to_ros2_layout
+            to_client = response.to_ros2_layout if self._in_ros1 else response.to_ros1_from_layout
+            self._convert_in_python({MessageKind.REQUEST: to_server, MessageKind.RESPONSE: to_client})
+        interface = interface_class(service.ros2_name, "srv")
+        no = refusal_around(interface.Response, response.to_layout)
+        with context.node.handle:
+            specification = native.ServiceSpecification(
+                ros1_service=spec.ros1_name.encode(),
+                ros1_type=service.ros1_name.encode(),
+                md5sum=service.md5sum.encode(),
+                ros2_service=spec.ros2_name.encode(),
+                node=context.node.handle.pointer,
+                type_support=type_support_of(interface),
+                request_program=native.words_of(request.program),
+                request_operations=len(request.program) // 4,
+                response_program=native.words_of(response.program),
+                response_operations=len(response.program) // 4,
+                timeout_ns=round(spec.timeout_s * 1e9),
+                token=self._token,
+                converts=not same_layout,
+                refusal_has_flag=no.has_flag,
+                refusal_has_text=no.has_text,
+                refusal_before=no.before,
+                refusal_before_bytes=len(no.before),
+                refusal_after=no.after,
+                refusal_after_bytes=len(no.after),
+            )
+            make = self._native.service_in_ros1_new if self._in_ros1 else self._native.service_in_ros2_new
+            self._handle = self._native.require(make(self._plane.context, ctypes.byref(specification)))
+        if self._in_ros1:
+            self._plane.call(self._token, self._handle, spec.ros1_name)
         else:
-            self._refuse(header, CallError(f"the bridge has {CONCURRENT_CALLS + WAITING_CALLS} calls of this service waiting"))
-
-    def _answer(self, request: Any, header: Header, deadline: Deadline) -> None:
-        start_ns = time.perf_counter_ns()
-        try:
-            ros1_request = self._type.request.to_ros1(serialize_message(request))
-            ros1_response = self._link.call(ros1_request, deadline)
-            response = deserialize_message(self._type.response.to_ros2(ros1_response), self._ros2_class.Response)
-            self._service.reply(response, header)
-            self._stats.crossed(time.perf_counter_ns() - start_ns)
-        except CallError as error:
-            self._refuse(header, error)
-        except Exception as error:  # noqa: BLE001 - an answer that can't be read must not leave the caller without one
-            self._refuse(header, CallError(f"{type(error).__name__}: {error}"))
-        finally:
-            self._vacancies.release()
-
-    def _refuse(self, header: Header, error: CallError) -> None:
-        self._stats.failed()
-        reason = f"{self._route.ros2_name} by the bridge: {error}"
-        kind = "timed out" if isinstance(error, CallTimeoutError) else "failed"
-        logger.warning("call %s: %s", kind, reason)
-        response = refusal(self._ros2_class.Response, reason)
-        if response is not None:
-            self._service.reply(response, header)
+            self._plane.node.register(Kind.SERVICE, spec.ros1_name)
 
     def start(self) -> None:
         """Do nothing: a call reaches for the server when it comes."""
 
-    def figures(self) -> Figures:
-        """Return what was called."""
-        return self._stats.figures()
-
     def close(self) -> None:
-        """End the calls under way; their callers get refusals."""
-        self._link.close()
-        self._threads.shutdown(wait=False, cancel_futures=True)
-        self._service.close()
+        """Withdraw the service; calls under way end with an error or a refusal."""
+        if self._handle is None:
+            return
+        if self._in_ros1:
+            self._plane.call_no_more(self._token)
+        else:
+            self._plane.node.unregister(Kind.SERVICE, self._spec.ros1_name)
+        self._delete()
 
 
 def refusal(response_class: Any, reason: str) -> Any | None:
@@ -188,26 +113,18 @@ def refusal(response_class: Any, reason: str) -> Any | None:
     return response
 
 
-def refusal_around(response_class: Any, convert: Callable[[bytes], memoryview]) -> tuple[bool, bool, bytes, bytes]:
-    """Return a response that says no as bytes of ROS 1: whether it can, whether it has a reason, and what is before and after that."""
+def refusal_around(response_class: Any, to_layout: Callable[[bytes], bytes]) -> Refusal:
+    """Return a response that says no as bytes in ROS 1's serialization, taken apart around the reason."""
     empty = refusal(response_class, "")
     if empty is None:
-        return False, False, b"", b""
-    without, with_a_letter = (bytes(convert(serialize_message(refusal(response_class, reason)))) for reason in ("", "x"))
+        return Refusal()
+    without, with_a_letter = (to_layout(serialize_message(refusal(response_class, reason))) for reason in ("", "x"))
     if without == with_a_letter:
-        return True, False, without, b""
+        return Refusal(has_flag=True, before=without)
     length_at = next(place for place, (one, other) in enumerate(zip(without, with_a_letter, strict=False)) if one != other)
-    return True, True, without[:length_at], without[length_at + LENGTH_BYTES :]
-
-
-KINDS: dict[World, type[Ros2Server | Ros1Server]] = {World.ROS1: Ros1Server, World.ROS2: Ros2Server}
+    return Refusal(has_flag=True, has_text=True, before=without[:length_at], after=without[length_at + LENGTH_BYTES :])
 
 
 def make(spec: ServiceRoute, context: Context) -> Route:
-    """Make a service's route, by the native data plane where the layouts agree; raises BridgeError when its type can't cross."""
-    service = context.types.service(spec.type_name, spec.ros2_type)
-    if context.plane is not None and service.request.same_layout and service.response.same_layout:
-        interface = interface_class(service.ros2_name, "srv")
-        no = refusal_around(interface.Response, service.response.to_ros1)
-        return FastService(spec, service, interface, no, context.node, context.plane)
-    return KINDS[spec.server](spec, service, context.node)
+    """Make a service's route; raises BridgeError when its type can't cross."""
+    return NativeService(spec, context.types.service(spec.type_name, spec.ros2_type), context)

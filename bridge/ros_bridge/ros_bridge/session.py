@@ -9,32 +9,26 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_bridge import two_worlds
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+
 from ros_bridge.conversion import Types
-from ros_bridge.definitions import DefinitionFiles, ament_prefixes, ros1_shares
+from ros_bridge.definitions import DefinitionFiles, ament_prefixes, ros1_modules, ros1_shares
 from ros_bridge.errors import NoMasterError
-from ros_bridge.master import Master
-
-two_worlds.import_ros1()
-
-import rclpy  # noqa: E402 - ROS 1 goes first
-import rospy  # noqa: E402
-from rclpy.signals import SignalHandlerOptions  # noqa: E402
-
-from ros_bridge.listing import list_routes  # noqa: E402
-from ros_bridge.node import Bridge  # noqa: E402
+from ros_bridge.listing import list_routes
+from ros_bridge.master import Connection, answers, wait_for_master
+from ros_bridge.node import Bridge
 
 if TYPE_CHECKING:
     from ros_bridge.config import BridgeConfig
 
 logger = logging.getLogger("ros_bridge")
 
-NODE_NAME = "ros_bridge"
-SWITCH_INTERVAL_S = 0.0005  # a thread that copies an image must not keep /clock waiting for Python's usual 5 ms
+SWITCH_INTERVAL_S = 0.0005  # a thread that converts a message must not keep others waiting for Python's usual 5 ms
 END_WITHIN_S = 1.5
 
 
-def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.Event, master_uri: str, *, wait: bool) -> None:
+def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.Event, master: Connection, name: str, *, wait: bool) -> None:
     """Start both nodes, bridge until asked to stop (or shut down by either world), end both nodes.
 
     Neither node takes time from ``/clock``: the bridge has to work before it ticks, and is what makes it tick in ROS 2.
@@ -44,42 +38,40 @@ def run_session(config: BridgeConfig, stats_file: Path | None, stop: threading.E
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     types = make_types(config)
-    master = Master(master_uri, f"/{NODE_NAME}")
     if not wait:
-        require_master(master)
-    if not master.wait(stop):
+        require_master(master, name)
+    if not wait_for_master(master, name, stop):
         return
-    rospy.init_node(NODE_NAME, argv=sys.argv, disable_signals=True, disable_rostime=True)
-    rospy.on_shutdown(stop.set)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        bridge = Bridge(config, types, master)
+        bridge = Bridge(config, types, master, name)
         bridge.run(stop, stats_file)
         _end_for_sure()
         bridge.close()
     finally:
-        rospy.signal_shutdown("the bridge ends")
         rclpy.try_shutdown()
     logger.info("ended")
 
 
 def make_types(config: BridgeConfig) -> Types:
     """Return the types of both worlds, with the configuration's rules."""
-    return Types(ament_prefixes(), config.rules, DefinitionFiles(ros1_shares(), two_worlds.find_ros1_path()))
+    return Types(ament_prefixes(), config.rules, DefinitionFiles(ros1_shares(), ros1_modules()))
 
 
-def require_master(master: Master) -> None:
+def require_master(master: Connection, name: str) -> None:
     """Check that the master answers; raises NoMasterError."""
-    if master.knows(f"/{NODE_NAME}") is None:
+    if not answers(master, name):
         raise NoMasterError(f"no ROS master answers at {master.uri}: start one (roscore), or set ROS_MASTER_URI to where it is")
 
 
-def list_session(config: BridgeConfig, master_uri: str) -> str:
+def list_session(config: BridgeConfig, master: Connection, name: str) -> str:
     """Return the table of what would be bridged; raises NoMasterError."""
-    require_master(Master(master_uri, f"/{NODE_NAME}"))
+    require_master(master, name)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        return list_routes(config, make_types(config), master_uri)
+        return list_routes(config, make_types(config), master)
+    except OSError as error:
+        raise NoMasterError(f"the ROS master does not answer any more: {error}") from error
     finally:
         rclpy.try_shutdown()
 

@@ -79,7 +79,6 @@ class RouteStats:
         self._lock = threading.Lock()
         self._durations = Durations()
         self._bytes = 0
-        self._dropped: dict[str, int] = {}
         self.errors = 0
 
     def crossed(self, duration_ns: int, size_bytes: int = 0) -> None:
@@ -87,11 +86,6 @@ class RouteStats:
         with self._lock:
             self._durations.add(duration_ns)
             self._bytes += size_bytes
-
-    def dropped(self, reason: str, number: int = 1) -> None:
-        """Count messages that did not cross, by the reason."""
-        with self._lock:
-            self._dropped[reason] = self._dropped.get(reason, 0) + number
 
     def failed(self) -> int:
         """Count a message that could not be converted, or a call without an answer; return how many so far."""
@@ -107,7 +101,6 @@ class RouteStats:
                 bytes=self._bytes,
                 p50_ms=self._durations.percentile_ms(0.50),
                 p95_ms=self._durations.percentile_ms(0.95),
-                dropped=dict(self._dropped),
                 errors=self.errors,
             )
 

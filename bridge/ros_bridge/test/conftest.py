@@ -1,6 +1,8 @@
 """What the bridge's live tests stand on: a ROS master, the bridge with the configuration of the test's module, peers in each world."""
 
 import time
+from types import SimpleNamespace
+from xmlrpc.client import ServerProxy
 
 import pytest
 from ros_bridge_action_nodes import ActionNode
@@ -90,3 +92,17 @@ def leave_nothing_running():
         if process not in before:
             process.close()
     RUNNING[:] = before
+
+
+@pytest.fixture(scope="module")
+def world(bridge, master, ros2_peer):
+    """Give all that runs: a master, a bridge with the module's ``CONFIG``, and a peer in ROS 2."""
+    return SimpleNamespace(master=master, bridge=bridge, ros2=ros2_peer, proxy=ServerProxy(master.uri))
+
+
+@pytest.fixture(autouse=True)
+def tidy(request):
+    """End what the test has made of the module's peer in ROS 2."""
+    yield
+    if "world" in request.fixturenames and "ros2_peer" in request.fixturenames:
+        request.getfixturevalue("ros2_peer").tidy()

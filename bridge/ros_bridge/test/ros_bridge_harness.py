@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from xmlrpc.client import ServerProxy
 
@@ -142,11 +142,11 @@ class Ros1Peer(Lines):
 
 
 class BridgeProcess(Lines):
-    def __init__(self, master: Master, folder: Path, config: str, *arguments: str) -> None:
+    def __init__(self, master: Master, folder: Path, config: str, *arguments: str, program: Sequence[str] = ("-m", "ros_bridge")) -> None:
         folder.mkdir(exist_ok=True, parents=True)
         (folder / "bridge.yaml").write_text(config)
         self.stats_file = folder / "bridge_stats.json"
-        command = [sys.executable, "-m", "ros_bridge", "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file), *arguments]
+        command = [sys.executable, *program, "--config", str(folder / "bridge.yaml"), "--stats", str(self.stats_file), *arguments]
         super().__init__([*command, f"__log:={folder}/bridge.log"], master.environment, errors=True)
 
     def wait_running(self) -> None:

@@ -7,24 +7,18 @@ import threading
 from ros_bridge_harness import PROBE_S
 from std_msgs.msg import String
 
-from ros_bridge import hostile
-from ros_bridge.hostile import LENGTH, HostilePublisher
+from bridge_tools.hostile import LENGTH, HostilePublisher
+from ros_bridge.tcpros import decode_header, encode_header
 
 STRING_SUM = "992ce8a1687cec8c8bd883ec73ca41d1"
 
 
 def header(**fields):
-    return hostile.header(fields)
+    return encode_header(fields)
 
 
 def read_header(connection):
-    body, fields = read_frame(connection), {}
-    while body:
-        size = LENGTH.unpack(body[:4])[0]
-        name, _, value = body[4 : 4 + size].decode().partition("=")
-        fields[name] = value
-        body = body[4 + size :]
-    return fields
+    return decode_header(read_frame(connection))
 
 
 def read_frame(connection):
@@ -77,10 +71,10 @@ def until_it_arrives(publisher, connection, text):
 class FakePublisher(HostilePublisher):
     """A ROS 1 publisher that answers each connection with the next of given bytes, or the last, and closes it."""
 
-    def __init__(self, master, replies, topic="/bp/fake"):
+    def __init__(self, master, replies, topic="/bp/fake", type_name="std_msgs/String"):
         self.replies = list(replies)
         self.answered = 0
-        super().__init__(master.uri, topic, "std_msgs/String", name="/fake", reply=b"", talk=self._answer)
+        super().__init__(master.uri, topic, type_name, name="/fake", reply=b"", talk=self._answer)
 
     def _answer(self, connection):
         connection.sendall(self.replies[min(self.answered, len(self.replies) - 1)])

@@ -11,7 +11,6 @@ from ros_bridge import actionlib_wire
 from ros_bridge.action_states import ROS1_TERMINAL, ROS2_TERMINAL, TO_ROS1, TO_ROS2, CancelCode, Ros1Status, Ros2Status
 from ros_bridge.action_types import action_type, split
 from ros_bridge.actionlib_wire import GoalId, GoalStatus
-from ros_bridge.bridge_watch import BridgeWatch, OtherWorld
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.errors import TypeUnknownError, WireError
 from ros_bridge.goals_to_ros1 import GoalsToRos1
@@ -345,22 +344,3 @@ def test_restarted_actionlib_server_that_no_longer_lists_a_goal_aborts_it():
     table.request_cancel("cancel", goal_uuid(0), 0, 0.3)
     table.request_cancel("cancel", goal_uuid(5), 0, 0.3)
     assert clients.cancels == [(CancelCode.GOAL_TERMINATED, []), (CancelCode.UNKNOWN_GOAL_ID, [])]
-
-
-def beat(sequence: int, *, master: bool = True, state: str = "running") -> str:
-    return f'{{"state": "{state}", "sequence": {sequence}, "ros1_master": {str(master).lower()}}}'
-
-
-def test_watch_tells_within_half_a_second_that_the_other_world_is_gone():
-    watch = BridgeWatch()
-    assert watch.look(0.0) is OtherWorld.NO_BRIDGE
-    watch.hear(beat(1), 10.0)
-    assert watch.look(10.5) is OtherWorld.REACHABLE
-    assert watch.look(10.51) is OtherWorld.NO_BRIDGE
-    watch.hear(beat(1), 10.6)  # the latched one once more, from a bridge that hangs
-    assert watch.look(10.6) is OtherWorld.NO_BRIDGE
-    watch.hear(beat(2, master=False), 10.7)
-    assert watch.look(10.7) is OtherWorld.NO_ROS1_MASTER
-    watch.hear("no JSON", 10.8)
-    watch.hear(beat(3, state="stopping"), 10.9)
-    assert watch.look(10.9) is OtherWorld.NO_BRIDGE

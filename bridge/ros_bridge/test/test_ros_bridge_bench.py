@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from ros_bridge import bench, bench_run
-from ros_bridge.bench_cases import FLAT_OUT, OFFICIAL, ServiceCase, TopicCase, Way, all_cases
-from ros_bridge.bench_ends import protocol
+from bridge_tools import bench, bench_run
+from bridge_tools.bench_cases import FLAT_OUT, OFFICIAL, ServiceCase, TopicCase, Way, all_cases
+from bridge_tools.bench_ends import protocol
 
 
 def test_every_case_of_the_official_figures_is_measured():

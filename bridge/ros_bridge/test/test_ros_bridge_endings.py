@@ -3,6 +3,7 @@
 import json
 import signal
 import time
+from xmlrpc.client import ServerProxy
 
 from ros_bridge_harness import BridgeProcess, Master, Ros1Peer, wait_until
 from ros_bridge_nodes import Ros2Peer, open_up
@@ -23,6 +24,36 @@ def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, r
         about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
         figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
         assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}
+
+
+WITHOUT_ROS1 = """
+import sys
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {"rospy", "rosgraph", "roslib", "genpy", "rospkg", "actionlib"}:
+            raise ImportError(f"the bridge imports {name}")
+sys.meta_path.insert(0, Refuse())
+from ros_bridge.cli import entry
+entry()
+"""
+
+
+def test_bridge_is_one_node_of_each_world_and_imports_no_ros1(ros2_domain, master, tmp_path):
+    config = "discover: {all: true, parameters: true}\nactions:\n  - {name: /bt_count, server: ros2, type: bridge_test_interfaces/Count}\n"
+    process = BridgeProcess(master, tmp_path, config, program=("-c", WITHOUT_ROS1))
+    process.wait_running()
+    ros2, peer = Ros2Peer(), Ros1Peer(master)
+    received = open_up(peer, ros2, "/bt_without", String, "std_msgs/String", values={"data": "crosses"})
+    assert received[0].data == "crosses"
+    peer.do("subscribe", topic="/diagnostics", type="diagnostic_msgs/DiagnosticArray")
+    peer.expect("message", topic="/diagnostics")
+    state = ServerProxy(master.uri).getSystemState("/t")[2]
+    nodes = {node for kind in state for _, nodes in kind for node in nodes if "bridge" in node and "peer" not in node}
+    assert nodes == {"/ros_bridge"}
+    assert [name for name in ros2.node.get_node_names() if "peer" not in name and name] == ["ros_bridge", "ros1_parameters"]
+    ros2.tidy()
+    ros2.close()
+    assert process.close() < 5.0
 
 
 def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):

@@ -23,7 +23,7 @@ HEADER = (("seq", "uint32", None), ("stamp", "time", None), ("frame_id", "string
 
 @pytest.fixture(scope="module")
 def library():
-    return native.Native(native.find_library())
+    return native.load_library()
 
 
 def convert(function, program, data, *more):

@@ -193,8 +193,8 @@ def test_ros1_definitions_are_read_from_generated_modules(tmp_path):
     module.write_text(
         'class Odd:\n  _md5sum = "x"\n  _full_text = """int32 a\nHeader h\n' + "=" * 80 + '\nMSG: std_msgs/Header\nuint32 seq\n"""\n'
     )
-    assert DefinitionFiles([], tmp_path).message("gen_msgs/Odd") == "int32 a\nHeader h\n"
-    assert DefinitionFiles([], tmp_path).message("gen_msgs/Even") is None
+    assert DefinitionFiles([], [tmp_path]).message("gen_msgs/Odd") == "int32 a\nHeader h\n"
+    assert DefinitionFiles([], [tmp_path]).message("gen_msgs/Even") is None
 
 
 def test_a_definition_that_can_not_be_read_is_an_error_with_its_name(world):

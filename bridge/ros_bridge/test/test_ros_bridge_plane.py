@@ -35,7 +35,7 @@ def place_in_ros1(master, topic):
     """Ask the bridge's node where it sends a topic from, as a subscriber does."""
     proxy = ServerProxy(master.uri)
     publishers = dict(proxy.getSystemState("/plane_test")[2][0])[topic]
-    assert publishers == ["/ros_bridge_topics"]
+    assert publishers == ["/ros_bridge"]
     uri = proxy.lookupNode("/plane_test", publishers[0])[2]
     code, _, (kind, host, port) = ServerProxy(uri).requestTopic("/plane_test", topic, [["TCPROS"]])
     assert (code, kind) == (1, "TCPROS")
@@ -116,7 +116,7 @@ def test_subscribers_are_checked_and_answered(ros2, master, bridge):
             connection.sendall(wish(**accepted))
             answer = read_header(connection)
             assert (answer["type"], answer["md5sum"], answer["latching"]) == ("std_msgs/String", STRING_SUM, "0")
-            assert answer["callerid"] == "/ros_bridge_topics"
+            assert answer["callerid"] == "/ros_bridge"
             assert "string data" in answer["message_definition"]
             until_it_arrives(publisher, connection, "for those who fit")
 

@@ -7,7 +7,7 @@ import sys
 
 
 def test_short_soak_loses_nothing_and_grows_nothing(ros2_domain):
-    command = [sys.executable, "-m", "ros_bridge.soak", "--minutes", "0.15"]
+    command = [sys.executable, "-m", "bridge_tools.soak", "--minutes", "0.15"]
     done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     figures = json.loads(done.stdout.splitlines()[-1])

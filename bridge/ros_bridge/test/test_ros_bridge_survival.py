@@ -16,8 +16,9 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from alula_common.network import free_port
-from ros_bridge.fuzz import Fuzzer
-from ros_bridge.hostile import LENGTH, HostilePublisher, header
+from bridge_tools.fuzz import Fuzzer
+from bridge_tools.hostile import LENGTH, HostilePublisher
+from ros_bridge.tcpros import encode_header
 
 CONFIG = """
 topics:
@@ -198,7 +199,7 @@ def test_publisher_killed_in_the_middle_of_a_4_mb_message(world):
             arrived.wait(4 * PROBE_S)
 
     for name, talk in (("/half", half), ("/whole", all_of_it)):
-        publisher = HostilePublisher(world.master.uri, "/bs/image", "sensor_msgs/Image", name=name, reply=header(IMAGE), talk=talk)
+        publisher = HostilePublisher(world.master.uri, "/bs/image", "sensor_msgs/Image", name=name, reply=encode_header(IMAGE), talk=talk)
         assert publisher.served.wait(15.0)
         publisher.close()
     wait_until(lambda: images, "the whole image arrives")

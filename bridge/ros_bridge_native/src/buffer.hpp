@@ -55,6 +55,17 @@ class Buffer {
 
 using Frame = std::shared_ptr<Buffer>;
 
+// Return a frame: four bytes of length, then the bytes.
+inline Frame framed(const void * bytes, size_t size) {
+  const auto length = static_cast<uint32_t>(size);
+  auto frame = std::make_shared<Buffer>();
+  frame->reserve(sizeof length + size);
+  std::memcpy(frame->data(), &length, sizeof length);
+  if (size) std::memcpy(frame->data() + sizeof length, bytes, size);
+  frame->set_size(sizeof length + size);
+  return frame;
+}
+
 // Frames of one route; the last ones to be let go are kept for the next messages.
 class Pool : public std::enable_shared_from_this<Pool> {
  public:

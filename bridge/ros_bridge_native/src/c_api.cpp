@@ -36,6 +36,7 @@ struct PlaneSpecification {
   uint64_t token;
   int32_t reliable;
   int32_t latched;
+  int32_t converts;
 };
 
 struct PlaneFigures {
@@ -45,8 +46,16 @@ struct PlaneFigures {
   uint64_t dropped_slow;
   uint64_t dropped_overrun;
   uint64_t peers;
-  uint64_t latching;
   uint32_t bins[kBins];
+};
+
+// What Python receives or converts. The bytes are valid until plane_python_done.
+struct PlanePythonMessage {
+  void * message;
+  uint64_t token;
+  int32_t kind;
+  const uint8_t * bytes;
+  uint64_t size;
 };
 
 struct PlaneEvent {
@@ -58,9 +67,10 @@ struct PlaneEvent {
 namespace {
 
 Specification specification_of(const PlaneSpecification & from) {
+  const auto * type = static_cast<const rosidl_message_type_support_t *>(from.type_support);
   return {{from.ros1_topic, from.ros1_type, from.md5sum, from.definition}, from.ros2_topic, static_cast<rcl_node_t *>(from.node),
-    bytes_type_support(static_cast<const rosidl_message_type_support_t *>(from.type_support)),
-    {from.depth, from.reliable != 0, from.latched != 0}, program_of(from.program, from.operations), from.token};
+    type == nullptr ? nullptr : bytes_type_support(type), {from.depth, from.reliable != 0, from.latched != 0},
+    program_of(from.program, from.operations), from.token, from.converts != 0};
 }
 
 }  // namespace
@@ -69,23 +79,23 @@ PLANE_API const char * plane_error() { return last_error.c_str(); }
 
 PLANE_API void * plane_new(const char * caller_id, const char * address) {
   return guarded<void *>(nullptr, [&] {
-    auto machinery = std::make_unique<Machinery>(caller_id);
-    machinery->server->listen_on(address);
-    return machinery.release();
+    auto context = std::make_unique<Context>(caller_id);
+    context->server->listen_on(address);
+    return context.release();
   });
 }
 
 // All routes have to be deleted before.
-PLANE_API void plane_delete(void * machinery) {
-  static_cast<Machinery *>(machinery)->server->close();
-  delete static_cast<Machinery *>(machinery);
+PLANE_API void plane_delete(void * context) {
+  static_cast<Context *>(context)->server->close();
+  delete static_cast<Context *>(context);
 }
 
-PLANE_API int32_t plane_port(void * machinery) { return static_cast<Machinery *>(machinery)->server->port(); }
+PLANE_API int32_t plane_port(void * context) { return static_cast<Context *>(context)->server->port(); }
 
-PLANE_API int32_t plane_next_event(void * machinery, int32_t timeout_ms, PlaneEvent * out) {
+PLANE_API int32_t plane_next_event(void * context, int32_t timeout_ms, PlaneEvent * out) {
   Event event;
-  if (!static_cast<Machinery *>(machinery)->events.next(timeout_ms, event)) return 0;
+  if (!static_cast<Context *>(context)->events.next(timeout_ms, event)) return 0;
   out->kind = static_cast<int32_t>(event.kind);
   out->token = event.token;
   std::strncpy(out->text, event.text.c_str(), sizeof out->text - 1);
@@ -93,36 +103,57 @@ PLANE_API int32_t plane_next_event(void * machinery, int32_t timeout_ms, PlaneEv
   return 1;
 }
 
-PLANE_API void * plane_up_new(void * machinery, const PlaneSpecification * specification) {
-  return guarded<void *>(nullptr, [&]() -> Route * { return new UpRoute(*static_cast<Machinery *>(machinery), specification_of(*specification)); });
+PLANE_API void * plane_ros1_to_ros2_new(void * context, const PlaneSpecification * specification) {
+  return guarded<void *>(nullptr, [&]() -> Route * { return new Ros1ToRos2Route(*static_cast<Context *>(context), specification_of(*specification)); });
 }
 
-PLANE_API int32_t plane_up_connect(void * route, uint64_t token, const char * address, uint16_t port) {
+PLANE_API int32_t plane_connect_publisher(void * route, uint64_t token, const char * address, uint16_t port) {
   return guarded(0, [&] {
-    static_cast<UpRoute *>(static_cast<Route *>(route))->connect(token, address, port);
+    static_cast<Ros1ToRos2Route *>(static_cast<Route *>(route))->connect(token, address, port);
     return 1;
   });
 }
 
-PLANE_API void plane_up_disconnect(void * route, uint64_t token) { static_cast<UpRoute *>(static_cast<Route *>(route))->disconnect(token); }
-
-PLANE_API int32_t plane_up_grant(void * route, uint64_t token) {
+PLANE_API int32_t plane_add_writer(void * route, uint64_t token) {
   return guarded(0, [&] {
-    static_cast<UpRoute *>(static_cast<Route *>(route))->grant(token);
+    static_cast<Ros1ToRos2Route *>(static_cast<Route *>(route))->grant(token);
     return 1;
   });
 }
 
-PLANE_API void * plane_down_new(void * machinery, const PlaneSpecification * specification) {
-  return guarded<void *>(nullptr, [&]() -> Route * { return new DownRoute(*static_cast<Machinery *>(machinery), specification_of(*specification)); });
+PLANE_API void * plane_ros2_to_ros1_new(void * context, const PlaneSpecification * specification) {
+  return guarded<void *>(nullptr, [&]() -> Route * { return new Ros2ToRos1Route(*static_cast<Context *>(context), specification_of(*specification)); });
 }
 
-PLANE_API int32_t plane_down_start(void * route) {
+PLANE_API int32_t plane_ros2_to_ros1_start(void * route) {
   return guarded(0, [&] {
-    static_cast<DownRoute *>(static_cast<Route *>(route))->start();
+    static_cast<Ros2ToRos1Route *>(static_cast<Route *>(route))->start();
     return 1;
   });
 }
+
+PLANE_API void plane_publish(void * route, const uint8_t * bytes, uint64_t size) {
+  static_cast<Ros2ToRos1Route *>(static_cast<Route *>(route))->publish(bytes, size, "");
+}
+
+PLANE_API int32_t plane_python_next(void * context, int32_t timeout_ms, PlanePythonMessage * out) {
+  auto message = static_cast<Context *>(context)->python.next(timeout_ms);
+  if (!message) return 0;
+  const Buffer & bytes = *message->bytes;
+  *out = {nullptr, message->token, static_cast<int32_t>(message->kind), bytes.data() + message->offset, bytes.size() - message->offset};
+  out->message = message.release();
+  return 1;
+}
+
+// Hand back a message that Python has converted, or say why it could not.
+PLANE_API void plane_python_converted(void * route, void * message, const uint8_t * bytes, uint64_t size, const char * problem) {
+  static_cast<Route *>(route)->on_converted(*static_cast<PythonMessage *>(message), bytes, size, problem);
+}
+
+PLANE_API void plane_python_done(void * message) { delete static_cast<PythonMessage *>(message); }
+
+// Have plane_python_next return at once from here on.
+PLANE_API void plane_python_close(void * context) { static_cast<Context *>(context)->python.close(); }
 
 PLANE_API void plane_route_delete(void * route) { delete static_cast<Route *>(route); }
 
@@ -138,7 +169,6 @@ PLANE_API void plane_route_figures(void * route, PlaneFigures * out) {
   out->dropped_slow = counters.dropped_slow;
   out->dropped_overrun = counters.dropped_overrun;
   out->peers = counters.peers;
-  out->latching = counters.latching;
   for (int i = 0; i < kBins; ++i) out->bins[i] = counters.bins[i];
 }
 

@@ -19,6 +19,7 @@ struct PlaneServiceSpecification {
   uint64_t response_operations;
   int64_t timeout_ns;
   uint64_t token;
+  int32_t converts;
   int32_t refusal_has_flag;
   int32_t refusal_has_text;
   const char * refusal_before;
@@ -35,20 +36,20 @@ ServiceSpecification specification_of(const PlaneServiceSpecification & from) {
     program_of(from.request_program, from.request_operations), program_of(from.response_program, from.response_operations), from.timeout_ns,
     {from.refusal_has_flag != 0, from.refusal_has_text != 0, {from.refusal_before, from.refusal_before_bytes},
       {from.refusal_after, from.refusal_after_bytes}},
-    from.token};
+    from.token, from.converts != 0};
 }
 
 }  // namespace
 
-PLANE_API void * plane_service_in_ros1_new(void * machinery, const PlaneServiceSpecification * specification) {
+PLANE_API void * plane_service_in_ros1_new(void * context, const PlaneServiceSpecification * specification) {
   return guarded<void *>(nullptr, [&]() -> Route * {
-    return new ServiceInRos1(*static_cast<Machinery *>(machinery), specification_of(*specification));
+    return new ServiceInRos1(*static_cast<Context *>(context), specification_of(*specification));
   });
 }
 
-PLANE_API void * plane_service_in_ros2_new(void * machinery, const PlaneServiceSpecification * specification) {
+PLANE_API void * plane_service_in_ros2_new(void * context, const PlaneServiceSpecification * specification) {
   return guarded<void *>(nullptr, [&]() -> Route * {
-    return new ServiceInRos2(*static_cast<Machinery *>(machinery), specification_of(*specification));
+    return new ServiceInRos2(*static_cast<Context *>(context), specification_of(*specification));
   });
 }
 

@@ -24,7 +24,6 @@ struct Counters {
   std::atomic<uint64_t> dropped_slow{0};     // gave way because a ROS 1 subscriber does not keep up
   std::atomic<uint64_t> dropped_overrun{0};  // gave way because they arrived faster than they crossed
   std::atomic<uint64_t> peers{0};            // connections in ROS 1
-  std::atomic<uint64_t> latching{0};         // of these, publishers that latch
   std::atomic<uint32_t> bins[kBins]{};
 
   void crossed(int64_t since_ns, size_t size) {

@@ -19,8 +19,8 @@ Gid gid_of(const rmw_request_id_t & who) {
 
 }  // namespace
 
-Replies::Replies(Machinery & machinery, const ServiceSpecification & specification, const Ros2Service & service, Counters & counters)
-: machinery_(machinery), specification_(specification), service_(service), counters_(counters) {}
+Replies::Replies(Context & context, const ServiceSpecification & specification, const Ros2Service & service, Counters & counters)
+: context_(context), specification_(specification), service_(service), counters_(counters) {}
 
 void Replies::answer(const rmw_request_id_t & who, Frame bytes, size_t offset, int64_t start_ns) {
   send_soon({who, std::move(bytes), offset, start_ns});
@@ -29,7 +29,7 @@ void Replies::answer(const rmw_request_id_t & who, Frame bytes, size_t offset, i
 void Replies::refuse(const rmw_request_id_t & who, const std::string & reason) {
   counters_.errors.fetch_add(1);
   const std::string text = specification_.ros2_service + " by the bridge: " + reason;
-  machinery_.events.put(EventKind::kCallFailed, specification_.token, text);
+  context_.events.put(EventKind::kCallFailed, specification_.token, text);
   if (specification_.refusal.has_flag) send_soon({who, refusal_frame(specification_.refusal, text), sizeof(uint32_t), 0});
 }
 
@@ -42,7 +42,7 @@ void Replies::send_soon(Reply reply) {
     std::lock_guard<std::mutex> lock(slow_mutex_);
     slow_.push_back(std::move(reply));
   }
-  machinery_.calls.schedule(this);
+  context_.calls.schedule(this);
 }
 
 void Replies::send(const Reply & reply) {
@@ -70,7 +70,7 @@ void Replies::work() {
 }
 
 void Replies::finish() {
-  machinery_.calls.forget(this);
+  context_.calls.forget(this);
   work();
 }
 

@@ -17,7 +17,7 @@ namespace plane {
 // What may take long goes by a worker: large responses, and the first one to a client, which DDS may still be connecting to.
 class Replies : public Job {
  public:
-  Replies(Machinery & machinery, const ServiceSpecification & specification, const Ros2Service & service, Counters & counters);
+  Replies(Context & context, const ServiceSpecification & specification, const Ros2Service & service, Counters & counters);
 
   // The loop's thread only. The response is in the bytes, from the offset on, and has the layout.
   void answer(const rmw_request_id_t & who, Frame bytes, size_t offset, int64_t start_ns);
@@ -40,7 +40,7 @@ class Replies : public Job {
   void send(const Reply & reply);
   void work() override;
 
-  Machinery & machinery_;
+  Context & context_;
   const ServiceSpecification & specification_;
   const Ros2Service & service_;
   Counters & counters_;

@@ -36,7 +36,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   }
 
   bool on_tick(int64_t now) override {
-    if (publisher_ || closed_) return false;
+    if (!publishers_.empty() || closed_) return false;
     if (now - born_ns_ < kHandshakeNs) return true;
     turn_away("it sent no connection header within 5 s");
     return false;
@@ -57,10 +57,21 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   }
 
   // The loop's thread only.
+  void join(const std::shared_ptr<Ros1Publisher> & publisher) {
+    publishers_.push_back(publisher);
+    publisher->attach(shared_from_this());
+  }
+
+  void leave(const std::shared_ptr<Ros1Publisher> & publisher) {
+    publisher->detach(shared_from_this());
+    publishers_.erase(std::remove(publishers_.begin(), publishers_.end(), publisher), publishers_.end());
+    if (publishers_.empty()) shut();
+  }
+
   void shut() {
     if (closed_) return;
     closed_ = true;
-    if (publisher_) publisher_->detach(shared_from_this());
+    for (const auto & publisher : publishers_) publisher->detach(shared_from_this());
     server_->loop.remove(key_, fd_);
     ::shutdown(fd_, SHUT_RDWR);
     std::lock_guard<std::mutex> lock(mutex_);
@@ -73,7 +84,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
     uint8_t bytes[4096];
     const ssize_t number = recv(fd_, bytes, sizeof bytes, MSG_DONTWAIT);
     if (number == 0 || (number < 0 && errno != EAGAIN && errno != EINTR)) return shut();
-    if (number > 0 && !publisher_) read_header(bytes, static_cast<size_t>(number));
+    if (number > 0 && publishers_.empty()) read_header(bytes, static_cast<size_t>(number));
     // A subscriber has nothing to say after its header; what it says nevertheless is thrown away.
   }
 
@@ -89,41 +100,41 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
       return turn_away("what it sent is no connection header");
     }
     if (fields.count("service")) return hand_over(fields, sizeof length + length);
-    const auto publisher = server_->find(fields["topic"]);
-    if (!publisher) return turn_away("topic [" + fields["topic"] + "] is not published here");
-    const std::string reason = mismatch(fields, publisher->identity);
+    const auto publishers = server_->find(fields["topic"]);
+    if (publishers.empty()) return turn_away("topic [" + fields["topic"] + "] is not published here");
+    const std::string reason = mismatch(fields, publishers.front()->identity);
     if (!reason.empty()) return turn_away(fields["callerid"] + " on " + fields["topic"] + ": " + reason);
-    accept(publisher);
+    accept(publishers);
   }
 
   // It is a client, not a subscriber.
   void hand_over(const Fields & fields, size_t header_bytes) {
     const std::string & service = fields.at("service");
-    ServiceDesk * desk = server_->find_desk(service);
-    if (desk == nullptr) return turn_away("service [" + service + "] is not provided here");
-    const std::string reason = mismatch(fields, desk->identity());
+    ServiceHandler * handler = server_->find_service(service);
+    if (handler == nullptr) return turn_away("service [" + service + "] is not provided here");
+    const std::string reason = mismatch(fields, handler->identity());
     const auto caller = fields.find("callerid");
     if (!reason.empty()) return turn_away((caller == fields.end() ? "?" : caller->second) + " on " + service + ": " + reason);
     server_->loop.remove(key_, fd_);
     closed_ = true;
-    const auto connection = std::make_shared<ServiceConnection>(server_->loop, *desk, std::exchange(fd_, -1), fields);
+    const auto connection = std::make_shared<ServiceConnection>(server_->loop, *handler, std::exchange(fd_, -1), fields);
     connection->begin(server_->caller_id, fields, reinterpret_cast<const uint8_t *>(header_.data()) + header_bytes,
       header_.size() - header_bytes);
   }
 
-  void accept(const std::shared_ptr<Ros1Publisher> & publisher) {
+  void accept(const std::vector<std::shared_ptr<Ros1Publisher>> & publishers) {
     header_.clear();
     header_.shrink_to_fit();
-    const auto & own = publisher->identity;
-    const std::string answer = encode({{"callerid", server_->caller_id}, {"latching", publisher->latched ? "1" : "0"},
+    const auto & own = publishers.front()->identity;
+    const bool latching = std::any_of(publishers.begin(), publishers.end(), [](const auto & publisher) { return publisher->latched; });
+    const std::string answer = encode({{"callerid", server_->caller_id}, {"latching", latching ? "1" : "0"},
       {"md5sum", own.md5sum}, {"message_definition", own.definition}, {"topic", own.topic}, {"type", own.type}});
     auto frame = std::make_shared<Buffer>();
     frame->reserve(answer.size());
     std::memcpy(frame->data(), answer.data(), answer.size());
     frame->set_size(answer.size());
     send(frame, 1);
-    publisher_ = publisher;
-    publisher_->attach(shared_from_this());
+    for (const auto & publisher : publishers) join(publisher);
   }
 
   void turn_away(const std::string & reason) {
@@ -180,7 +191,7 @@ class OutConnection : public Handler, public std::enable_shared_from_this<OutCon
   Key key_ = 0;
   bool closed_ = false;
   std::string header_;
-  std::shared_ptr<Ros1Publisher> publisher_;
+  std::vector<std::shared_ptr<Ros1Publisher>> publishers_;  // of its topic
   std::mutex mutex_;
   std::deque<Frame> queue_;
   size_t sent_ = 0;  // bytes of the first frame
@@ -229,6 +240,12 @@ void Ros1Publisher::detach(const std::shared_ptr<OutConnection> & connection) {
 std::vector<std::shared_ptr<OutConnection>> Ros1Publisher::connections() {
   std::lock_guard<std::mutex> lock(mutex_);
   return connections_;
+}
+
+void join(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher) { connection->join(publisher); }
+
+void leave(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher) {
+  connection->leave(publisher);
 }
 
 void greet_peer(const std::shared_ptr<Server> & server, int fd) { std::make_shared<OutConnection>(server, fd)->begin(); }

@@ -16,10 +16,15 @@
 namespace plane {
 
 class OutConnection;
+class Ros1Publisher;
 class Server;
 
 // Read the header of a peer that has connected to the server, and become what it asks for: a subscriber's connection, or a service's.
 void greet_peer(const std::shared_ptr<Server> & server, int fd);
+
+// Let a subscriber receive from one more publisher of its topic, or from one less; without any its connection ends. The loop's thread.
+void join(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher);
+void leave(const std::shared_ptr<OutConnection> & connection, const std::shared_ptr<Ros1Publisher> & publisher);
 
 // A topic that ROS 1 can subscribe to.
 class Ros1Publisher {

@@ -5,6 +5,7 @@
 #include <sys/epoll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
@@ -50,43 +51,57 @@ void Server::on_ready(uint32_t) {
   }
 }
 
-std::shared_ptr<Ros1Publisher> Server::find(const std::string & topic) {
+std::vector<std::shared_ptr<Ros1Publisher>> Server::find(const std::string & topic) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = publishers_.find(topic);
-  return found == publishers_.end() ? nullptr : found->second;
+  std::vector<std::shared_ptr<Ros1Publisher>> found;
+  const auto [first, last] = publishers_.equal_range(topic);
+  for (auto entry = first; entry != last; ++entry) found.push_back(entry->second);
+  return found;
 }
 
 void Server::offer(const std::shared_ptr<Ros1Publisher> & publisher) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  publishers_[publisher->identity.topic] = publisher;
-}
-
-void Server::withdraw(const std::shared_ptr<Ros1Publisher> & publisher) {
-  {
-    std::lock_guard<std::mutex> lock(mutex_);
-    const auto found = publishers_.find(publisher->identity.topic);
-    if (found != publishers_.end() && found->second == publisher) publishers_.erase(found);
+  const TopicIdentity & own = publisher->identity;
+  const auto others = find(own.topic);
+  if (!others.empty() && others.front()->identity.md5sum != own.md5sum) {
+    throw std::runtime_error("the bridge publishes " + own.topic + " in ROS 1 already, as " + others.front()->identity.type);
   }
   loop.run_and_wait([&] {
-    for (const auto & connection : publisher->connections()) connection->shut();
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      publishers_.emplace(own.topic, publisher);
+    }
+    if (others.empty()) return;
+    for (const auto & connection : others.front()->connections()) join(connection, publisher);
   });
 }
 
-ServiceDesk * Server::find_desk(const std::string & service) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = desks_.find(service);
-  return found == desks_.end() ? nullptr : found->second;
+void Server::withdraw(const std::shared_ptr<Ros1Publisher> & publisher) {
+  loop.run_and_wait([&] {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      const auto [first, last] = publishers_.equal_range(publisher->identity.topic);
+      const auto found = std::find_if(first, last, [&](const auto & entry) { return entry.second == publisher; });
+      if (found != last) publishers_.erase(found);
+    }
+    for (const auto & connection : publisher->connections()) leave(connection, publisher);
+  });
 }
 
-void Server::open_desk(ServiceDesk & desk) {
+ServiceHandler * Server::find_service(const std::string & service) {
   std::lock_guard<std::mutex> lock(mutex_);
-  desks_[desk.identity().service] = &desk;
+  const auto found = services_.find(service);
+  return found == services_.end() ? nullptr : found->second;
 }
 
-void Server::close_desk(ServiceDesk & desk) {
+void Server::offer_service(ServiceHandler & handler) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const auto found = desks_.find(desk.identity().service);
-  if (found != desks_.end() && found->second == &desk) desks_.erase(found);
+  services_[handler.identity().service] = &handler;
+}
+
+void Server::withdraw_service(ServiceHandler & handler) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = services_.find(handler.identity().service);
+  if (found != services_.end() && found->second == &handler) services_.erase(found);
 }
 
 }  // namespace plane

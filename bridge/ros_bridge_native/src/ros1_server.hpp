@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "events.hpp"
 #include "loop.hpp"
@@ -24,16 +25,17 @@ class Server : public Handler, public std::enable_shared_from_this<Server> {
   void close();
   uint16_t port() const { return port_; }
 
+  // A topic may have several publishers here; each subscriber gets the messages of all. Throws std::runtime_error if their types differ.
   void offer(const std::shared_ptr<Ros1Publisher> & publisher);
-  void withdraw(const std::shared_ptr<Ros1Publisher> & publisher);  // returns when no connection is left
-  void open_desk(ServiceDesk & desk);
-  void close_desk(ServiceDesk & desk);  // in the loop's thread; who is connected stays so
+  void withdraw(const std::shared_ptr<Ros1Publisher> & publisher);  // returns when it has no subscriber left
+  void offer_service(ServiceHandler & handler);
+  void withdraw_service(ServiceHandler & handler);  // in the loop's thread; who is connected stays so
 
   void on_ready(uint32_t epoll_events) override;
 
   // For those who connect:
-  std::shared_ptr<Ros1Publisher> find(const std::string & topic);
-  ServiceDesk * find_desk(const std::string & service);
+  std::vector<std::shared_ptr<Ros1Publisher>> find(const std::string & topic);
+  ServiceHandler * find_service(const std::string & service);
   Loop & loop;
   Events & events;
   const std::string caller_id;
@@ -44,8 +46,8 @@ class Server : public Handler, public std::enable_shared_from_this<Server> {
   Key key_ = 0;
   uint16_t port_ = 0;
   std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<Ros1Publisher>> publishers_;
-  std::map<std::string, ServiceDesk *> desks_;
+  std::multimap<std::string, std::shared_ptr<Ros1Publisher>> publishers_;
+  std::map<std::string, ServiceHandler *> services_;
 };
 
 }  // namespace plane

@@ -20,8 +20,8 @@ constexpr size_t kLeastRoom = 4096;
 
 }  // namespace
 
-CallConnection::CallConnection(Loop & loop, CallDesk & desk, const ServiceIdentity & identity, const std::string & caller_id)
-: loop_(loop), desk_(desk),
+CallConnection::CallConnection(Loop & loop, CallListener & listener, const ServiceIdentity & identity, const std::string & caller_id)
+: loop_(loop), listener_(listener),
   greeting_(encode({{"callerid", caller_id}, {"md5sum", identity.md5sum}, {"persistent", "1"}, {"service", identity.service}})),
   born_ns_(now_ns()) {}
 
@@ -106,7 +106,7 @@ void CallConnection::take_header() {
   received_->set_size(0);
   state_ = State::kIdle;
   used_ns = now_ns();
-  desk_.on_open(shared_from_this());
+  listener_.on_open(shared_from_this());
 }
 
 bool CallConnection::call(Frame request) {
@@ -149,7 +149,7 @@ void CallConnection::take_answer() {
   used_ns = now_ns();
   const auto keep_alive = shared_from_this();
   if (!clean) drop();  // it talks more than it was asked
-  desk_.on_answer(keep_alive, good, answer);
+  listener_.on_answer(keep_alive, good, answer);
 }
 
 void CallConnection::drop() {
@@ -163,7 +163,7 @@ void CallConnection::lose(Loss loss, const std::string & reason) {
   if (state_ == State::kClosed) return;
   const auto keep_alive = shared_from_this();
   drop();
-  desk_.on_lost(keep_alive, loss, reason);
+  listener_.on_lost(keep_alive, loss, reason);
 }
 
 void CallConnection::watch(uint32_t epoll_events) {

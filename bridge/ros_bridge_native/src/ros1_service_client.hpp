@@ -22,9 +22,9 @@ enum class Loss {
 };
 
 // Who calls. All calls come from the loop's thread.
-class CallDesk {
+class CallListener {
  public:
-  virtual ~CallDesk() = default;
+  virtual ~CallListener() = default;
   virtual void on_open(const std::shared_ptr<CallConnection> & connection) = 0;
   // The answer, or the text of an error, is behind the five bytes of the protocol. The connection is idle again, or shut.
   virtual void on_answer(const std::shared_ptr<CallConnection> & connection, bool good, Frame answer) = 0;
@@ -37,13 +37,13 @@ constexpr size_t kAnswerHeadBytes = 5;
 // The loop's thread only.
 class CallConnection : public Handler, public std::enable_shared_from_this<CallConnection> {
  public:
-  CallConnection(Loop & loop, CallDesk & desk, const ServiceIdentity & identity, const std::string & caller_id);
+  CallConnection(Loop & loop, CallListener & listener, const ServiceIdentity & identity, const std::string & caller_id);
   ~CallConnection() override;
 
   void begin(const std::string & address, uint16_t port);
   // Send a request, which is behind the four bytes of its length. Returns false, and shuts, if the server has closed the idle connection.
   bool call(Frame request);
-  // Close without telling the desk.
+  // Close without telling the listener.
   void drop();
 
   void on_ready(uint32_t epoll_events) override;
@@ -52,7 +52,7 @@ class CallConnection : public Handler, public std::enable_shared_from_this<CallC
   bool open() const { return state_ != State::kClosed; }
   bool calling() const { return state_ == State::kCalling; }
 
-  uint64_t call_number = 0;  // the desk's
+  uint64_t call_number = 0;  // the listener's
   int64_t used_ns = 0;       // when the last answer came
 
  private:
@@ -68,7 +68,7 @@ class CallConnection : public Handler, public std::enable_shared_from_this<CallC
   void watch(uint32_t epoll_events);
 
   Loop & loop_;
-  CallDesk & desk_;
+  CallListener & listener_;
   const std::string greeting_;
   State state_ = State::kConnecting;
   int fd_ = -1;

@@ -25,18 +25,18 @@ bool says_yes(const Fields & header, const char * name) {
 
 }  // namespace
 
-ServiceConnection::ServiceConnection(Loop & loop, ServiceDesk & desk, int fd, const Fields & header)
-: loop_(loop), desk_(desk), fd_(fd), persistent_(says_yes(header, "persistent")) {}
+ServiceConnection::ServiceConnection(Loop & loop, ServiceHandler & handler, int fd, const Fields & header)
+: loop_(loop), handler_(handler), fd_(fd), persistent_(says_yes(header, "persistent")) {}
 
 ServiceConnection::~ServiceConnection() { ::close(fd_); }
 
 void ServiceConnection::begin(const std::string & caller_id, const Fields & header, const uint8_t * rest, size_t rest_bytes) {
-  const ServiceIdentity & own = desk_.identity();
+  const ServiceIdentity & own = handler_.identity();
   const std::string greeting = encode({{"callerid", caller_id}, {"md5sum", own.md5sum}, {"request_type", own.type + "Request"},
     {"response_type", own.type + "Response"}, {"service", own.service}, {"type", own.type}});
   watched_ = EPOLLIN | EPOLLRDHUP;
   key_ = loop_.add(fd_, shared_from_this(), watched_);
-  desk_.on_open(shared_from_this());
+  handler_.on_open(shared_from_this());
   // A fresh socket takes a header of any sensible length at once.
   const ssize_t written = send(fd_, greeting.data(), greeting.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
   if (written != static_cast<ssize_t>(greeting.size()) || says_yes(header, "probe")) return shut();
@@ -84,7 +84,7 @@ void ServiceConnection::take_requests() {
     if (bytes > kMostBytes) shut();
     if (closed_ || received_->size() < bytes) break;
     calling_ = true;
-    desk_.on_request(shared_from_this(), cut_request(bytes));
+    handler_.on_request(shared_from_this(), cut_request(bytes));
   }
   taking_ = false;
 }
@@ -142,7 +142,7 @@ void ServiceConnection::shut() {
   closed_ = true;
   loop_.remove(key_, fd_);
   ::shutdown(fd_, SHUT_RDWR);
-  desk_.on_closed(shared_from_this());
+  handler_.on_closed(shared_from_this());
 }
 
 }  // namespace plane

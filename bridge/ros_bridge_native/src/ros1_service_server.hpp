@@ -13,9 +13,9 @@ namespace plane {
 class ServiceConnection;
 
 // Who answers. All calls come from the loop's thread.
-class ServiceDesk {
+class ServiceHandler {
  public:
-  virtual ~ServiceDesk() = default;
+  virtual ~ServiceHandler() = default;
   virtual const ServiceIdentity & identity() const = 0;
   virtual void on_open(const std::shared_ptr<ServiceConnection> & connection) = 0;
   // The request is behind the four bytes of its length. The connection has to be answered once, now or later.
@@ -26,8 +26,8 @@ class ServiceDesk {
 // The loop's thread only.
 class ServiceConnection : public Handler, public std::enable_shared_from_this<ServiceConnection> {
  public:
-  // The client's header fits the desk's identity; `rest` is what came behind it. Takes the descriptor.
-  ServiceConnection(Loop & loop, ServiceDesk & desk, int fd, const Fields & header);
+  // The client's header fits the handler's identity; `rest` is what came behind it. Takes the descriptor.
+  ServiceConnection(Loop & loop, ServiceHandler & handler, int fd, const Fields & header);
   ~ServiceConnection() override;
 
   // Say our own header, and wait for requests. A probe is told the header and nothing else.
@@ -47,7 +47,7 @@ class ServiceConnection : public Handler, public std::enable_shared_from_this<Se
   void watch(uint32_t epoll_events);
 
   Loop & loop_;
-  ServiceDesk & desk_;
+  ServiceHandler & handler_;
   const int fd_;
   const bool persistent_;
   Key key_ = 0;

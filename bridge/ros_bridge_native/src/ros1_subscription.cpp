@@ -134,7 +134,6 @@ void InConnection::take_header() {
   std::memmove(received_.data(), received_.data() + whole, received_.size() - whole);
   received_.set_size(received_.size() - whole);
   peer = fields["callerid"];
-  latching = fields["latching"] == "1";
   state_ = State::kOpen;
   const bool at_once = inbox_.on_open(*this);
   events_.put(EventKind::kConnected, token, peer);

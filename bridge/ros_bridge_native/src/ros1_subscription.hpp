@@ -47,9 +47,10 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   bool on_tick(int64_t now_ns) override;
   void on_rested() override;
 
+  bool open() const { return state_ == State::kOpen; }
+
   const uint64_t token;
   std::string peer;
-  bool latching = false;
   size_t writer = 0;  // the inbox's
 
  private:

@@ -17,44 +17,36 @@ void Route::count_bad(Events & events, uint64_t token, const std::string & from)
   if (number % 1000 == 1) events.put(EventKind::kBadMessage, token, "message " + std::to_string(number) + " from " + from);
 }
 
-UpRoute::UpRoute(Machinery & machinery, Specification specification)
-: machinery_(machinery), specification_(std::move(specification)), tokens_(static_cast<double>(specification_.quality.depth)) {
-  writers_.push_back({make_writer(), "", false});
+Ros1ToRos2Route::Ros1ToRos2Route(Context & context, Specification specification)
+: context_(context), specification_(std::move(specification)), tokens_(static_cast<double>(specification_.quality.depth)) {
+  if (specification_.node != nullptr) writers_.push_back({make_writer(), "", false});
 }
 
-UpRoute::~UpRoute() {
-  machinery_.loop.run_and_wait([this] {
+Ros1ToRos2Route::~Ros1ToRos2Route() {
+  context_.loop.run_and_wait([this] {
     const auto connections = connections_;
     for (const auto & [token, connection] : connections) connection->shut("the route ends");
   });
-  machinery_.upward.forget(this);
+  context_.upward.forget(this);
+  context_.python.forget(specification_.token);
 }
 
-std::unique_ptr<Ros2Publisher> UpRoute::make_writer() const {
+std::unique_ptr<Ros2Publisher> Ros1ToRos2Route::make_writer() const {
   return std::make_unique<Ros2Publisher>(specification_.node, specification_.type, specification_.ros2_topic, specification_.quality);
 }
 
-void UpRoute::connect(uint64_t token, const std::string & address, uint16_t port) {
-  machinery_.loop.run_and_wait([&] {
+void Ros1ToRos2Route::connect(uint64_t token, const std::string & address, uint16_t port) {
+  context_.loop.run_and_wait([&] {
     const auto connection = std::make_shared<InConnection>(
-      machinery_.loop, machinery_.events, *this, specification_.ros1, machinery_.caller_id, token);
+      context_.loop, context_.events, *this, specification_.ros1, context_.caller_id, token);
     connections_[token] = connection;
     connection->begin(address, port);
   });
 }
 
-void UpRoute::disconnect(uint64_t token) {
-  machinery_.loop.run_and_wait([&] {
-    const auto found = connections_.find(token);
-    if (found == connections_.end()) return;
-    const auto connection = found->second;
-    connection->shut("the publisher is gone");
-  });
-}
-
 // Each latching publisher has a writer of its own, so that late joiners get the last message of each of them. The writer of one that has
 // gone is kept for the next: what was written with it may still be on its way.
-bool UpRoute::on_open(InConnection & connection) {
+bool Ros1ToRos2Route::on_open(InConnection & connection) {
   count_peers();
   if (!specification_.quality.latched) return true;
   std::lock_guard<std::mutex> lock(writers_mutex_);
@@ -62,7 +54,7 @@ bool UpRoute::on_open(InConnection & connection) {
   if (chosen == writers_.end()) chosen = std::find_if(writers_.begin(), writers_.end(), [](auto & writer) { return !writer.taken; });
   if (chosen == writers_.end()) {
     if (writers_.size() >= kMostWriters) return true;
-    machinery_.events.put(EventKind::kNeedsWriter, connection.token, connection.peer);
+    context_.events.put(EventKind::kNeedsWriter, connection.token, connection.peer);
     return false;
   }
   chosen->taken = true;
@@ -71,9 +63,9 @@ bool UpRoute::on_open(InConnection & connection) {
   return true;
 }
 
-void UpRoute::grant(uint64_t token) {
+void Ros1ToRos2Route::grant(uint64_t token) {
   auto made = make_writer();
-  machinery_.loop.run_and_wait([&] {
+  context_.loop.run_and_wait([&] {
     const auto found = connections_.find(token);
     if (found == connections_.end()) return;
     const auto connection = found->second;
@@ -86,14 +78,14 @@ void UpRoute::grant(uint64_t token) {
   });
 }
 
-size_t UpRoute::target_peers() {
+size_t Ros1ToRos2Route::target_peers() {
   std::lock_guard<std::mutex> lock(writers_mutex_);
-  return writers_.front().publisher->peers();
+  return writers_.empty() ? 0 : writers_.front().publisher->peers();
 }
 
 // At most `depth` messages a millisecond go out. A burst, such as what has piled up while this process had no processor, would push older
 // messages out of the queues of ROS 2's subscribers, which are mostly as deep, before they are scheduled to take them.
-bool UpRoute::ready() {
+bool Ros1ToRos2Route::ready() {
   const auto most = static_cast<double>(specification_.quality.depth);
   const int64_t now = now_ns();
   tokens_ = std::min(most, tokens_ + static_cast<double>(now - tokens_at_ns_) * 1e-6 * most);
@@ -103,8 +95,8 @@ bool UpRoute::ready() {
   return true;
 }
 
-void UpRoute::on_small(InConnection & connection, const uint8_t * message, size_t size) {
-  if (under_way_.load(std::memory_order_acquire) == 0) return publish(connection.writer, message, size, now_ns());
+void Ros1ToRos2Route::on_small(InConnection & connection, const uint8_t * message, size_t size) {
+  if (!through_python() && under_way_.load(std::memory_order_acquire) == 0) return publish(connection.writer, message, size, now_ns());
   Frame copy = pool_->get();
   copy->reserve(std::max<size_t>(size, 1));
   if (size) std::memcpy(copy->data(), message, size);
@@ -112,7 +104,8 @@ void UpRoute::on_small(InConnection & connection, const uint8_t * message, size_
   on_large(connection, std::move(copy));
 }
 
-void UpRoute::on_large(InConnection & connection, Frame message) {
+void Ros1ToRos2Route::on_large(InConnection & connection, Frame message) {
+  if (through_python()) return hand_to_python(connection.writer, std::move(message));
   const size_t size = std::max<size_t>(message->size(), 1);
   const size_t most = std::max<size_t>(2, std::min(specification_.quality.depth, kMostWaitingBytes / size));
   {
@@ -125,10 +118,21 @@ void UpRoute::on_large(InConnection & connection, Frame message) {
     under_way_.fetch_add(1);
     large_.push_back({std::move(message), connection.writer, now_ns()});
   }
-  machinery_.upward.schedule(this);
+  context_.upward.schedule(this);
 }
 
-void UpRoute::on_closed(InConnection & connection) {
+void Ros1ToRos2Route::hand_to_python(size_t writer, Frame message) {
+  const size_t gone = context_.python.put(
+    {specification_.token, PythonKind::kMessage, writer, now_ns(), "", std::move(message), 0}, specification_.quality.depth);
+  if (gone) counters.dropped_overrun.fetch_add(gone);
+}
+
+void Ros1ToRos2Route::on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) {
+  if (!problem.empty()) return count_bad(context_.events, specification_.token, specification_.ros1.topic + ": " + problem);
+  publish(message.number, bytes, size, message.start_ns);
+}
+
+void Ros1ToRos2Route::on_closed(InConnection & connection) {
   {
     std::lock_guard<std::mutex> lock(writers_mutex_);
     if (connection.writer < writers_.size() && writers_[connection.writer].peer == connection.peer) writers_[connection.writer].taken = false;
@@ -137,12 +141,11 @@ void UpRoute::on_closed(InConnection & connection) {
   count_peers();
 }
 
-void UpRoute::count_peers() {
-  counters.peers = connections_.size();
-  counters.latching = std::count_if(connections_.begin(), connections_.end(), [](const auto & entry) { return entry.second->latching; });
+void Ros1ToRos2Route::count_peers() {
+  counters.peers = std::count_if(connections_.begin(), connections_.end(), [](const auto & entry) { return entry.second->open(); });
 }
 
-void UpRoute::work() {
+void Ros1ToRos2Route::work() {
   while (true) {
     Large next;
     {
@@ -156,7 +159,7 @@ void UpRoute::work() {
   }
 }
 
-void UpRoute::publish(size_t writer, const uint8_t * message, size_t size, int64_t arrived_ns) {
+void Ros1ToRos2Route::publish(size_t writer, const uint8_t * message, size_t size, int64_t arrived_ns) {
   Ros2Publisher * publisher;
   {
     std::lock_guard<std::mutex> lock(writers_mutex_);
@@ -165,35 +168,36 @@ void UpRoute::publish(size_t writer, const uint8_t * message, size_t size, int64
   if (publisher->publish(specification_.program, message, size)) {
     counters.crossed(arrived_ns, size);
   } else {
-    count_bad(machinery_.events, specification_.token, specification_.ros1.topic);
+    count_bad(context_.events, specification_.token, specification_.ros1.topic);
   }
 }
 
-DownRoute::DownRoute(Machinery & machinery, Specification specification)
-: machinery_(machinery), specification_(std::move(specification)),
+Ros2ToRos1Route::Ros2ToRos1Route(Context & context, Specification specification)
+: context_(context), specification_(std::move(specification)),
   publisher_(std::make_shared<Ros1Publisher>(specification_.ros1, specification_.quality.latched, specification_.quality.depth, counters)) {
-  machinery_.server->offer(publisher_);
+  context_.server->offer(publisher_);
 }
 
-DownRoute::~DownRoute() {
+Ros2ToRos1Route::~Ros2ToRos1Route() {
   if (subscription_) subscription_->stop_listening();
-  machinery_.downward.forget(this);
+  context_.downward.forget(this);
   subscription_.reset();
-  machinery_.server->withdraw(publisher_);
+  context_.python.forget(specification_.token);
+  context_.server->withdraw(publisher_);
 }
 
-void DownRoute::start() {
+void Ros2ToRos1Route::start() {
   subscription_ = std::make_unique<Ros2Subscription>(
     specification_.node, specification_.type, specification_.ros2_topic, specification_.quality);
   subscription_->listen([this] { on_arrived(); });
 }
 
-void DownRoute::on_arrived() {
-  if (large_.load(std::memory_order_acquire)) return machinery_.downward.schedule(this);
+void Ros2ToRos1Route::on_arrived() {
+  if (large_.load(std::memory_order_acquire)) return context_.downward.schedule(this);
   drain();
 }
 
-void DownRoute::drain() {
+void Ros2ToRos1Route::drain() {
   while (true) {
     const int64_t start_ns = now_ns();
     Frame frame = pool_->get();
@@ -203,21 +207,42 @@ void DownRoute::drain() {
     if (!incoming.touched) return;
     count_missed(sender);
     if (!incoming.good) {
-      count_bad(machinery_.events, specification_.token, specification_.ros2_topic);
+      count_bad(context_.events, specification_.token, specification_.ros2_topic);
       continue;
     }
     ++sequence_;
-    if (incoming.wanted) publisher_->publish(frame, std::string(sender.gid.begin(), sender.gid.end()));
+    const std::string from(sender.gid.begin(), sender.gid.end());
+    if (specification_.converts) {
+      if (incoming.wanted) hand_to_python(start_ns, from, std::move(frame));
+      continue;
+    }
+    if (incoming.wanted) publisher_->publish(frame, from);
     counters.crossed(start_ns, frame->size());
     if (!large_ && frame->size() > kLargeBytes) {
       large_.store(true, std::memory_order_release);
-      return machinery_.downward.schedule(this);
+      return context_.downward.schedule(this);
     }
   }
 }
 
+void Ros2ToRos1Route::hand_to_python(int64_t start_ns, const std::string & sender, Frame message) {
+  const size_t gone = context_.python.put(
+    {specification_.token, PythonKind::kMessage, 0, start_ns, sender, std::move(message), sizeof(uint32_t)}, specification_.quality.depth);
+  if (gone) counters.dropped_overrun.fetch_add(gone);
+}
+
+void Ros2ToRos1Route::on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) {
+  if (!problem.empty()) return count_bad(context_.events, specification_.token, specification_.ros2_topic + ": " + problem);
+  publish(bytes, size, message.sender);
+  counters.crossed(message.start_ns, size);
+}
+
+void Ros2ToRos1Route::publish(const uint8_t * bytes, size_t size, const std::string & sender) {
+  publisher_->publish(framed(bytes, size), sender);
+}
+
 // What DDS let go before it was taken shows as a gap in the sender's numbers.
-void DownRoute::count_missed(const Sender & sender) {
+void Ros2ToRos1Route::count_missed(const Sender & sender) {
   if (last_sequence_.size() >= kMostSendersFollowed && !last_sequence_.count(sender.gid)) last_sequence_.clear();
   uint64_t & last = last_sequence_[sender.gid];
   if (last && sender.sequence > last + 1) counters.dropped_overrun.fetch_add(sender.sequence - last - 1);

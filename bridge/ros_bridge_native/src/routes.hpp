@@ -11,6 +11,7 @@
 #include "counters.hpp"
 #include "events.hpp"
 #include "loop.hpp"
+#include "python_queue.hpp"
 #include "ros1_publisher.hpp"
 #include "ros1_server.hpp"
 #include "ros1_subscription.hpp"
@@ -20,11 +21,12 @@
 namespace plane {
 
 // What all routes share.
-struct Machinery {
-  explicit Machinery(const std::string & caller_id_) : caller_id(caller_id_), server(std::make_shared<Server>(loop, events, caller_id_)) {}
+struct Context {
+  explicit Context(const std::string & caller_id_) : caller_id(caller_id_), server(std::make_shared<Server>(loop, events, caller_id_)) {}
 
   const std::string caller_id;
   Events events;
+  PythonQueue python;
   Loop loop;
   Worker upward{"plane_to_ros2"};
   Worker downward{"plane_to_ros1"};
@@ -35,11 +37,12 @@ struct Machinery {
 struct Specification {
   TopicIdentity ros1;
   std::string ros2_topic;
-  rcl_node_t * node;
+  rcl_node_t * node;  // none: Python is the other end
   const rosidl_message_type_support_t * type;
   Quality quality;
   Program program;
   uint64_t token;  // names the route in events
+  bool converts;   // Python converts between ROS 1's layout and ROS 2's, which is that of the program
 };
 
 class Route {
@@ -48,6 +51,8 @@ class Route {
   // How many peers the end has that messages go out of, and the one that they come from.
   virtual size_t target_peers() { return 0; }
   virtual size_t source_peers() { return 0; }
+  // Take back what Python has converted, or why it could not. Any thread.
+  virtual void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) = 0;
   Counters counters;
 
  protected:
@@ -56,17 +61,17 @@ class Route {
 };
 
 // ROS 1 to ROS 2.
-class UpRoute : public Route, public Inbox, public Job {
+class Ros1ToRos2Route : public Route, public Inbox, public Job {
  public:
-  UpRoute(Machinery & machinery, Specification specification);
-  ~UpRoute() override;
+  Ros1ToRos2Route(Context & context, Specification specification);
+  ~Ros1ToRos2Route() override;
 
   void connect(uint64_t token, const std::string & address, uint16_t port);
-  void disconnect(uint64_t token);
   // Give a connection whose on_open asked for it a writer of its own.
   void grant(uint64_t token);
   size_t target_peers() override;
   size_t source_peers() override { return counters.peers; }
+  void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) override;
 
  private:
   struct Large {
@@ -88,11 +93,13 @@ class UpRoute : public Route, public Inbox, public Job {
   void on_large(InConnection & connection, Frame message) override;
   void on_closed(InConnection & connection) override;
   void work() override;
+  bool through_python() const { return specification_.converts || specification_.node == nullptr; }
+  void hand_to_python(size_t writer, Frame message);
   void publish(size_t writer, const uint8_t * message, size_t size, int64_t arrived_ns);
   void count_peers();
   std::unique_ptr<Ros2Publisher> make_writer() const;
 
-  Machinery & machinery_;
+  Context & context_;
   const Specification specification_;
   std::map<uint64_t, std::shared_ptr<InConnection>> connections_;  // the loop's thread only
   double tokens_;                                                  // the loop's thread only
@@ -106,22 +113,26 @@ class UpRoute : public Route, public Inbox, public Job {
 };
 
 // ROS 2 to ROS 1.
-class DownRoute : public Route, public Job {
+class Ros2ToRos1Route : public Route, public Job {
  public:
-  DownRoute(Machinery & machinery, Specification specification);
-  ~DownRoute() override;
+  Ros2ToRos1Route(Context & context, Specification specification);
+  ~Ros2ToRos1Route() override;
 
   void start();
+  // Send what Python has. Any thread.
+  void publish(const uint8_t * bytes, size_t size, const std::string & sender);
   size_t target_peers() override { return counters.peers; }
   size_t source_peers() override { return subscription_ ? subscription_->peers() : 0; }
+  void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) override;
 
  private:
   void on_arrived();
   void work() override { drain(); }
   void drain();
+  void hand_to_python(int64_t start_ns, const std::string & sender, Frame message);
   void count_missed(const Sender & sender);
 
-  Machinery & machinery_;
+  Context & context_;
   const Specification specification_;
   std::shared_ptr<Ros1Publisher> publisher_;
   std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();

@@ -28,14 +28,13 @@ struct ServiceSpecification {
   int64_t timeout_ns;
   Refusal refusal;
   uint64_t token;  // names the route in events
+  bool converts;   // Python converts between ROS 1's layout and ROS 2's, which is that of the programs
 };
 
 // How often a server is looked for while calls wait.
 constexpr int64_t kLookEveryNs = 50'000'000;
 constexpr const char * kBridgeEnds = "the bridge is shutting down";
 
-// Return a frame: four bytes of length, then the text.
-Frame text_frame(const std::string & text);
 // Return the bytes of a refusal, behind four bytes of length.
 Frame refusal_frame(const Refusal & refusal, const std::string & reason);
 

@@ -9,6 +9,7 @@ namespace {
 constexpr size_t kConcurrentCalls = 16;
 constexpr size_t kWaitingCalls = 32;
 constexpr size_t kMostPosted = 256;
+constexpr size_t kRequestHeadBytes = sizeof(uint32_t);
 // After that the master is asked again: the service may have moved to another node.
 constexpr int64_t kReuseWithinNs = 2'000'000'000;
 // How long the last answers may take to their clients. A server that is no more takes back what they have not got yet.
@@ -17,10 +18,10 @@ constexpr const char * kNotAsked = "the ROS master has not answered, asked";
 
 }  // namespace
 
-ServiceInRos1::ServiceInRos1(Machinery & machinery, ServiceSpecification specification)
-: machinery_(machinery), specification_(std::move(specification)), timer_(std::make_shared<Timer>(machinery.loop, [this] { look(); })),
+ServiceInRos1::ServiceInRos1(Context & context, ServiceSpecification specification)
+: context_(context), specification_(std::move(specification)), timer_(std::make_shared<Timer>(context.loop, [this] { look(); })),
   service_(std::make_unique<Ros2Service>(specification_.node, specification_.type, specification_.ros2_service)),
-  replies_(machinery, specification_, *service_, counters) {
+  replies_(context, specification_, *service_, counters) {
   timer_->begin();
   try {
     service_->listen([this](size_t) { take_requests(); });
@@ -33,7 +34,7 @@ ServiceInRos1::ServiceInRos1(Machinery & machinery, ServiceSpecification specifi
 ServiceInRos1::~ServiceInRos1() {
   service_->stop_listening();
   bool answered = false;
-  machinery_.loop.run_and_wait([&] {
+  context_.loop.run_and_wait([&] {
     closed_ = true;
     answered = !calls_.empty();
     replies_.stop_deferring();
@@ -44,7 +45,8 @@ ServiceInRos1::~ServiceInRos1() {
     }
   });
   replies_.finish();
-  machinery_.loop.run_and_wait([] {});  // what was posted meanwhile
+  context_.loop.run_and_wait([] {});  // what was posted meanwhile
+  context_.python.forget(specification_.token);
   if (answered) service_->wait_for_arrival(kFarewellNs);
 }
 
@@ -64,7 +66,7 @@ void ServiceInRos1::take_requests() {
     ++sequence_;
     ++posted_;
     if (!incoming.good) frame.reset();
-    machinery_.loop.post([this, who, frame = std::move(frame), start_ns] {
+    context_.loop.post([this, who, frame = std::move(frame), start_ns] {
       on_request(who, frame, start_ns);
       if (--posted_ == 0 && !closed_ && left_over_.exchange(false)) take_requests();
     });
@@ -78,10 +80,33 @@ void ServiceInRos1::on_request(const rmw_request_id_t & who, Frame request, int6
     return replies_.refuse(who, "the bridge has " + std::to_string(kConcurrentCalls + kWaitingCalls) + " calls of this service waiting");
   }
   if (calls_.empty()) problem_ = kNotAsked;
-  calls_.emplace_hint(calls_.end(), next_number_, Call{who, std::move(request), start_ns, start_ns + specification_.timeout_ns, nullptr});
-  waiting_.push_back(next_number_++);
-  begin_waiting();
+  const uint64_t number = next_number_++;
+  Call & call = calls_.emplace_hint(calls_.end(), number, Call{who, nullptr, start_ns, start_ns + specification_.timeout_ns, nullptr})->second;
+  if (specification_.converts) {
+    context_.python.put({specification_.token, PythonKind::kRequest, number, start_ns, "", std::move(request), kRequestHeadBytes}, SIZE_MAX);
+  } else {
+    call.request = std::move(request);
+    waiting_.push_back(number);
+    begin_waiting();
+  }
   look_again();
+}
+
+void ServiceInRos1::on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) {
+  context_.loop.post([this, kind = message.kind, number = message.number, frame = framed(bytes, size), problem] {
+    const auto call = calls_.find(number);
+    if (call == calls_.end()) return;  // its time was over
+    if (!problem.empty()) {
+      fail(call, "it can't be converted: " + problem);
+    } else if (kind == PythonKind::kRequest) {
+      call->second.request = frame;
+      waiting_.push_back(number);
+    } else {
+      on_good_answer(call, frame, kRequestHeadBytes);
+    }
+    begin_waiting();
+    look_again();
+  });
 }
 
 // Begin what waits: over idle connections, and where there is none over new ones.
@@ -91,7 +116,7 @@ void ServiceInRos1::begin_waiting() {
   if (now_ns() < place_until_ns_) return attempt();
   if (asked_ || now_ns() < ask_after_ns_) return;
   asked_ = true;
-  machinery_.events.put(EventKind::kNeedsServer, specification_.token, "");
+  context_.events.put(EventKind::kNeedsServer, specification_.token, "");
 }
 
 size_t ServiceInRos1::wanted_attempts() const {
@@ -101,7 +126,7 @@ size_t ServiceInRos1::wanted_attempts() const {
 
 void ServiceInRos1::attempt() {
   while (now_ns() < place_until_ns_ && attempts_.size() < wanted_attempts()) {
-    attempts_.push_back(std::make_shared<CallConnection>(machinery_.loop, *this, specification_.ros1, machinery_.caller_id));
+    attempts_.push_back(std::make_shared<CallConnection>(context_.loop, *this, specification_.ros1, context_.caller_id));
     const auto begun = attempts_.back();
     begun->begin(address_, port_);
   }
@@ -124,7 +149,7 @@ bool ServiceInRos1::begin_one(uint64_t number) {
 }
 
 void ServiceInRos1::found(const std::string & address, uint16_t port) {
-  machinery_.loop.post([this, address, port] {
+  context_.loop.post([this, address, port] {
     asked_ = false;
     problem_ = "no server";
     address_ = address;
@@ -136,7 +161,7 @@ void ServiceInRos1::found(const std::string & address, uint16_t port) {
 }
 
 void ServiceInRos1::not_found(const std::string & reason) {
-  machinery_.loop.post([this, reason] {
+  context_.loop.post([this, reason] {
     asked_ = false;
     problem_ = reason;
     ask_after_ns_ = now_ns() + kLookEveryNs;
@@ -163,16 +188,25 @@ void ServiceInRos1::on_answer(const std::shared_ptr<CallConnection> & connection
     const size_t size = answer->size() - kAnswerHeadBytes;
     if (!good) {
       fail(call, std::string(reinterpret_cast<const char *>(payload), size));
-    } else if (cdr_size(specification_.response, payload, size) == SIZE_MAX) {
-      fail(call, "the answer is none of " + specification_.ros1.type);
+    } else if (specification_.converts) {
+      call->second.connection = nullptr;
+      context_.python.put(
+        {specification_.token, PythonKind::kResponse, call->first, call->second.start_ns, "", std::move(answer), kAnswerHeadBytes}, SIZE_MAX);
     } else {
-      const Call done = std::move(call->second);
-      calls_.erase(call);
-      replies_.answer(done.who, std::move(answer), kAnswerHeadBytes, done.start_ns);
+      on_good_answer(call, std::move(answer), kAnswerHeadBytes);
     }
   }
   begin_waiting();
   look_again();
+}
+
+void ServiceInRos1::on_good_answer(Calls::iterator call, Frame answer, size_t offset) {
+  if (cdr_size(specification_.response, answer->data() + offset, answer->size() - offset) == SIZE_MAX) {
+    return fail(call, "the answer is none of " + specification_.ros1.type);
+  }
+  const Call done = std::move(call->second);
+  calls_.erase(call);
+  replies_.answer(done.who, std::move(answer), offset, done.start_ns);
 }
 
 void ServiceInRos1::on_lost(const std::shared_ptr<CallConnection> & connection, Loss loss, const std::string & reason) {

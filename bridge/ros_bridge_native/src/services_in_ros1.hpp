@@ -18,14 +18,15 @@ namespace plane {
 
 // Calls live in the loop's thread. Threads of DDS take the requests and post them to it.
 // A request is sent once: whether a server that died in a call had carried it out nobody knows, so it is not repeated.
-class ServiceInRos1 : public Route, public CallDesk {
+class ServiceInRos1 : public Route, public CallListener {
  public:
-  ServiceInRos1(Machinery & machinery, ServiceSpecification specification);
+  ServiceInRos1(Context & context, ServiceSpecification specification);
   ~ServiceInRos1() override;
 
   // Any thread. What became of asking the master (kNeedsServer): where the server is, or why that is not known.
   void found(const std::string & address, uint16_t port);
   void not_found(const std::string & reason);
+  void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) override;
 
  private:
   struct Call {
@@ -43,6 +44,7 @@ class ServiceInRos1 : public Route, public CallDesk {
 
   void take_requests();
   void on_request(const rmw_request_id_t & who, Frame request, int64_t start_ns);
+  void on_good_answer(Calls::iterator call, Frame answer, size_t offset);
   void begin_waiting();
   bool begin_one(uint64_t number);
   size_t wanted_attempts() const;
@@ -54,7 +56,7 @@ class ServiceInRos1 : public Route, public CallDesk {
   void look();
   void look_again();
 
-  Machinery & machinery_;
+  Context & context_;
   const ServiceSpecification specification_;
   std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
   std::shared_ptr<Timer> timer_;

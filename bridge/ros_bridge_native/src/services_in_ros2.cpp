@@ -11,27 +11,28 @@ constexpr size_t kMostEarly = 256;
 
 }  // namespace
 
-ServiceInRos2::ServiceInRos2(Machinery & machinery, ServiceSpecification specification)
-: machinery_(machinery), specification_(std::move(specification)),
+ServiceInRos2::ServiceInRos2(Context & context, ServiceSpecification specification)
+: context_(context), specification_(std::move(specification)),
   client_(std::make_unique<Ros2Client>(specification_.node, specification_.type, specification_.ros2_service)),
-  timer_(std::make_shared<Timer>(machinery.loop, [this] { look(); })) {
+  timer_(std::make_shared<Timer>(context.loop, [this] { look(); })) {
   client_->listen([this](size_t number) { on_responses(number); });
   timer_->begin();
-  machinery_.server->open_desk(*this);
+  context_.server->offer_service(*this);
 }
 
 ServiceInRos2::~ServiceInRos2() {
   client_->stop_listening();
-  machinery_.loop.run_and_wait([this] {
+  context_.loop.run_and_wait([this] {
     closed_ = true;
     timer_->end();
-    machinery_.server->close_desk(*this);
+    context_.server->withdraw_service(*this);
     while (!calls_.empty()) fail(calls_.begin(), kBridgeEnds);
     const auto connections = connections_;
     for (const auto & connection : connections) connection->shut();
   });
-  machinery_.calls.forget(this);
-  machinery_.loop.run_and_wait([] {});  // what the worker has posted before
+  context_.calls.forget(this);
+  context_.loop.run_and_wait([] {});  // what the worker has posted before
+  context_.python.forget(specification_.token);
 }
 
 void ServiceInRos2::on_open(const std::shared_ptr<ServiceConnection> & connection) {
@@ -51,14 +52,29 @@ void ServiceInRos2::on_closed(const std::shared_ptr<ServiceConnection> & connect
 void ServiceInRos2::on_request(const std::shared_ptr<ServiceConnection> & connection, Frame request) {
   const int64_t now = now_ns();
   const auto call = calls_.emplace_hint(calls_.end(), next_number_++, Call{connection, nullptr, now, now + specification_.timeout_ns});
-  const size_t bytes = request->size() - kRequestOffset;
   if (closed_) return fail(call, kBridgeEnds);
-  if (cdr_size(specification_.request, request->data() + kRequestOffset, bytes) == SIZE_MAX) {
+  if (!specification_.converts) return on_good_request(call, std::move(request));
+  context_.python.put({specification_.token, PythonKind::kRequest, call->first, now, "", std::move(request), kRequestOffset}, SIZE_MAX);
+  look_again();
+}
+
+void ServiceInRos2::on_good_request(Calls::iterator call, Frame request) {
+  if (cdr_size(specification_.request, request->data() + kRequestOffset, request->size() - kRequestOffset) == SIZE_MAX) {
     return fail(call, "the request is none of " + specification_.ros1.type);
   }
   call->second.request = std::move(request);
   if (client_->ready()) hand_on(call);
   look_again();
+}
+
+void ServiceInRos2::on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) {
+  context_.loop.post([this, kind = message.kind, number = message.number, frame = framed(bytes, size), problem] {
+    const auto call = calls_.find(number);
+    if (call == calls_.end()) return;  // its client has gone, or its time was over
+    if (!problem.empty()) fail(call, "it can't be converted: " + problem);
+    else if (kind == PythonKind::kRequest) on_good_request(call, frame);
+    else answer(call, frame);
+  });
 }
 
 // Large requests are the worker's, so that their copies hold up nothing else.
@@ -70,7 +86,7 @@ void ServiceInRos2::hand_on(Calls::iterator call) {
     std::lock_guard<std::mutex> lock(large_mutex_);
     large_.emplace_back(call->first, request);
   }
-  machinery_.calls.schedule(this);
+  context_.calls.schedule(this);
 }
 
 void ServiceInRos2::work() {
@@ -83,7 +99,7 @@ void ServiceInRos2::work() {
       large_.pop_front();
     }
     const int64_t sequence = send(next.second);
-    machinery_.loop.post([this, number = next.first, sequence] {
+    context_.loop.post([this, number = next.first, sequence] {
       --with_worker_;
       on_sent(number, sequence);
       if (with_worker_ == 0) early_.clear();
@@ -115,7 +131,7 @@ void ServiceInRos2::on_responses(size_t number) {
     const int64_t sequence = client_->take(incoming);
     if (!incoming.touched) continue;  // another client's
     if (!incoming.good) frame.reset();
-    machinery_.loop.post([this, sequence, frame = std::move(frame)] { on_response(sequence, frame); });
+    context_.loop.post([this, sequence, frame = std::move(frame)] { on_response(sequence, frame); });
   }
 }
 
@@ -130,6 +146,13 @@ void ServiceInRos2::on_response(int64_t sequence, const Frame & response) {
 
 void ServiceInRos2::finish(Calls::iterator call, const Frame & response) {
   if (!response) return fail(call, "the response is none of " + specification_.ros1.type);
+  if (!specification_.converts) return answer(call, response);
+  numbers_.erase(std::exchange(call->second.sequence, -1));
+  context_.python.put(
+    {specification_.token, PythonKind::kResponse, call->first, call->second.start_ns, "", response, kRequestOffset}, SIZE_MAX);
+}
+
+void ServiceInRos2::answer(Calls::iterator call, const Frame & response) {
   const Call done = std::move(call->second);
   numbers_.erase(done.sequence);
   calls_.erase(call);
@@ -143,8 +166,8 @@ void ServiceInRos2::fail(Calls::iterator call, const std::string & reason) {
   calls_.erase(call);
   counters.errors.fetch_add(1);
   const std::string text = specification_.ros1.service + " by the bridge: " + reason;
-  machinery_.events.put(EventKind::kCallFailed, specification_.token, text);
-  failed.connection->answer(false, text_frame(text));
+  context_.events.put(EventKind::kCallFailed, specification_.token, text);
+  failed.connection->answer(false, framed(text.data(), text.size()));
 }
 
 // While there are calls: end those whose time is over or whose server has gone, and begin those whose server has come.

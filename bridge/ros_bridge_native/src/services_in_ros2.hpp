@@ -16,12 +16,13 @@
 namespace plane {
 
 // Calls live in the loop's thread. Threads of DDS take the responses, and a worker sends large requests; both post what they have to the loop.
-class ServiceInRos2 : public Route, public ServiceDesk, public Job {
+class ServiceInRos2 : public Route, public ServiceHandler, public Job {
  public:
-  ServiceInRos2(Machinery & machinery, ServiceSpecification specification);
+  ServiceInRos2(Context & context, ServiceSpecification specification);
   ~ServiceInRos2() override;
 
   const ServiceIdentity & identity() const override { return specification_.ros1; }
+  void on_converted(const PythonMessage & message, const uint8_t * bytes, size_t size, const std::string & problem) override;
 
  private:
   struct Call {
@@ -38,17 +39,19 @@ class ServiceInRos2 : public Route, public ServiceDesk, public Job {
   void on_closed(const std::shared_ptr<ServiceConnection> & connection) override;
   void work() override;
 
+  void on_good_request(Calls::iterator call, Frame request);
   void hand_on(Calls::iterator call);
   int64_t send(const Frame & request) const;
   void on_sent(uint64_t number, int64_t sequence);
   void on_responses(size_t number);
   void on_response(int64_t sequence, const Frame & response);
   void finish(Calls::iterator call, const Frame & response);
+  void answer(Calls::iterator call, const Frame & response);
   void fail(Calls::iterator call, const std::string & reason);
   void look();
   void look_again();
 
-  Machinery & machinery_;
+  Context & context_;
   const ServiceSpecification specification_;
   std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
   std::unique_ptr<Ros2Client> client_;

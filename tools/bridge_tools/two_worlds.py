@@ -1,4 +1,4 @@
-"""Import rospy and rclpy side by side, in one interpreter.
+"""Import rospy and rclpy side by side, in one interpreter: the soak is a peer of the bridge in both worlds.
 
 Both worlds have packages of the same names (``std_msgs`` ...). rospy needs ROS 1's while it is imported, and keeps them itself
 afterwards; so they are taken out of ``sys.modules`` again, and from then on every import is ROS 2's.
@@ -76,27 +76,25 @@ def _is_message_package(name: str, folder: Path) -> bool:
     return any((folder / name / kind / "__init__.py").is_file() for kind in ("msg", "srv"))
 
 
-def import_ros1() -> Path:
-    """Import rospy and give its message packages' names back to ROS 2; return the folder that it came from. Twice is once.
+def import_ros1(*message_modules: str) -> dict[str, ModuleType]:
+    """Import rospy and give its message packages' names back to ROS 2; return ROS 1's modules of the given names (``std_msgs.msg``).
 
-    ROS 2 message packages that are imported already are put back afterwards. Call it before other threads import anything.
+    ROS 2 message packages that are imported already are put back afterwards. Call it once, before other threads import anything.
 
     Raises:
         WorldError: rospy is not there.
     """
     folder = find_ros1_path()
-    if "rospy" in sys.modules:
-        return folder
     for name in KEEP_OURS:
         importlib.import_module(name)
     ros2_messages = _take_out_messages(folder)
     try:
         with _in_front(folder):
             importlib.import_module("rospy")
+            return {name: importlib.import_module(name) for name in message_modules}
     finally:
         _take_out_messages(folder)
         sys.modules.update(ros2_messages)
-    return folder
 
 
 def _take_out_messages(folder: Path) -> dict[str, ModuleType]:

@@ -7,14 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_bridge.config import ActionRoute, Direction, Reliability, ServiceRoute, TopicRoute, World
+from ros_bridge.decisions import BULKY_DEPTH, DEPTH, Refused, RouteDecision, decide
 from ros_bridge.errors import BridgeError, TypeUnknownError
 from ros_bridge.graph import Graphs, Ros1Graph, Ros2Endpoint, Ros2Graph, is_bridge
-from ros_bridge.lingering import LINGER_S, Lingering
+from ros_bridge.keep_alive import KEEP_ALIVE_S, KeepAlive
 from ros_bridge.parameters import flatten
-from ros_bridge.rows import Rates, list_table, live_table, render, summary
 from ros_bridge.selection import Selection
 from ros_bridge.stats import Figures
-from ros_bridge.wanted import BULKY_DEPTH, DEPTH, Refused, Wanted, decide
+from ros_bridge.tables import Rates, list_table, live_table, render, summary
 
 STRING = "std_msgs/String"
 UP, DOWN = Direction.ROS1_TO_ROS2, Direction.ROS2_TO_ROS1
@@ -63,7 +63,7 @@ def decided(one, two, selection=ALL, configured=()):
 
 def test_a_ros1_publisher_is_offered_and_flows_when_somebody_receives():
     (alone,) = decided(ros1(["/a"]), ros2())
-    assert alone == Wanted(TopicRoute("/a", "/a", UP, STRING, latched=True, depth=DEPTH, ros2_type=STRING))
+    assert alone == RouteDecision(TopicRoute("/a", "/a", UP, STRING, latched=True, depth=DEPTH, ros2_type=STRING))
     assert not alone.flows
     (heard,) = decided(ros1(["/a"]), ros2(subscribers={"/a": (end(), end())}))
     assert (heard.spec, heard.receivers, heard.flows) == (alone.spec, 2, True)
@@ -120,9 +120,9 @@ def test_services_and_actions_go_from_the_world_that_has_the_server():
     assert decided(one, two) == [
         Refused("service", "/both", "/both", "both worlds have a server"),
         Refused("service", "/mute", "/mute", "its node does not say its type"),
-        Wanted(ServiceRoute("/one", "/one", World.ROS1, "a/B", ros2_type="a/B")),
-        Wanted(ServiceRoute("/two", "/two", World.ROS2, "c/D", ros2_type="c/D")),
-        Wanted(ActionRoute("/go", "/go", World.ROS2, "e/Go")),
+        RouteDecision(ServiceRoute("/one", "/one", World.ROS1, "a/B", ros2_type="a/B")),
+        RouteDecision(ServiceRoute("/two", "/two", World.ROS2, "c/D", ros2_type="c/D")),
+        RouteDecision(ActionRoute("/go", "/go", World.ROS2, "e/Go")),
     ]
 
 
@@ -132,13 +132,13 @@ def test_an_action_of_ros1_is_known_by_its_topics_which_are_no_topics_then():
     to_server = {"/go/goal": server, "/go/cancel": server}
     types = {"/go/goal": "e/GoActionGoal", "/go/status": "actionlib_msgs/GoalStatusArray"}
     graph = Ros1Graph({**from_server, "/go/goal": client}, {**to_server, "/go/status": client}, types=types)
-    assert decided(graph, ros2()) == [Wanted(ActionRoute("/go", "/go", World.ROS1, "e/Go"))]
+    assert decided(graph, ros2()) == [RouteDecision(ActionRoute("/go", "/go", World.ROS1, "e/Go"))]
     assert Ros1Graph({"/go/goal": client}, {"/go/status": client}, types=types).action_servers() == {}
 
 
 def test_own_ends_and_other_bridges_are_no_foreign_ones():
     assert is_bridge("/ros_bridge")
-    assert is_bridge("/robot/ros_bridge_topics")
+    assert is_bridge("/robot/ros_bridge")
     assert not is_bridge("/ros_bridge_user")
 
 
@@ -195,23 +195,23 @@ def test_no_renaming_makes_two_routes_meet_or_a_message_go_round(selection, name
 
 
 def wanted(receivers=0, **changes):
-    return Wanted(TopicRoute("/a", "/a", UP, STRING, **changes), receivers)
+    return RouteDecision(TopicRoute("/a", "/a", UP, STRING, **changes), receivers)
 
 
 def test_a_route_lingers_after_its_publisher_and_flows_on_after_its_last_subscriber():
-    lingering = Lingering()
-    assert lingering.update([wanted(2)], 0.0) == [wanted(2)]
-    assert lingering.update([wanted(0)], 1.0) == [wanted(2)]
-    assert lingering.update([wanted(0)], LINGER_S - 0.1) == [wanted(2)]
-    assert lingering.update([wanted(0)], LINGER_S + 0.1) == [wanted(0)]
-    assert lingering.update([], LINGER_S + 1.0) == [wanted(0)]
-    assert lingering.update([], 2 * LINGER_S + 0.2) == []
+    keep_alive = KeepAlive()
+    assert keep_alive.update([wanted(2)], 0.0) == [wanted(2)]
+    assert keep_alive.update([wanted(0)], 1.0) == [wanted(2)]
+    assert keep_alive.update([wanted(0)], KEEP_ALIVE_S - 0.1) == [wanted(2)]
+    assert keep_alive.update([wanted(0)], KEEP_ALIVE_S + 0.1) == [wanted(0)]
+    assert keep_alive.update([], KEEP_ALIVE_S + 1.0) == [wanted(0)]
+    assert keep_alive.update([], 2 * KEEP_ALIVE_S + 0.2) == []
 
 
 def test_another_quality_of_service_replaces_the_route_at_once():
-    lingering = Lingering()
-    lingering.update([wanted(1)], 0.0)
-    assert lingering.update([wanted(1, latched=True)], 1.0) == [wanted(1, latched=True)]
+    keep_alive = KeepAlive()
+    keep_alive.update([wanted(1)], 0.0)
+    assert keep_alive.update([wanted(1, latched=True)], 1.0) == [wanted(1, latched=True)]
 
 
 def test_rates_are_those_since_the_last_look():
@@ -233,7 +233,7 @@ def test_rows_tell_both_ways_of_a_topic_and_what_can_not_be():
     assert {name: row["count"] for name, row in topics.items()} == {"/tf": 7, "/tf ros2_to_ros1": 2}
     assert (topics["/tf"]["rate_hz"], topics["/tf"]["dropped"], topics["/tf"]["dropped_why"]) == (1.26, 3, {"slow": 3})
     assert [row[0:3] for row in live_table(figures, {up: 1.0})[1:]] == [("/tf", "->", "/tf"), ("/tf", "<-", "/tf")]
-    table = list_table([Wanted(down, 1), Refused("topic", "/x", "/y", "no such type")], {up: ""})
+    table = list_table([RouteDecision(down, 1), Refused("topic", "/x", "/y", "no such type")], {up: ""})
     assert [(row[0], row[2], row[5], row[6]) for row in table[1:]] == [
         ("topic", "->", "reliable, volatile, 10", "configured"),
         ("topic", "<-", "best effort, volatile, 10", "1 receive"),

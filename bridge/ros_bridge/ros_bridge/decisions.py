@@ -23,7 +23,7 @@ DEPTH = 100
 BULKY_DEPTH = 10  # of types with an array of bytes without an end: images, clouds, maps
 
 
-class TypeBook(Protocol):
+class TypeLookup(Protocol):
     """What is asked about types."""
 
     def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> tuple[str, str]:
@@ -37,7 +37,7 @@ class TypeBook(Protocol):
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RouteDecision:
     """A route that is to exist. ``receivers``: how many foreign subscribers wait at its target; with none it does not flow."""
 
     spec: Spec
@@ -59,10 +59,10 @@ class Refused:
     reason: str
 
 
-Decision = Wanted | Refused
+Decision = RouteDecision | Refused
 
 
-def decide(graphs: Graphs, selection: Selection, types: TypeBook, configured: Iterable[Spec] = ()) -> list[Decision]:
+def decide(graphs: Graphs, selection: Selection, types: TypeLookup, configured: Iterable[Spec] = ()) -> list[Decision]:
     """Return everything that is selected: what to bridge and what can't be. Names of configured routes are left to these."""
     taken1 = {spec.ros1_name for spec in configured}
     taken2 = {spec.ros2_name for spec in configured}
@@ -89,7 +89,7 @@ def _pairs(names1: Iterable[str], names2: Iterable[str], selection: Selection) -
     return {(one, two): None for one, two in pairs if one is not None and two is not None and selection.selects(one, two)}
 
 
-def _topic(graphs: Graphs, types: TypeBook, ros1_name: str, ros2_name: str) -> Iterator[Decision]:
+def _topic(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) -> Iterator[Decision]:
     publishers1 = graphs.ros1.publishers.get(ros1_name, frozenset())
     publishers2 = graphs.ros2.publishers.get(ros2_name, ())
     if not publishers1 and not publishers2:
@@ -113,9 +113,9 @@ def _topic(graphs: Graphs, types: TypeBook, ros1_name: str, ros2_name: str) -> I
     if publishers1:
         receivers = sum(end.type_name == pair[1] for end in subscribers2)
         spec = TopicRoute(*names, Direction.ROS1_TO_ROS2, pair[0], latched=True, depth=max(depth, len(publishers1)), ros2_type=pair[1])
-        yield Wanted(spec, receivers)
+        yield RouteDecision(spec, receivers)
     if publishers2:
-        yield Wanted(_from_ros2(names, pair, depth, publishers2), subscribers1)
+        yield RouteDecision(_from_ros2(names, pair, depth, publishers2), subscribers1)
 
 
 def _from_ros2(names: tuple[str, str], pair: tuple[str, str], depth: int, publishers: tuple[Ros2Endpoint, ...]) -> TopicRoute:
@@ -132,7 +132,7 @@ def _from_ros2(names: tuple[str, str], pair: tuple[str, str], depth: int, publis
     )
 
 
-def _service(graphs: Graphs, types: TypeBook, ros1_name: str, ros2_name: str) -> Decision:
+def _service(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) -> Decision:
     in1, in2 = ros1_name in graphs.ros1.services, ros2_name in graphs.ros2.services
     if in1 and in2:
         return Refused("service", ros1_name, ros2_name, "both worlds have a server")
@@ -140,11 +140,11 @@ def _service(graphs: Graphs, types: TypeBook, ros1_name: str, ros2_name: str) ->
         pair = types.check_service(graphs.ros1.service_types.get(ros1_name), graphs.ros2.services.get(ros2_name))
     except BridgeError as error:
         return Refused("service", ros1_name, ros2_name, str(error))
-    return Wanted(ServiceRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, pair[0], ros2_type=pair[1]))
+    return RouteDecision(ServiceRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, pair[0], ros2_type=pair[1]))
 
 
 def _action(graphs: Graphs, ros1_name: str, ros2_name: str) -> Decision:
     in1, in2 = graphs.ros1.action_servers().get(ros1_name), graphs.ros2.actions.get(ros2_name)
     if in1 and in2:
         return Refused("action", ros1_name, ros2_name, "both worlds have a server")
-    return Wanted(ActionRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, in1 or in2 or ""))
+    return RouteDecision(ActionRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, in1 or in2 or ""))

@@ -1,4 +1,4 @@
-"""Throw garbage at a running bridge: ``python -m ros_bridge.fuzz --seconds 60 --up /a --down /b`` (String topics that it carries).
+"""Throw garbage at a running bridge: ``python -m bridge_tools.fuzz --seconds 60 --up /a --down /b`` (String topics that it carries).
 
 Broken and random frames, connection headers and definitions from a publisher; random bytes, and real requests with bytes changed, to its
 XML-RPC and TCPROS ports; with ``--service /c`` (a SetBool that it offers in ROS 1) broken headers and requests of that service's clients.
@@ -20,12 +20,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ros_bridge.hostile import LENGTH, WITHIN_S, HostilePublisher, header, master, open_ports
+from bridge_tools.hostile import LENGTH, WITHIN_S, HostilePublisher, master, open_ports
+from ros_bridge.tcpros import encode_header
 
 STRING = {"type": "std_msgs/String", "md5sum": "992ce8a1687cec8c8bd883ec73ca41d1", "message_definition": "string data\n"}
 SET_BOOL = {"md5sum": "09fb03525b03e7ea1fd3992bafd87e16", "persistent": "1"}
 REQUESTS = (
-    header({"callerid": "/fuzz", "topic": "{down}", **STRING}),
+    encode_header({"callerid": "/fuzz", "topic": "{down}", **STRING}),
     b"POST /RPC2 HTTP/1.1\r\nHost: a\r\nContent-Type: text/xml\r\nContent-Length: 93\r\n\r\n"
     b"<?xml version='1.0'?><methodCall><methodName>getPid</methodName><params></params></methodCall>",
 )
@@ -90,7 +91,7 @@ def reply(dice: random.Random) -> bytes:
     fields = STRING | {"callerid": "/fuzz", "latching": "1"}
     if dice.random() < 0.5:
         fields["message_definition"] = "\n".join(dice.choices(WORDS, k=3))
-    return dice.choice((header(fields), header(fields), mutated(header(fields), dice), dice.randbytes(60)))
+    return dice.choice((encode_header(fields), encode_header(fields), mutated(encode_header(fields), dice), dice.randbytes(60)))
 
 
 class Fuzzer:
@@ -123,7 +124,7 @@ class Fuzzer:
         self._send(garbage, self._dice.choice(self._ports))
 
     def _call(self) -> None:
-        greeting = header(SET_BOOL | {"callerid": "/fuzz", "service": self._service, "probe": self._dice.choice("01")})
+        greeting = encode_header(SET_BOOL | {"callerid": "/fuzz", "service": self._service, "probe": self._dice.choice("01")})
         if self._dice.random() < 0.3:
             greeting = mutated(greeting, self._dice)
         calls = (LENGTH.pack(1) + self._dice.randbytes(1)) * self._dice.randint(0, 5)
@@ -157,7 +158,7 @@ class Fuzzer:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Throw, print the figures, and return 0 if the bridge still answers."""
     parser = argparse.ArgumentParser(
-        prog="ros_bridge.fuzz", description="Throws garbage at a running bridge, which has to be of this machine."
+        prog="bridge_tools.fuzz", description="Throws garbage at a running bridge, which has to be of this machine."
     )
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)

@@ -14,13 +14,13 @@ Take = Callable[[Any, Header], None]
 
 
 @dataclass(frozen=True)
-class _LaterResponse:
+class _DeferredResponse:
     """Stands for a response that will be sent."""
 
     request: Any
 
 
-class LaterService:
+class DeferredService:
     """A service whose requests are taken in the executor's thread by ``take(request, header)``."""
 
     def __init__(self, node: Node, service_class: Any, name: str, take: Take) -> None:
@@ -29,12 +29,12 @@ class LaterService:
         self._take = take
         # rclpy sends what the callback returns at once, and a callback that awaits makes its executor poll without a pause.
         # So the callback returns a stand-in, and its sending hands the request over.
-        self._service = node.create_service(service_class, name, lambda request, _: _LaterResponse(request))
+        self._service = node.create_service(service_class, name, lambda request, _: _DeferredResponse(request))
         self._send = self._service.send_response
         self._service.send_response = self._hand_over
 
-    def _hand_over(self, later: _LaterResponse, header: Header) -> None:
-        self._take(later.request, header)
+    def _hand_over(self, response: _DeferredResponse, header: Header) -> None:
+        self._take(response.request, header)
 
     def reply(self, response: Any, header: Header) -> None:
         """Answer a request."""

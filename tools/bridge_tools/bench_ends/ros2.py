@@ -16,7 +16,7 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from ros_bridge.bench_ends import protocol
+from bridge_tools.bench_ends import protocol
 
 DEPTH = 10
 READY_S = 60.0

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import socket
 import struct
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import ServerProxy, Transport
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
-
-from ros_bridge.ros1_call import TimedTransport
 
 WITHIN_S = 5.0
 LENGTH = struct.Struct("<I")
 LOOPBACK = "127.0.0.1"
 
 
+class TimedTransport(Transport):
+    """XML-RPC that gives up."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """Connect with the time limit."""
+        connection = super().make_connection(host)
+        connection.timeout = WITHIN_S
+        return connection
+
+
 def master(uri: str) -> Any:
     """Return the master, asked within a time."""
-    return ServerProxy(uri, transport=TimedTransport(WITHIN_S))
-
-
-def header(fields: Mapping[str, str]) -> bytes:
-    """Return a TCPROS connection header with its length."""
-    entries = [f"{name}={value}".encode() for name, value in fields.items()]
-    body = b"".join(LENGTH.pack(len(entry)) + entry for entry in entries)
-    return LENGTH.pack(len(body)) + body
+    return ServerProxy(uri, transport=TimedTransport())
 
 
 class _Quiet(SimpleXMLRPCRequestHandler):

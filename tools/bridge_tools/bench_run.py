@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from alula_common.network import free_port
-from ros_bridge.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
+from bridge_tools.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
 from ros_bridge.errors import BridgeError
-from ros_bridge.master import Master
+from ros_bridge.master import Connection, wait_for_master
 
 WITHIN_S = 60.0
 DRAINED_S = 1.0
@@ -125,7 +125,7 @@ class Bench:
             return Process([in_ros1, "python3", str(ENDS / "ros1.py"), argument], environment)
         if small_segments:
             environment = {name: value for name, value in environment.items() if name not in PROFILES}
-        return Process([sys.executable, "-m", "ros_bridge.bench_ends.ros2", argument], environment)
+        return Process([sys.executable, "-m", "bridge_tools.bench_ends.ros2", argument], environment)
 
     @contextlib.contextmanager
     def bridge(self, configuration: dict[str, list[dict[str, Any]]]) -> Iterator[Process]:
@@ -232,7 +232,7 @@ def open_bench() -> Iterator[Bench]:
         limit = threading.Timer(WITHIN_S, (stop := threading.Event()).set)
         limit.daemon = True
         limit.start()
-        if not Master(uri, "/bench").wait(stop):
+        if not wait_for_master(Connection(uri), "/bench", stop):
             raise BenchError(f"the ROS master at {uri} does not answer within {WITHIN_S:.0f} s")
         limit.cancel()
         yield Bench(uri, Path(folder))

@@ -1,4 +1,4 @@
-"""Run the bridge for minutes amid coming and going: ``setup/in_ros2 python -m ros_bridge.soak --minutes 30``.
+"""Run the bridge for minutes amid coming and going: ``setup/in_ros2 python -m bridge_tools.soak --minutes 30``.
 
 It starts a ROS master and a bridge of its own. Two steady topics, one each way, carry numbered messages at 100 Hz, and a ROS 1 client calls
 a ROS 2 service, while publishers and subscribers of other topics come and go in both worlds and the master is killed and started
@@ -19,14 +19,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from alula_common.network import free_port
-from ros_bridge import two_worlds
-from ros_bridge.fuzz import memory_mb
+from bridge_tools import two_worlds
+from bridge_tools.fuzz import memory_mb
 
 PERIOD_S = 0.01
 START_WITHIN_S = 30.0
@@ -147,43 +147,38 @@ def bridge_process(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
 class Ends:
     """The peers in both worlds, in this process; steady ones from the beginning, others as told."""
 
-    def __init__(self, figures: SoakFigures, dice: random.Random) -> None:
-        """Open the steady ends. Both worlds have to be initialised."""
+    def __init__(self, figures: SoakFigures, dice: random.Random, ros1: Mapping[str, Any]) -> None:
+        """Open the steady ends. Both worlds have to be initialised; ``ros1`` has ROS 1's modules of std_msgs and std_srvs."""
         import rclpy
         import rospy
         from rclpy.executors import SingleThreadedExecutor
         from std_msgs.msg import String
         from std_srvs.srv import SetBool
 
-        from ros_bridge import raw
-        from ros_bridge.conversion import Types, ament_prefixes
         from ros_bridge.spinning import spin
 
-        types = Types(ament_prefixes())
         self._figures, self._dice, self._rospy, self._string = figures, dice, rospy, String
-        self._class = raw.message_class(types.message("std_msgs/String"))
+        self._class = ros1["std_msgs.msg"].String
+        self._service_class = ros1["std_srvs.srv"].SetBool
         self._node = rclpy.create_node("ros_bridge_soak")
-        service = types.service("std_srvs/SetBool")
-        self._service_class = raw.service_class(service)
-        self._request = raw.message_class(service.request)(b"\x01")
         self._node.create_subscription(String, UP, lambda message: figures.up.take(int(message.data)) if message.data else None, 1000)
         self._node.create_service(SetBool, SERVICE, lambda request, _: SetBool.Response(success=request.data))
         self._down = self._node.create_publisher(String, DOWN, 1000)
-        rospy.Subscriber(DOWN, self._class, lambda message: self._take_down(bytes(message.data)[4:]))
+        rospy.Subscriber(DOWN, self._class, lambda message: self._take_down(message.data))
         self._up = rospy.Publisher(UP, self._class, queue_size=1000)
         self._changing: list[Callable[[], None]] = []
         executor = SingleThreadedExecutor()
         executor.add_node(self._node)
         threading.Thread(target=spin, args=(executor,), daemon=True).start()
 
-    def _take_down(self, text: bytes) -> None:
+    def _take_down(self, text: str) -> None:
         if text:
             self._figures.down.take(int(text))
 
     def publish(self, number: int | None) -> None:
         """Send a number both ways; without one an empty text, to see whether the way is open."""
         text = "" if number is None else str(number)
-        self._up.publish(self._class(len(text).to_bytes(4, "little") + text.encode()))
+        self._up.publish(self._class(text))
         self._down.publish(self._string(data=text))
 
     def connected(self) -> bool:
@@ -197,15 +192,15 @@ class Ends:
         while True:
             try:
                 self._rospy.wait_for_service(SERVICE, max(0.1, end_s - time.monotonic()))
-                answer = self._rospy.ServiceProxy(SERVICE, self._service_class)(self._request)
+                answer = self._rospy.ServiceProxy(SERVICE, self._service_class)(data=True)
             except (self._rospy.ServiceException, self._rospy.ROSException, OSError) as error:
                 # The master may go between these two lines; then nobody was called.
                 if any(word in str(error) for word in MASTER_GONE) and time.monotonic() < end_s:
                     continue
                 self._figures.failures.append(str(error))
             else:
-                if bytes(answer.data)[:1] != b"\x01":
-                    self._figures.failures.append(f"answered {bytes(answer.data)!r}")
+                if not answer.success:
+                    self._figures.failures.append(f"answered {answer}")
             return
 
     def come_or_go(self) -> None:
@@ -221,7 +216,7 @@ class Ends:
 
     def _ros1_publisher(self, number: int) -> Callable[[], None]:
         end: Any = self._rospy.Publisher(f"/soak/up{number}", self._class, queue_size=10, latch=True)
-        end.publish(self._class(b"\x01\0\0\0a"))
+        end.publish(self._class("a"))
         return end.unregister  # type: ignore[no-any-return]
 
     def _ros1_subscriber(self, number: int) -> Callable[[], None]:
@@ -246,12 +241,12 @@ def open_files(pid: int) -> int:
 class Soak:
     """One run."""
 
-    def __init__(self, seconds: float, seed: int, master: Master, pid: int) -> None:
-        """Prepare; the bridge runs, with this process id."""
+    def __init__(self, seconds: float, seed: int, master: Master, pid: int, ros1: Mapping[str, Any]) -> None:
+        """Prepare; the bridge runs, with this process id. ``ros1`` as of ``Ends``."""
         self._seconds, self._master, self._pid = seconds, master, pid
         self.figures = SoakFigures()
         self._dice = random.Random(seed)  # noqa: S311 - repeatable, not secret
-        self._ends = Ends(self.figures, self._dice)
+        self._ends = Ends(self.figures, self._dice, ros1)
         self._stop = threading.Event()
 
     def _repeat(self, period_s: float, action: Callable[[], None]) -> threading.Thread:
@@ -313,7 +308,7 @@ class Soak:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print the figures; return 0 if they are good."""
-    parser = argparse.ArgumentParser(prog="ros_bridge.soak", description="Runs a bridge for minutes amid coming and going.")
+    parser = argparse.ArgumentParser(prog="bridge_tools.soak", description="Runs a bridge for minutes amid coming and going.")
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)
@@ -322,7 +317,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         folder = Path(name)
         master = Master(folder)
         os.environ |= {"ROS_MASTER_URI": master.uri, "ROS_IP": "127.0.0.1", "ROS_LOG_DIR": name}
-        two_worlds.import_ros1()
+        ros1 = two_worlds.import_ros1("std_msgs.msg", "std_srvs.srv")
         import rclpy
         import rospy
 
@@ -330,7 +325,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rclpy.init(args=[])
         try:
             with bridge_process(folder) as bridge:
-                figures = Soak(options.minutes * 60, options.seed, master, bridge.pid).run()
+                figures = Soak(options.minutes * 60, options.seed, master, bridge.pid, ros1).run()
         finally:
             master.close()
     sys.stdout.write(json.dumps(asdict(figures) | {"good": figures.good}) + "\n")

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ros_bridge.config import ActionRoute, Direction, ServiceRoute, Spec, TopicRoute, World
+from ros_bridge.decisions import Decision, Refused
 from ros_bridge.routes import Key, key_of
 from ros_bridge.stats import Figures
-from ros_bridge.wanted import Decision, Refused
 
 SECTION_OF: dict[type, str] = {TopicRoute: "topics", ServiceRoute: "services", ActionRoute: "actions"}
 COLUMNS = ("what", "ROS 1", "", "ROS 2", "type", "quality of service", "state")
@@ -31,7 +31,7 @@ class Rates:
         return rates
 
 
-def up(spec: Spec) -> bool:
+def to_ros2(spec: Spec) -> bool:
     """Tell whether messages go, or calls are answered, from ROS 1 towards ROS 2."""
     return spec.direction is Direction.ROS1_TO_ROS2 if isinstance(spec, TopicRoute) else spec.server is World.ROS1
 
@@ -42,9 +42,9 @@ def summary(figures: Mapping[Spec, Figures], rates: Mapping[Spec, float]) -> dic
     A topic that crosses both ways has a second row, ``<name> ros2_to_ros1``.
     """
     sections: dict[str, dict[str, dict[str, object]]] = {section: {} for section in SECTION_OF.values()}
-    for spec, one in sorted(figures.items(), key=lambda item: not up(item[0])):
+    for spec, one in sorted(figures.items(), key=lambda item: not to_ros2(item[0])):
         section = sections[SECTION_OF[type(spec)]]
-        way = "ros1_to_ros2" if up(spec) else "ros2_to_ros1"
+        way = "ros1_to_ros2" if to_ros2(spec) else "ros2_to_ros1"
         section[spec.ros1_name if spec.ros1_name not in section else f"{spec.ros1_name} {way}"] = {
             "ros2_name": spec.ros2_name,
             "direction": way,
@@ -89,7 +89,7 @@ def list_table(decisions: Iterable[Decision], configured: Mapping[Spec, str]) ->
 
 def _row(spec: Spec, state: str) -> tuple[str, ...]:
     kind = SECTION_OF[type(spec)].removesuffix("s")
-    return (kind, spec.ros1_name, "->" if up(spec) else "<-", spec.ros2_name, type_text(spec), quality_text(spec), state)
+    return (kind, spec.ros1_name, "->" if to_ros2(spec) else "<-", spec.ros2_name, type_text(spec), quality_text(spec), state)
 
 
 LIVE_COLUMNS = ("ROS 1", "", "ROS 2", "type", "Hz", "count", "MB", "p50 ms", "p95 ms", "dropped", "errors")
@@ -102,7 +102,7 @@ def live_table(figures: Mapping[Spec, Figures], rates: Mapping[Spec, float]) -> 
         rows.append(
             (
                 spec.ros1_name,
-                "->" if up(spec) else "<-",
+                "->" if to_ros2(spec) else "<-",
                 spec.ros2_name,
                 spec.type_name,
                 f"{rates.get(spec, 0.0):.1f}",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from ros_bridge.errors import BridgeError, TypeUnknownError
-from ros_bridge.topics import interface_class
+from ros_bridge.ros2_types import interface_class
 
 if TYPE_CHECKING:
     from ros_bridge.conversion import Types
@@ -16,7 +16,7 @@ Pair = tuple[str, str]
 
 
 class CheckedTypes:
-    """Answers for ``wanted.decide``."""
+    """Answers for ``decisions.decide``."""
 
     def __init__(self, types: Types, headers: Headers) -> None:
         """``headers`` asks the ROS 1 publishers of a topic for their connection headers; it may take a second each."""

@@ -16,8 +16,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ros_bridge.bench_cases import FLAT_OUT, OFFICIAL, OFFICIAL_IDLE_PERCENT, OFFICIAL_START_S, Case, Official, TopicCase, all_cases
-from ros_bridge.bench_run import Bench, BenchError, open_bench
+from bridge_tools.bench_cases import FLAT_OUT, OFFICIAL, OFFICIAL_IDLE_PERCENT, OFFICIAL_START_S, Case, Official, TopicCase, all_cases
+from bridge_tools.bench_run import Bench, BenchError, open_bench
 
 PACED_S, QUICK_S = 10.0, 2.0
 EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
@@ -125,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; return the exit code."""
     options = parse_arguments(arguments)
     if "ALULA_ROOT" not in os.environ:
-        sys.stderr.write("alula bench bridge: run it by ./alula bench bridge, or by setup/in_ros2 python -m ros_bridge.bench\n")
+        sys.stderr.write("alula bench bridge: run it by ./alula bench bridge, or by setup/in_ros2 python -m bridge_tools.bench\n")
         return EXIT_USAGE
     known = sorted({case.name for case in all_cases(PACED_S)} | {START})
     unknown = [words for words in options.case or () if not any(name.startswith(words) for name in known)]

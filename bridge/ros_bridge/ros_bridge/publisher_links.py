@@ -1,0 +1,164 @@
+"""Connections of the data plane to publishers in ROS 1: to all that the master names, tried again as long as it names them."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ros_bridge.native import EventKind, Native
+from ros_bridge.ros1_node import Kind
+
+if TYPE_CHECKING:
+    from ros_bridge.ros1_node import Ros1Node
+
+logger = logging.getLogger("ros_bridge")
+
+ASKING_THREADS = 4
+FIRST_RETRY_S, LAST_RETRY_S, REFUSED_RETRY_S = 0.1, 1.0, 5.0
+
+
+@dataclass
+class _Link:
+    """A connection to a publisher, made or wanted."""
+
+    route: int
+    topic: str
+    uri: str
+    token: int
+    connected: bool = False
+    under_way: bool = False
+    failures: int = 0
+    next_try_s: float = 0.0
+    complaint: str = ""
+
+
+@dataclass
+class _Subscription:
+    topic: str
+    type_name: str
+    publishers: set[str] = field(default_factory=set)
+    links: dict[str, _Link] = field(default_factory=dict)
+
+
+def resolve(host: str, port: int) -> bytes:
+    """Return the address of a host; raises OSError."""
+    return str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0]).encode()
+
+
+class PublisherLinks:
+    """All of them. Safe from several threads; ``node`` has to be set before the first subscription."""
+
+    node: Ros1Node
+
+    def __init__(self, library: Native, tokens: Iterator[int]) -> None:
+        """``tokens`` gives numbers that no event of another kind carries."""
+        self._native = library
+        self._tokens = tokens
+        self._lock = threading.RLock()
+        self._subscriptions: dict[int, _Subscription] = {}  # by the native route's address
+        self._links: dict[int, _Link] = {}
+        self._closed = False
+        self._askers = ThreadPoolExecutor(ASKING_THREADS, thread_name_prefix="plane_ask")  # publishers that are asked may hang
+
+    def subscribe(self, topic: str, type_name: str, route: int) -> None:
+        """Connect a native route to all publishers of a ROS 1 topic, now and later."""
+        with self._lock:
+            self._subscriptions[route] = _Subscription(topic, type_name)
+        self.node.register(Kind.SUBSCRIBER, topic, type_name)
+
+    def unsubscribe(self, route: int) -> None:
+        """Connect no more; when it returns nobody uses the native route."""
+        with self._lock:
+            subscription = self._subscriptions.pop(route, None)
+            if subscription is None:
+                return
+            for link in subscription.links.values():
+                self._links.pop(link.token, None)
+        self.node.unregister(Kind.SUBSCRIBER, subscription.topic, subscription.type_name)
+
+    def publishers_changed(self, topic: str, uris: list[str]) -> None:
+        """Take the master's word on who publishes a topic. What the bridge itself publishes is never fetched back."""
+        publishers = set(uris) - {self.node.uri}
+        with self._lock:
+            for route, subscription in self._subscriptions.items():
+                if subscription.topic == topic:
+                    self._connect_all(route, subscription, publishers)
+
+    def _connect_all(self, route: int, subscription: _Subscription, publishers: set[str]) -> None:
+        """Connect to those that are new. The others' connections end when they close them: a restarted master does not know all at once."""
+        subscription.publishers = publishers
+        for uri in publishers - subscription.links.keys():
+            link = _Link(route, subscription.topic, uri, next(self._tokens))
+            subscription.links[uri] = link
+            self._links[link.token] = link
+            self._try(link)
+
+    def _try(self, link: _Link) -> None:
+        """Ask the publisher where to connect to, in another thread."""
+        link.under_way = True
+        if not self._closed:
+            self._askers.submit(self._connect, link)
+
+    def _connect(self, link: _Link) -> None:
+        try:
+            host, port = self.node.place_of(link.topic, link.uri)
+            address = resolve(host, port)
+        except (OSError, ValueError, TypeError, LookupError) as error:  # it does not answer, or answers nonsense
+            self._failed(link, str(error), refused=False)
+            return
+        with self._lock:
+            wanted = link.route in self._subscriptions and link.token in self._links
+            if wanted and not self._native.connect_publisher(link.route, link.token, address, port):
+                self._failed(link, self._native.error().decode(errors="replace"), refused=False)
+
+    def _failed(self, link: _Link, reason: str, *, refused: bool) -> None:
+        """Try again later, unless the publisher is gone by the master's word."""
+        with self._lock:
+            subscription = self._subscriptions.get(link.route)
+            if subscription is None or link.token not in self._links:
+                return
+            if refused and link.complaint != reason:
+                link.complaint = reason
+                logger.warning("%s: the publisher at %s is not bridged: %s", link.topic, link.uri, reason)
+            link.connected = link.under_way = False
+            if link.uri not in subscription.publishers:
+                del subscription.links[link.uri]
+                del self._links[link.token]
+                return
+            pause_s = REFUSED_RETRY_S if refused else min(FIRST_RETRY_S * 2**link.failures, LAST_RETRY_S)
+            link.failures = min(link.failures + 1, 10)
+            link.next_try_s = time.monotonic() + pause_s
+
+    def on_event(self, kind: EventKind, token: int, text: str) -> None:
+        """Take what the data plane tells of a connection."""
+        with self._lock:
+            link = self._links.get(token)
+            if link is None:
+                return
+            if kind is EventKind.CONNECTED:
+                link.connected, link.under_way, link.failures, link.complaint = True, False, 0, ""
+            elif kind is EventKind.NEEDS_WRITER:
+                self._native.add_writer(link.route, token)
+            elif kind in {EventKind.CLOSED, EventKind.REFUSED}:
+                self._failed(link, text, refused=kind is EventKind.REFUSED)
+
+    def try_again(self) -> bool:
+        """Try the connections whose time has come; tell whether any is missing."""
+        now_s = time.monotonic()
+        with self._lock:
+            missing = [link for link in self._links.values() if not link.connected]
+            for link in missing:
+                if not link.under_way and now_s >= link.next_try_s:
+                    self._try(link)
+            return bool(missing)
+
+    def close(self) -> None:
+        """Try no more."""
+        self._closed = True
+        self._askers.shutdown(wait=False, cancel_futures=True)
