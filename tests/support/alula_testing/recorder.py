@@ -24,7 +24,8 @@ class Recorder(SkillHooks):
 
     def validate(self, inputs: object) -> str:
         """Accept."""
-        return self._note("validate", inputs) or ""
+        value = self._note("validate", inputs)
+        return value if "validate" in self.acts else ""
 
     def on_dispatch(self, execution: Execution) -> None:
         """Be dispatched."""

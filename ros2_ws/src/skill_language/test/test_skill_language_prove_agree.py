@@ -120,7 +120,7 @@ class Bench:
     def stimuli(self, copies):
         """Return what may be done now and is not refused, by kind, so that walks get somewhere."""
         skillset, running = self.skillset, [execution.skill for execution in self.engine.executions]
-        situation = self.engine._ledger.situation
+        situation = self.engine._context.situation
         kinds = {
             "extern": [(r.name, state) for r in skillset.resources for state in r.states],
             "event": [(event.name,) for event in skillset.events],

@@ -25,9 +25,8 @@ from skillset_interfaces.srv import Describe, GetData, SetPaused, Transition, Tr
 from skillset_interfaces.srv import Why as WhyService
 
 from skill_model.execution_state import ExecutionState
-from skill_runtime.core.engine import TransitionReply
+from skill_runtime.core.engine import PauseReply, TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from skill_runtime.core.pauses import PauseReply
 from skill_runtime.core.records import ExecutionRecord, SkillRecord
 from skill_runtime.core.why import Unmet as UnmetPrecondition
 from skill_runtime.core.why import Why

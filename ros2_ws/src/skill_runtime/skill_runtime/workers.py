@@ -51,7 +51,7 @@ class Workers:
                 continue
             try:
                 job()
-            except Exception as error:  # noqa: BLE001 - told; the thread is for the next job
+            except BaseException as error:  # noqa: BLE001 - told; the thread is for the next job
                 self._on_error("".join(traceback.format_exception(error)))
             with self._changed:
                 self._open -= 1

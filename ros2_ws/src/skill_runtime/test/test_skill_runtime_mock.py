@@ -103,7 +103,7 @@ def test_rules_by_call_by_inputs_and_for_the_rest(read):
     assert mocked.call(101.0) == (("NOT_VALIDATED", "too high"), 0.0)
     assert mocked.call(1.0) == (("TERMINATED", "DONE"), 0.5)
     assert mocked.call(1.0) == (("FAILED", "the mock crashed: a wire broke"), 0.25)
-    assert mocked.call(1.0) == (("FAILED", "on_dispatch raised skill_runtime.mock.skill.MockCrashError: at once"), 0.0)
+    assert mocked.call(1.0) == (("FAILED", "on_dispatch raised MockCrashError: at once"), 0.0)
     assert mocked.client.resources["axes"] == "AVAILABLE"
 
 

@@ -56,4 +56,4 @@ def test_every_trace_obeys_the_model(skillset, behaviours, programs):
     check_executions(bench)
     check_records(bench)
     assert bench.engine.executions == ()
-    assert bench.engine._ledger.entries == {}
+    assert bench.engine._context.entries == {}

@@ -9,7 +9,7 @@ from skill_runtime_models import RELEASE, TAKE, Bench, flying_skill, flying_skil
 
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Interrupt
-from skill_runtime.core.stops import DEFAULT_TIMEOUT_S
+from skill_runtime.core.engine import DEFAULT_TIMEOUT_S
 from skill_runtime.hooks import SkillHooks
 
 S = ExecutionState

@@ -61,5 +61,5 @@ def test_a_thousand_executions_leave_nothing_behind(navigation):
     assert growth_kb < GROWTH_KB, f"{growth_kb} kB more after {MEASURED} executions"
     assert more.total() < MEASURED / 20, more
     assert navigation.managers.engine.executions == ()
-    assert navigation.managers.engine._ledger.entries == {}
+    assert navigation.managers.engine._context.entries == {}
     print(f"{growth_kb} kB, {open_files() - files} files, {more.total()} objects more")  # noqa: T201

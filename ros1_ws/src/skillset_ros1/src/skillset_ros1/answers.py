@@ -12,8 +12,7 @@ from skillset_interfaces.srv import Describe, DescribeResponse, SetPaused, SetPa
 from skillset_interfaces.srv import Why as WhyService
 
 from skill_model.json_form import to_json
-from skill_runtime.core.engine import SkillsetEngine
-from skill_runtime.core.pauses import PauseReply
+from skill_runtime.core.engine import PauseReply, SkillsetEngine
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.messages import fill_why
 from skill_runtime.workers import Workers

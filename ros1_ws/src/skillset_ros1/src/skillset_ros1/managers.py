@@ -11,10 +11,9 @@ from typing import Protocol
 import rospy
 
 from skill_model.model import Skillset
-from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
-from skill_runtime.core.stops import DEFAULT_TIMEOUT_S
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.workers import Workers
 from skillset_ros1.alarms import Alarms

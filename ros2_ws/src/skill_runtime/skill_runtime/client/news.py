@@ -116,13 +116,11 @@ class ClientNews:
         self.heard += 1
         self.states_after = states.after
         self.resources = {name: value.state for name, value in states.resources.items()}
-        try:
-            for callback in self.on_changes:
-                callback(dict(self.resources))
-        finally:
-            for tracker in self._trackers():
-                tracker.settle()
-            self.connection.heard_states()
+        for callback in self.on_changes:
+            callback(dict(self.resources))
+        for tracker in self._trackers():
+            tracker.settle()
+        self.connection.heard_states()
 
     def _on_told(self, told: Told) -> None:
         event = told.event
@@ -136,13 +134,11 @@ class ClientNews:
             self._last_transition = event.sequence
         if gap:
             self._ask_endings()
-        try:
-            for callback in self.on_events:
-                callback(event)
-        finally:
-            # Whatever a callback raises: a goal that has ended ends for its handle.
-            if isinstance(event, ExecutionEvent):
-                self._follow_event(event, told.life)
+        # A goal that has ended by an event ends after all others know of the event.
+        for callback in self.on_events:
+            callback(event)
+        if isinstance(event, ExecutionEvent):
+            self._follow_event(event, told.life)
 
     def _follow_event(self, event: ExecutionEvent, life: str) -> None:
         if event.state.terminal:

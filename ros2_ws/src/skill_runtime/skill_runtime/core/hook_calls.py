@@ -10,12 +10,13 @@ from typing import Protocol
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.execution import Execution
+from skill_runtime.core.wire import as_text, error_line
 from skill_runtime.hooks import SkillHooks
 
 
 @dataclass(frozen=True)
 class HookAnswer:
-    """What a hook returned, or the last line (``error``) and the whole (``trace``) of what it raised."""
+    """What a hook returned, or type and first line (``error``) and the whole (``trace``) of what it raised."""
 
     value: object = None
     error: str = ""
@@ -60,9 +61,15 @@ def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookAnswer:
     """Call one hook and return what came of it."""
     try:
         return HookAnswer(getattr(hooks, hook)(execution.inputs if hook == "validate" else execution))
-    except Exception as error:  # noqa: BLE001 - whatever a hook raises ends its execution only
-        last_line = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
-        return HookAnswer(error=last_line, trace="".join(traceback.format_exception(error)))
+    except BaseException as error:  # noqa: BLE001 - whatever a hook raises, also SystemExit, ends its execution only
+        return HookAnswer(error=error_line(error), trace=as_text(_trace(error)))
+
+
+def _trace(error: BaseException) -> str:
+    try:
+        return "".join(traceback.format_exception(error))
+    except BaseException:  # noqa: BLE001 - an exception that can't be printed
+        return error_line(error)
 
 
 def _check(skillset: Skillset, hooks: Mapping[str, SkillHooks]) -> None:

@@ -6,8 +6,10 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-from skill_runtime.core.events import EngineEvent, Listener
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, Listener
+from skill_runtime.core.wire import as_text, error_line
 
 
 class Outbox:
@@ -35,9 +37,30 @@ class Outbox:
                 self._delivering = True
                 events = self._steps.popleft()
             try:
-                self._listener(events)
-            except Exception as error:  # noqa: BLE001 - a listener must not stop the managers
-                self._on_error(f"the listener raised {''.join(traceback.format_exception(error))}")
+                self._tell(events)
             finally:
                 with self._lock:
                     self._delivering = False
+
+    def _tell(self, events: tuple[EngineEvent, ...]) -> None:
+        """Tell of a step; what can't be told with its values is told without them, so that no caller misses an end."""
+        try:
+            self._listener(events)
+        except Exception as error:  # noqa: BLE001 - a listener must not stop the managers
+            self._on_error(as_text(f"the listener raised {''.join(traceback.format_exception(error))}"))
+            without = tuple(_without_values(event, error) for event in events)
+        else:
+            return
+        try:
+            self._listener(without)
+        except Exception as error:  # noqa: BLE001 - as above
+            self._on_error(as_text(f"the listener raised again {''.join(traceback.format_exception(error))}"))
+
+
+def _without_values(event: EngineEvent, error: Exception) -> EngineEvent:
+    """Return an event without the values of hooks and callers; its message says why they are missing."""
+    if not isinstance(event, ExecutionEvent):
+        return event
+    reason = f"inputs and outputs could not be told: {error_line(error)}"
+    message = f"{event.message} ({reason})" if event.message else reason
+    return replace(event, message=as_text(message), inputs={}, outputs={})

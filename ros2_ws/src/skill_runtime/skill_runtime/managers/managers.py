@@ -6,11 +6,10 @@ import uuid
 from collections.abc import Callable, Mapping, Sequence
 
 from skill_model.model import Skillset
-from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.hook_calls import HookCaller
-from skill_runtime.core.stops import DEFAULT_TIMEOUT_S
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.managers.data import DataBindings, DataManager
 from skill_runtime.managers.deadline import EngineAlarm

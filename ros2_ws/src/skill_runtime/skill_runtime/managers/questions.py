@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from skill_model.json_form import to_json
-from skill_runtime.core.engine import SkillsetEngine
-from skill_runtime.core.pauses import PauseReply
+from skill_runtime.core.engine import PauseReply, SkillsetEngine
 from skill_runtime.middleware import ActionServer, Middleware, Reply, ResourceValue, Timer, WhyReply
 
 HOOK_ANSWERS_S = 10.0

@@ -1,4 +1,4 @@
-"""What is the case in a skillset now: the situation, since when, and the executions that are not through.
+"""The execution context of a skillset: its situation, its resources, its executions; every change comes out as an event.
 
 Not safe for threads: the engine calls it with its lock held.
 """
@@ -15,6 +15,7 @@ from skill_model.model import Skillset
 from skill_model.situation import Change, Entered, Running, Situation, Step
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from skill_runtime.core.execution import Execution
+from skill_runtime.core.records import Records
 
 
 @dataclass(frozen=True)
@@ -34,24 +35,31 @@ class Entry:
     key: Running
     dispatching: bool = False
     """Whether ``on_dispatch``, ``on_pause`` or ``on_resume`` is being called."""
+    asking: bool = False
+    """Whether ``progress`` is being called."""
     stop_hook: str = ""
     """The one hook that stops the function, once it is decided on; called at once, or after the hook that is being called."""
+    stop_due_ns: int = 0
+    """When an interruption that is under way is too late, mission clock."""
     waiting: list[Callable[[], None]] = field(default_factory=list)
     """Pauses and resumptions that were asked for while a hook was being called; they come after it, and after a stop."""
 
 
-class Ledger:
-    """Records steps; every change comes out as an event, numbered from 1 without gaps, through ``publish``."""
+class ExecutionContext:
+    """Records steps; ``publish`` gets the events of each, numbered from 1 without gaps."""
 
     def __init__(self, skillset: Skillset, clock_ns: Callable[[], int], publish: Callable[[Sequence[EngineEvent]], None]) -> None:
-        self._clock_ns = clock_ns
-        self._publish = publish
         self._skillset = skillset
+        self._clock_ns = clock_ns
+        self._publish_events = publish
         self._situation = semantics.initial(skillset)
-        born_ns = clock_ns()
-        self.resources = {name: ResourceStatus(state, "", born_ns) for name, state in self._situation.states.items()}
+        created_ns = clock_ns()
+        self.resources = {name: ResourceStatus(state, "", created_ns) for name, state in self._situation.states.items()}
+        self.records = Records(skillset)
         self.entries: dict[str, Entry] = {}
         self.sequence = 0
+
+    # --- what is the case ------------------------------------------------------------------------------------------------
 
     @property
     def situation(self) -> Situation:
@@ -59,34 +67,54 @@ class Ledger:
         return replace(self._situation, now_ns=self._clock_ns())
 
     @property
+    def elapsed(self) -> bool:
+        """Tell whether time alone has broken something."""
+        due = due_ns(self._skillset, self._situation)
+        return due is not None and self._clock_ns() >= due
+
+    @property
     def due_ns(self) -> int | None:
-        """Return when time alone next changes something."""
-        return due_ns(self._skillset, self._situation)
+        """Return when time alone next changes something: an invariant, a progress deadline, a stop that is too late."""
+        stops = [entry.stop_due_ns for entry in self.entries.values() if entry.stop_due_ns and not entry.execution.done]
+        breaks = due_ns(self._skillset, self._situation)
+        return min(stops if breaks is None else [*stops, breaks], default=None)
 
-    def progressed(self, entry: Entry) -> None:
-        """Record that a running execution has made progress now."""
-        self._situation = semantics.progressed(self._skillset, self.situation, entry.key)
+    def open(self, execution_id: str) -> Entry | None:
+        """Return the entry of an execution that has not ended."""
+        entry = self.entries.get(execution_id)
+        return None if entry is None or entry.execution.done else entry
 
-    def interrupting(self, entry: Entry) -> None:
-        """Record that an execution is being interrupted: no progress is expected any more."""
-        self._situation = semantics.interrupting(self._situation, entry.key)
-
-    def add(self, execution: Execution) -> Entry:
-        """Record a request."""
-        entry = Entry(execution, Running(execution.id, execution.skill))
-        self.entries[execution.id] = entry
-        self._publish([self._entered(execution)])
-        return entry
-
-    def running(self, execution_id: str) -> Entry | None:
+    def active(self, execution_id: str) -> Entry | None:
         """Return the entry of an execution that has started and not ended."""
         entry = self.entries.get(execution_id)
         return entry if entry is not None and entry.execution.state.active else None
 
+    # --- changes ---------------------------------------------------------------------------------------------------------
+
+    def add(self, execution: Execution) -> Entry:
+        """Record a request."""
+        entry = self.entries[execution.id] = Entry(execution, Running(execution.id, execution.skill))
+        self._publish([self._entered(execution)])
+        return entry
+
+    def end_request(self, entry: Entry, state: ExecutionState, message: str) -> None:
+        """End an execution that never started."""
+        _set_state(entry.execution, Entered(entry.key, state, "", message))
+        self._publish([self._entered(entry.execution)])
+        self.forget_if_through(entry)
+
     def enter_phase(self, entry: Entry, phase: ExecutionState) -> None:
-        """Record that an execution runs on in another phase."""
+        """Record that an execution runs on in another phase; only one that is RUNNING is expected to make progress."""
+        if phase is ExecutionState.RUNNING:
+            self.progressed(entry)
+        else:
+            self._situation = semantics.interrupting(self._situation, entry.key)
         entry.execution.state = phase
         self._publish([self._entered(entry.execution)])
+
+    def progressed(self, entry: Entry) -> None:
+        """Record that a running execution has made progress now."""
+        self._situation = semantics.progressed(self._skillset, self.situation, entry.key)
 
     def commit(self, step: Step, *, by_itself: Entry | None = None) -> list[Entry]:
         """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
@@ -105,32 +133,24 @@ class Ledger:
         self._publish(events)
         for entry in ended:
             self.forget_if_through(entry)
-        return [entry for entry in ended if entry is not by_itself and self._stop_now(entry)]
-
-    def end_request(self, entry: Entry, state: ExecutionState, message: str) -> None:
-        """End an execution that never started."""
-        _set_state(entry.execution, Entered(entry.key, state, "", message))
-        self._publish([self._entered(entry.execution)])
-        self.forget_if_through(entry)
+        return [entry for entry in ended if entry is not by_itself and _stop_now(entry)]
 
     def forget_if_through(self, entry: Entry) -> None:
         """Drop an execution of which nothing is to come any more."""
         if entry.execution.done and not entry.dispatching:
             self.entries.pop(entry.key.id, None)
 
-    @staticmethod
-    def _stop_now(entry: Entry) -> bool:
-        """Decide on the stop hook of an execution that was ended, unless one is; tell whether it may be called at once."""
-        if entry.stop_hook:
-            return False
-        entry.stop_hook = "on_failure" if entry.execution.state is ExecutionState.FAILED else "on_violation"
-        return not entry.dispatching
+    # --- events ----------------------------------------------------------------------------------------------------------
+
+    def _publish(self, events: Sequence[EngineEvent]) -> None:
+        self.records.on_events(events)
+        self._publish_events(events)
 
     def _changed(self, change: Change) -> TransitionEvent:
         self.sequence += 1
         now_ns = self._clock_ns()
         self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns)
-        return TransitionEvent(self.sequence, now_ns, change.resource, change.source, change.target, change.cause)
+        return TransitionEvent(self.sequence, now_ns, change.resource, change.source, change.target, change.cause, self._skillset.name)
 
     def _entered(self, execution: Execution) -> ExecutionEvent:
         self.sequence += 1
@@ -144,6 +164,7 @@ class Ledger:
             message=execution.message,
             inputs=execution.inputs,
             outputs=dict(execution.outputs),
+            skillset=self._skillset.name,
         )
 
 
@@ -152,3 +173,11 @@ def _set_state(execution: Execution, entered: Entered) -> None:
     execution.result = entered.result
     execution.message = entered.message
     execution.state = entered.state
+
+
+def _stop_now(entry: Entry) -> bool:
+    """Decide on the stop hook of an execution that was ended, unless one is; tell whether it may be called at once."""
+    if entry.stop_hook:
+        return False
+    entry.stop_hook = "on_failure" if entry.execution.state is ExecutionState.FAILED else "on_violation"
+    return not entry.dispatching

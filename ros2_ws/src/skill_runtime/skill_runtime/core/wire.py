@@ -1,0 +1,102 @@
+"""Make what hooks hand over fit for every middleware: UTF-8 texts of bounded length without zeros, outputs of their types."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from skill_model.model import Skill
+from skill_model.ros_types import PRIMITIVES
+from skill_runtime import fitting
+from skill_runtime.plain import to_plain
+
+TEXT_LIMIT = 10_000
+"""Characters of a text that are carried; the rest is counted."""
+LINE_LIMIT = 500
+VALUE_LIMIT = 100
+
+
+def as_text(value: object, limit: int = TEXT_LIMIT) -> str:
+    """Return a value as a text that every middleware carries, whatever it is; half characters and zeros become escapes."""
+    try:
+        words = str.encode(value if isinstance(value, str) else str(value), "utf-8", "backslashreplace").decode()
+    except BaseException:  # noqa: BLE001 - whatever a hook's object does when it is printed
+        words = f"a value of type {type(value).__name__}"
+    words = words.replace("\0", "\\x00")
+    return words if len(words) <= limit else f"{words[:limit]}... ({len(words) - limit} characters more)"
+
+
+def as_short_text(value: object) -> str:
+    """Return a value as it is written in Python, in a few words, for an error."""
+    try:
+        return as_text(repr(value), VALUE_LIMIT)
+    except BaseException:  # noqa: BLE001 - as above
+        return f"a value of type {type(value).__name__}"
+
+
+def error_line(error: BaseException) -> str:
+    """Return the type of an exception and what it says, in one line."""
+    said = "; ".join(line.strip() for line in as_text(error, LINE_LIMIT).splitlines() if line.strip())
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+
+
+def fitted_outputs(skill: Skill, outputs: Mapping[str, object]) -> dict[str, object]:
+    """Return outputs as their types hold them; a message's fields are checked by the middleware that knows the message.
+
+    Raises:
+        ValueError: a name or a value does not fit; the message names the skill and the output.
+    """
+    types = {output.name: output.type for output in skill.outputs}
+    unknown = [as_text(name) for name in outputs if name not in types]
+    if unknown:
+        raise ValueError(f"skill {skill.name} has no output {', '.join(unknown)}; it has {', '.join(types) or 'none'}")
+    return {name: _fitted(types[name], value, f"outputs of {skill.name}, {name}") for name, value in outputs.items()}
+
+
+def _fitted(kind: str, value: object, place: str) -> object:
+    try:
+        if kind in PRIMITIVES:
+            return _SCALARS[PRIMITIVES[kind]](kind, value, place)
+        json.dumps(to_plain(value))
+    except ValueError:
+        raise
+    except BaseException as error:
+        raise ValueError(f"{place} takes a {kind}, not {as_short_text(value)}") from error
+    return value
+
+
+_SCALARS: Mapping[str, Callable[[str, Any, str], object]] = {
+    "bool": lambda kind, value, place: fitting.instance(bool, value, kind, place),
+    "int": lambda kind, value, place: fitting.whole_number(value, kind, place, fitting.INTEGERS[kind]),
+    "float": lambda kind, value, place: float(fitting.number(value, kind, place)),
+    "str": lambda kind, value, place: as_text(fitting.instance(str, value, kind, place)),
+}
+
+
+# --- what hooks return --------------------------------------------------------------------------------------------------
+
+
+def wrong_return(hook: str, value: object) -> str:
+    """Return what is wrong with what a hook has returned, or ""."""
+    expected = _EXPECTED.get(hook)
+    if expected is None or expected[1](value):
+        return ""
+    return f"{hook} returned {as_short_text(value)}; it has to return {expected[0]}"
+
+
+def _is_finite(value: Any) -> bool:
+    return fitting.is_number(value) and math.isfinite(value)
+
+
+def _is_answer(value: object) -> bool:
+    return value is None or isinstance(value, str)
+
+
+_EXPECTED: Mapping[str, tuple[str, Callable[[object], bool]]] = {
+    "validate": ('a text, "" to accept the request', lambda value: isinstance(value, str)),
+    "progress": ("a number from 0 to 1", _is_finite),
+    "on_pause": ('why it can\'t, or ""', _is_answer),
+    "on_resume": ('why it can\'t, or ""', _is_answer),
+}
