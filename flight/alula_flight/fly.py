@@ -29,9 +29,12 @@ from alula_common.signals import Interrupts
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
-from alula_flight.spec import SCENARIOS, SENSORS, RequestError, RunSpec, parse_fault
+from alula_flight.spec import SCENARIOS, RequestError, RunSpec, read_faults, read_world
+from uav_simulator.sensors.faults import FAULTS
+from uav_simulator.world.config import world_names
 
 CANNOT_START = 2
+FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 GIVEN_UP = 1
 PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
@@ -47,6 +50,7 @@ class Arguments(argparse.Namespace):
     out: Path | None
     seed: int
     rate: float | None
+    world: str
     autopilot: str | None
     mock: bool
     behaviour: list[Path]
@@ -56,7 +60,10 @@ def parse(arguments: list[str]) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
     parser = argparse.ArgumentParser(prog="alula fly", description="Fly a scenario through the whole stack.", add_help=True)
     parser.add_argument("scenario", help="; ".join(f"{name}: {meaning}" for name, meaning in SCENARIOS.items()))
-    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[@SECONDS]", help="break a sensor, seconds after lift-off")
+    parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="break a sensor, seconds after lift-off")
+    parser.add_argument(
+        "--world", default="yard", metavar="FILE|NAME", help=f"where to fly: a file, or {', '.join(world_names())} (default yard)"
+    )
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/<time>-<scenario>)")
     parser.add_argument("--seed", type=int, default=0, help="seed of world details, wind and noise (default 0)")
     parser.add_argument("--rate", type=float, help="simulated seconds per second at most, 0: no limit (default 1)")
@@ -81,7 +88,8 @@ def parse(arguments: list[str]) -> RunSpec:
         run_id=uuid.uuid4().hex,
         seed=given.seed,
         rate=1.0 if given.rate is None else given.rate,
-        faults=tuple(str(parse_fault(text, None if given.mock else SENSORS)) for text in given.fail),
+        faults=read_faults(given.fail, None if given.mock else FAULTS),
+        world=read_world(given.world),
         autopilot=given.autopilot,
         master_port=0 if given.mock else free_port(),
         mavlink_port=0 if given.mock else free_port(),

@@ -24,9 +24,8 @@ def shipped_behaviour(root: Path) -> Path:
 
 def command(spec: RunSpec, root: Path) -> list[str]:
     """Return the command line of the flight."""
-    route = root / "ros1_ws" / "src" / "uav_simulator" / "config" / "yard.yaml"
     words = [str(root / "setup" / "in_ros2"), "python", "-m", "uav_missions.mock_flight", "--scenario", spec.scenario]
-    words += ["--out", spec.out_dir, "--route", str(route), "--seed", str(spec.seed)]
+    words += ["--out", spec.out_dir, "--route", spec.world, "--seed", str(spec.seed)]
     for file in (str(shipped_behaviour(root)), *spec.behaviour):
         words += ["--behaviour", file]
     for fault in spec.faults:

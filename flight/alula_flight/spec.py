@@ -3,48 +3,46 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Collection
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from alula_common.faults import FaultError, parse_fault
 from alula_common.files import write_json
+from uav_simulator.errors import ConfigError
+from uav_simulator.world.config import find_world, load_world
 
 SCENARIOS = {"mapping": "map the yard; watch ahead with the ZED, or with the LiDAR when the ZED has failed (paper, section 2.2)"}
-SENSORS = ("zed", "lidar", "imu")
-_FAULT = re.compile(r"^(?P<sensor>[a-z0-9_]+)(@(?P<seconds>\d+(\.\d+)?))?$")
 
 
 class RequestError(Exception):
     """The command line asks for something that can't be; the message names it and the remedy in one line."""
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A sensor that breaks ``after_lift_off_s`` seconds of mission clock after lift-off (None: from the beginning)."""
-
-    sensor: str
-    after_lift_off_s: float | None
-
-    def __str__(self) -> str:
-        return self.sensor if self.after_lift_off_s is None else f"{self.sensor}@{self.after_lift_off_s:g}"
+def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:
+    """Check what `--fail` asks for, and return it as everybody writes it. ``known`` None: somebody else knows what there is to break."""
+    try:
+        return tuple(str(parse_fault(text, known)) for text in texts)
+    except FaultError as error:
+        raise RequestError(f"--fail: {error}") from None
 
 
-def parse_fault(text: str, known: Collection[str] | None = SENSORS) -> Fault:
-    """Read ``zed@30`` or ``zed``; raise RequestError for anything else. ``known`` None: somebody else knows what there is to break."""
-    match = _FAULT.match(text)
-    if match is None:
-        raise RequestError(f"--fail {text}: write WHAT@SECONDS, as in zed@30, or WHAT alone for a failure from the start")
-    sensor, seconds = match["sensor"], match["seconds"]
-    if known is not None and sensor not in known:
-        raise RequestError(f"--fail {text}: there is no '{sensor}' to break; choose one of {', '.join(known)}")
-    return Fault(sensor, None if seconds is None else float(seconds))
+def read_world(text: str) -> str:
+    """Check a world, given by name or file, and return its file."""
+    try:
+        path = find_world(text)
+        load_world(path)
+    except ConfigError as error:
+        raise RequestError(f"--world: {error}") from None
+    return str(path)
 
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run. ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at most, 0 unlimited.
+    """One run.
 
+    ``world`` is a world file; ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at
+    most, 0 unlimited.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
     """
 
@@ -54,6 +52,7 @@ class RunSpec:
     seed: int
     rate: float
     faults: tuple[str, ...]
+    world: str
     autopilot: str | None
     master_port: int
     mavlink_port: int
@@ -79,6 +78,7 @@ class RunSpec:
             f"seed:={self.seed}",
             f"rate:={self.rate:g}",
             f"faults:={','.join(self.faults)}",
+            f"world:={self.world}",
             f"mavlink_port:={self.mavlink_port}",
         ]
         if self.autopilot is not None:

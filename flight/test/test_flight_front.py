@@ -10,8 +10,6 @@ import uuid
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from alula_common.network import NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
@@ -19,7 +17,8 @@ from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import command
-from alula_flight.spec import Fault, RequestError, RunSpec, parse_fault
+from alula_flight.spec import RequestError, RunSpec
+from uav_simulator.world.config import find_world
 
 
 @pytest.mark.parametrize(
@@ -27,7 +26,9 @@ from alula_flight.spec import Fault, RequestError, RunSpec, parse_fault
     [
         (["nosuch"], ["nosuch", "mapping"]),
         (["mapping", "--fail", "nosuch"], ["nosuch", "zed", "lidar"]),
-        (["mapping", "--fail", "zed@x"], ["zed@x", "zed@30"]),
+        (["mapping", "--fail", "zed@x"], ["--fail", "zed@x", "zed:dark@30-40"]),
+        (["mapping", "--fail", "zed:thinned"], ["zed can't be 'thinned'", "dark"]),
+        (["mapping", "--world", "nowhere"], ["--world", "'nowhere'", "yard", "forest"]),
         (["mapping", "--fail", "zed@-1"], ["zed@-1"]),
         (["mapping", "--seed", "-3"], ["--seed -3"]),
         (["mapping", "--rate", "nan"], ["--rate nan"]),
@@ -58,27 +59,36 @@ def test_a_run_never_overwrites_another(tmp_path, capsys):
     assert (tmp_path / "summary.json").read_text() == "{}"
 
 
-@given(st.sampled_from(["zed", "lidar", "imu"]), st.none() | st.floats(min_value=0, max_value=1e5).map(lambda s: round(s, 3)))
-def test_fault_reads_back_what_it_prints(sensor, seconds):
-    assert parse_fault(str(Fault(sensor, seconds))).sensor == sensor
-    if seconds is not None and seconds < 1e4:
-        assert parse_fault(str(Fault(sensor, seconds))).after_lift_off_s == pytest.approx(seconds, rel=1e-4)
-
-
-@given(st.text())
-def test_any_fault_text_is_read_or_refused(text):
-    try:
-        parse_fault(text)
-    except RequestError as error:
-        assert "--fail" in str(error)  # noqa: PT017
-
-
 def test_specification_survives_its_file(tmp_path):
-    spec = parse(["mapping", "--fail", "zed@30", "--seed", "7", "--rate", "0", "--out", str(tmp_path / "run")])
+    spec = parse(
+        [
+            "mapping",
+            "--fail",
+            "zed@30",
+            "--fail",
+            "lidar:sector@40-50",
+            "--world",
+            "forest",
+            "--seed",
+            "7",
+            "--rate",
+            "0",
+            "--out",
+            str(tmp_path / "run"),
+        ]
+    )
     spec.save(tmp_path / "run.json")
     assert RunSpec.load(tmp_path / "run.json") == spec
-    assert "faults:=zed@30" in spec.launch_arguments()
+    assert {"faults:=zed@30,lidar:sector@40-50", f"world:={find_world('forest')}"} <= set(spec.launch_arguments())
     assert "simulate:=false" not in spec.launch_arguments()
+
+
+def test_a_world_file_that_is_wrong_is_refused_with_its_line(tmp_path, capsys):
+    world = tmp_path / "mine.yaml"
+    world.write_text(find_world("yard").read_text().replace("keep_clear_m: 2.4", "keep_clear_m: far"))
+    assert main(["mapping", "--world", str(world)]) == CANNOT_START
+    line = 1 + find_world("yard").read_text().splitlines().index("keep_clear_m: 2.4")
+    assert f"{world}:{line}: `keep_clear_m` should be a number" in capsys.readouterr().err
 
 
 def test_real_autopilot_takes_the_place_of_the_simulator(tmp_path):
@@ -103,7 +113,7 @@ def test_mocks_need_no_ports_and_know_their_own_faults(tmp_path):
         (["--behaviour", "x.yaml"], "add --mock"),
         (["--mock", "--autopilot", "tcp:127.0.0.1:5760"], "leave out --autopilot"),
         (["--mock", "--rate", "2"], "no --rate limits"),
-        (["--mock", "--fail", "zed@x"], "write WHAT@SECONDS"),
+        (["--mock", "--fail", "zed@x"], "write WHAT"),
     ],
 )
 def test_what_does_not_go_together_with_mocks(more, complaint, tmp_path):

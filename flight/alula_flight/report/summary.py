@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from typing import TypedDict
 
+from alula_common.faults import parse_fault
 from alula_flight.report.events import History
 from alula_flight.report.facts import Death, RunFacts
 from alula_flight.report.files import Problems, ReportError, mapping, read_json
@@ -158,7 +158,7 @@ def note_doubts(facts: RunFacts, recording: Recording, phases: Phases, problems:
         problems.note(f"no lift-off is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(recording)}
     for fault in facts.faults:
-        if recording.simulator is not None and re.split("[:@]", fault)[0] not in broken:
+        if recording.simulator is not None and parse_fault(fault).what not in broken:
             problems.note(f"the fault {fault} never happened")
 
 

@@ -2,19 +2,17 @@
 
 import math
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from alula_common.faults import parse_faults
 from uav_simulator.autopilot.types import LandedState
-from uav_simulator.sensors.faults import parse_faults
-from uav_simulator.settings import Settings
 from uav_simulator.simulation import Simulation
-from uav_simulator.world.config import load_world_config
+from uav_simulator.world.config import find_world, load_world
 
-CONFIG = load_world_config(Path(Settings().world))
+CONFIG = load_world(find_world("yard"))
 SPEED_M_S = 1.0
 
 
@@ -53,7 +51,7 @@ class Client:
 
 
 def fly_route(seed):
-    simulation = Simulation(CONFIG, seed=seed, faults=parse_faults("zed@30"), boot_before_s=60.0)
+    simulation = Simulation(CONFIG, seed=seed, faults=parse_faults("zed@30-35"), boot_before_s=60.0)
     client = Client(simulation)
     client.take_off()
     for a, b in pairwise(CONFIG.route):
@@ -69,7 +67,8 @@ def test_the_route_is_flown_without_a_contact_and_with_clearance():
     assert 0.8 <= state.min_clearance_m <= 2.0
     assert state.distance_m == pytest.approx(76.0 + 6.0, abs=4.0)
     assert 75.0 <= state.t_s - state.lift_off_s <= 130.0
-    assert state.faults == [{"sensor": "zed", "mode": "dead", "t_s": pytest.approx(state.lift_off_s + 30.0, abs=0.03)}]
+    begin, end = (pytest.approx(state.lift_off_s + seconds, abs=0.03) for seconds in (30.0, 35.0))
+    assert state.faults == [{"sensor": "zed", "mode": "dead", "t_s": begin}, {"sensor": "zed", "mode": "ok", "t_s": end}]
 
 
 def test_flying_into_a_wall_is_a_contact_and_does_not_go_through():

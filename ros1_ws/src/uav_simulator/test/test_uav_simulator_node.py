@@ -117,6 +117,21 @@ def start_simulator(start_node):
     rospy.delete_param("/uav_simulator")
 
 
+def break_stamps_and_infos(set_sensor, seen):
+    def lag_s():
+        return seen.messages["clock"][-1].clock.to_sec() - seen.messages["left"][-1].header.stamp.to_sec()
+
+    assert set_sensor("zed", "late").accepted
+    wait_until(lambda: lag_s() > 0.45, timeout_s=5.0, what="an image that comes late")
+    assert set_sensor("zed", "future").accepted
+    wait_until(lambda: lag_s() < -9.0, timeout_s=5.0, what="a stamp of the future")
+    assert set_sensor("zed", "wrong_info").accepted
+    wait_until(lambda: seen.messages["info"][-1].width == 960, timeout_s=5.0, what="the info of another resolution")
+    assert seen.messages["info"][-1].P[3] == pytest.approx(-480.0 * 0.12)
+    assert set_sensor("zed", "ok").accepted
+    wait_until(lambda: seen.messages["info"][-1].width == 480, timeout_s=5.0, what="the right info again")
+
+
 def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, collect, tmp_path):
     port = start_simulator("_rate:=0", f"_world_path:={tmp_path / 'world.ply'}", "_faults:=imu")
     seen = collect(
@@ -173,6 +188,7 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
     wait_until(lambda: not any(seen.messages["left"][-1].data), timeout_s=5.0, what="a black image")
     assert set_sensor("zed", "ok").accepted
     wait_until(lambda: any(seen.messages["left"][-1].data), timeout_s=5.0, what="an image again")
+    break_stamps_and_infos(set_sensor, seen)
     state = json.loads(seen.wait("state").data)
     assert state["lift_off_s"] > 0.0
     assert state["collisions"] == 0
@@ -180,8 +196,7 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
         ("imu", "dead"),
         ("zed", "dead"),
         ("zed", "frozen"),
-        ("zed", "black"),
-        ("zed", "ok"),
+        *(("zed", mode) for mode in ("black", "ok", "late", "future", "wrong_info", "ok")),
     ]
     steps = clock_steps_ns(seen)
     assert min(steps) == 20_000_000, "50 Hz, and never backwards"
@@ -225,5 +240,5 @@ def test_a_wrong_parameter_ends_the_node_with_one_line():
         check=False,
     )
     assert done.returncode == 2
-    assert "unknown sensor 'sonar'" in done.stderr
+    assert "there is no 'sonar' to break; choose one of zed, lidar, imu" in done.stderr
     assert "Traceback" not in done.stderr

@@ -1,27 +1,27 @@
 """The sensors see the world that is there, from where the vehicle is, the same for the same seed."""
 
-from itertools import pairwise
-from pathlib import Path
+import math
 
 import cv2
 import numpy as np
 import open3d as o3d
 import pytest
 
+from alula_common.faults import parse_faults
 from uav_simulator.errors import ConfigError
-from uav_simulator.sensors.faults import SensorBoard, SensorMode, parse_faults
-from uav_simulator.sensors.imu import Imu
+from uav_simulator.sensors import degradation
+from uav_simulator.sensors.faults import FAULTS, SensorBoard, SensorMode
+from uav_simulator.sensors.imu import Imu, ImuReading
 from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.mounts import LIDAR, ZED_LEFT, rotation_matrix
 from uav_simulator.sensors.pose_track import Pose, PoseTrack
 from uav_simulator.sensors.stereo import StereoPair
-from uav_simulator.settings import Settings
 from uav_simulator.vehicle.quaternion import from_yaw, multiply
-from uav_simulator.world.config import load_world_config
+from uav_simulator.world.config import find_world, load_world
+from uav_simulator.world.parts import build_parts
 from uav_simulator.world.scene import World
-from uav_simulator.world.yard import build_parts
 
-CONFIG = load_world_config(Path(Settings().world))
+CONFIG = load_world(find_world("yard"))
 TILTED = multiply(from_yaw(0.3), (0.998, 0.04, -0.05, 0.0))
 
 
@@ -167,24 +167,82 @@ def test_imu_noise_has_its_size():
 # --- faults --------------------------------------------------------------------------------------------------------------
 
 
-def test_faults_are_read_with_their_moments_and_modes():
-    faults = parse_faults("zed@30, lidar:black@40.5,imu:frozen")
-    assert [(f.sensor, f.mode, f.after_lift_off_s) for f in faults] == [
-        ("zed", SensorMode.DEAD, 30.0),
-        ("lidar", SensorMode.BLACK, 40.5),
-        ("imu", SensorMode.FROZEN, None),
-    ]
-    assert parse_faults("") == []
+GREY = np.random.default_rng(0).integers(40, 200, (2, 270, 480), dtype=np.uint8)
+SOFT = tuple(cv2.GaussianBlur(eye, (0, 0), 1.5) for eye in GREY)
 
 
-@pytest.mark.parametrize(("text", "said"), [("sonar@3", "'sonar'"), ("zed:sad", "'sad'"), ("zed@soon", "'soon'")])
-def test_a_wrong_fault_is_refused(text, said):
+def broken(mode):
+    return degradation.pair(mode, SOFT, np.random.default_rng(1))
+
+
+def test_every_way_of_failing_is_a_mode_and_changes_what_it_is_for():
+    assert {mode for ways in FAULTS.values() for mode in ways} == {mode.value for mode in SensorMode} - {"ok"}
+    images = {mode: broken(SensorMode(mode)) for mode in FAULTS["zed"]}
+    same = {mode for mode, pair in images.items() if all(np.array_equal(a, b) for a, b in zip(pair, SOFT, strict=True))}
+    assert same == {"dead", "frozen", "late", "future", "wrong_info"}, "these are the driver's"
+
+
+def test_light_and_sharpness_fail_as_they_are_named():
+    assert broken(SensorMode.BLACK)[0].max() == 0
+    dark, white, blurred = (broken(mode)[0] for mode in (SensorMode.DARK, SensorMode.WHITE, SensorMode.BLURRED))
+    assert 0.0 < dark.std() < 5.0
+    assert dark.mean() < 8.0
+    assert (white == 255).mean() > 0.9
+    sharpness = [cv2.Laplacian(eye, cv2.CV_64F).var() for eye in (SOFT[0], blurred)]
+    assert sharpness[1] < 0.05 * sharpness[0]
+
+
+def test_the_right_eye_moves_as_it_is_named():
+    left, right = broken(SensorMode.SHIFTED)
+    assert np.array_equal(left, SOFT[0])
+    assert np.array_equal(right[3:], SOFT[1][:-3])
+    assert np.array_equal(broken(SensorMode.SWAPPED)[0], SOFT[1])
+    turned = broken(SensorMode.ROTATED)[1]
+    across = math.tan(math.radians(1.0)) * 200.0  # so many pixels up, 200 pixels right of the centre
+    column, row = 240 + 200, 135 - round(across)
+    patch = SOFT[1][125:146, 430:451].astype(float) - SOFT[1][125:146, 430:451].mean()
+    found = turned[row - 10 : row + 11, column - 10 : column + 11].astype(float)
+    assert np.corrcoef(patch.ravel(), (found - found.mean()).ravel())[0, 1] > 0.7
+    flickering = [degradation.pair(SensorMode.FLICKERING, SOFT, np.random.default_rng(n))[0] for n in range(2)]
+    assert np.count_nonzero(flickering[0] != flickering[1]) == 1
+
+
+def test_the_lidar_fails_as_it_is_named(world):
+    track = PoseTrack()
+    for n in range(8):
+        track.add(pose(10.0, 0.0, 3.0, from_yaw(0.0), 0.02 * n))
+    good = Lidar(world, 0).scan(track, 0.02)
+    sweep = {mode: degradation.sweep(SensorMode(mode), good, np.random.default_rng(1)) for mode in FAULTS["lidar"]}
+    assert len(sweep["black"]) == 0
+    assert 1 / 550 < len(sweep["thinned"]) / len(good) < 1 / 450
+    body = np.array([sweep["sector"][axis] for axis in "xyz"]).T @ LIDAR.matrix.T
+    assert 0.3 < len(body) / len(good) < 0.7
+    assert body[:, 0].max() < 0.0
+    length = [np.linalg.norm([points[axis] for axis in "xyz"], axis=0) for points in (good, sweep["biased"])]
+    assert np.allclose(length[1] - length[0], 0.5, atol=1e-3)
+    assert np.array_equal(sweep["flickering"]["x"], good["x"])
+    assert sweep["flickering"]["intensity"][0] != good["intensity"][0]
+    assert sweep["frozen"] is good
+
+
+def test_the_imu_fails_as_it_is_named():
+    good = ImuReading((0.1, 0.2, 0.3), (0.0, 0.0, 9.8))
+    biased = degradation.inertial(SensorMode.BIASED, good, np.random.default_rng(1))
+    assert math.dist(biased.rates, good.rates) == pytest.approx(0.088, abs=0.001)
+    assert math.dist(biased.specific_force, good.specific_force) == pytest.approx(0.877, abs=0.001)
+    assert degradation.inertial(SensorMode.BLACK, good, np.random.default_rng(1)) == ImuReading((0.0,) * 3, (0.0,) * 3)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "mode", "said"), [("sonar", "ok", "'sonar'; known are zed"), ("imu", "white", "imu has no mode 'white'; it has ok")]
+)
+def test_a_wrong_mode_is_refused(sensor, mode, said):
     with pytest.raises(ConfigError, match=said):
-        parse_faults(text)
+        SensorBoard([]).set(sensor, mode, 0.0)
 
 
 def test_scheduled_faults_happen_at_their_moment_after_lift_off():
-    board = SensorBoard(parse_faults("zed@3,imu"))
+    board = SensorBoard(parse_faults("zed@3,imu", FAULTS))
     assert board.apply_due(0.0, None)
     assert board.modes == {"zed": "ok", "lidar": "ok", "imu": "dead"}
     assert not board.apply_due(100.0, None), "not lifted off yet"
@@ -193,5 +251,9 @@ def test_scheduled_faults_happen_at_their_moment_after_lift_off():
     assert not board.apply_due(13.1, 10.0)
     board.set("zed", "ok", 20.0)
     assert [(r.sensor, r.mode.value, r.t_s) for r in board.records] == [("imu", "dead", 0.0), ("zed", "dead", 13.0), ("zed", "ok", 20.0)]
-    for before, after in pairwise(board.records):
-        assert before.t_s <= after.t_s
+
+
+def test_a_fault_with_an_end_is_mended():
+    board = SensorBoard(parse_faults("zed:dark@3-5", FAULTS))
+    modes = [(t, board.apply_due(10.0 + t, 10.0), board.mode("zed")) for t in (0.0, 3.0, 4.9, 5.0)]
+    assert modes == [(0.0, False, SensorMode.OK), (3.0, True, SensorMode.DARK), (4.9, False, SensorMode.DARK), (5.0, True, SensorMode.OK)]

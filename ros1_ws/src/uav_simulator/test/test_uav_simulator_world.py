@@ -1,8 +1,8 @@
-"""The yard: a route with room around it for every seed, and true surfaces in a file."""
+"""Worlds: a route with room around it for every seed, and true surfaces in a file."""
 
 import math
+import re
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import open3d as o3d
@@ -12,37 +12,36 @@ import yaml
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor
 from uav_simulator.errors import ConfigError
-from uav_simulator.settings import Settings
 from uav_simulator.vehicle.airframe import Airframe
 from uav_simulator.vehicle.rigid_body import RigidBody
 from uav_simulator.world import shapes
-from uav_simulator.world.config import load_world_config, world_config_from_dict
+from uav_simulator.world.config import find_world, load_world, world_names
+from uav_simulator.world.parts import build_parts, distances_to_mesh
 from uav_simulator.world.ply import write_mesh
+from uav_simulator.world.radio import RadioQuality, radio_zone_at
 from uav_simulator.world.scene import World
-from uav_simulator.world.yard import build_parts, distances_to_mesh
 
-YARD = Path(Settings().world)
-CONFIG = load_world_config(YARD)
-SEEDS = range(12)
+YARD = find_world("yard")
+CONFIG = load_world(YARD)
+WORLDS = [load_world(find_world(name)) for name in world_names()]
+SEEDS = [(CONFIG, seed) for seed in range(12)] + [(world, seed) for world in WORLDS for seed in range(2) if world != CONFIG]
+SEED_NAMES = [f"{world.name}-{seed}" for world, seed in SEEDS]
 
 
-def along_route(step_m=0.2):
-    pieces = [np.linspace(a, b, math.ceil(math.dist(a, b) / step_m)) for a, b in pairwise(CONFIG.route)]
+def along_route(config, step_m=0.2):
+    pieces = [np.linspace(a, b, math.ceil(math.dist(a, b) / step_m)) for a, b in pairwise(config.route)]
     return np.concatenate(pieces)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_route_has_room_on_all_sides(seed):
-    mesh = shapes.merged([p.mesh for p in build_parts(CONFIG, seed)])
-    distance, _ = distances_to_mesh(mesh, along_route())
-    assert distance.min() >= 2.3
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_nothing_stands_ahead_of_the_end_of_a_leg(seed):
-    """Whoever watches ahead must not stop before a corner: 4.5 m beyond each leg a corridor of 2.6 x 2 m is free."""
-    world = World(build_parts(CONFIG, seed))
-    for a, b in pairwise(CONFIG.route):
+@pytest.mark.parametrize(("config", "seed"), SEEDS, ids=SEED_NAMES)
+def test_the_route_has_room_on_all_sides_and_ahead_of_each_leg(config, seed):
+    """Whoever watches ahead must not stop before a corner: 4.5 m beyond each level leg a corridor of 2.6 x 2 m is free."""
+    world = World(build_parts(config, seed))
+    distance, _ = distances_to_mesh(shapes.Mesh(world.vertices, world.triangles), along_route(config))
+    assert distance.min() >= config.keep_clear_m - 0.1
+    for a, b in pairwise(config.route):
+        if math.dist(a[:2], b[:2]) < 1.0:
+            continue
         direction = (np.array(b) - np.array(a)) / math.dist(a, b)
         side = np.array([-direction[1], direction[0], 0.0])
         starts = [np.array(b) + y * side + [0, 0, z] for y in np.linspace(-1.3, 1.3, 14) for z in (-1.0, -0.5, 0.0, 0.5, 1.0)]
@@ -50,12 +49,15 @@ def test_nothing_stands_ahead_of_the_end_of_a_leg(seed):
         assert world.cast(rays).range_m.min() > 4.5
 
 
-def test_the_route_is_as_long_as_the_mission_needs_and_within_the_fence():
-    legs = [math.dist(a, b) for a, b in pairwise(CONFIG.route)]
-    assert 75.0 <= sum(legs) <= 85.0
-    assert CONFIG.route[0] == (0.0, 0.0, 3.0)
-    assert max(math.dist(p[:2], CONFIG.home[:2]) for p in CONFIG.route) < 60.0
-    for (a, b), (_, c) in pairwise(pairwise(CONFIG.route)):
+@pytest.mark.parametrize("config", WORLDS, ids=lambda config: config.name)
+def test_the_route_is_within_the_fence_and_turns_by_right_angles(config):
+    legs = [math.dist(a, b) for a, b in pairwise(config.route)]
+    assert 50.0 <= sum(legs) <= 170.0
+    assert config.route[0] == (0.0, 0.0, 3.0)
+    assert config.home == (0.0, 0.0, 0.0)
+    assert max(math.dist(p[:2], config.home[:2]) for p in config.route) < 60.0
+    assert max(p[2] for p in config.route) < 20.0
+    for (a, b), (_, c) in pairwise(pairwise(config.route)):
         assert abs(np.dot(np.subtract(b, a), np.subtract(c, b))) < 1e-9, "corners of 90 degrees"
 
 
@@ -77,11 +79,17 @@ def test_the_seed_changes_details_and_nothing_else():
     assert np.allclose(build_parts(CONFIG, 4)[1].mesh.vertices, build_parts(CONFIG, 5)[1].mesh.vertices)
 
 
-def test_an_obstacle_on_the_route_is_pushed_off_it():
+def written(folder, data):
+    path = folder / "world.yaml"
+    path.write_text(yaml.safe_dump(data))
+    return path
+
+
+def test_an_obstacle_on_the_route_is_pushed_off_it(tmp_path):
     data = yaml.safe_load(YARD.read_text())
     data["obstacles"] = [{"kind": "pillar", "at": [10.0, 0.3]}]
-    parts = build_parts(world_config_from_dict(data, "test"), 0)
-    distance, _ = distances_to_mesh(parts[-1].mesh, along_route())
+    parts = build_parts(load_world(written(tmp_path, data)), 0)
+    distance, _ = distances_to_mesh(parts[-1].mesh, along_route(CONFIG))
     assert distance.min() >= 2.3
 
 
@@ -103,26 +111,81 @@ def test_the_written_surfaces_are_read_by_others(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
+SMALL = """\
+name: small
+home: [0, 0, 0]
+route: [[0, 0, 3], [9, 0, 3]]
+keep_clear_m: 2
+ground: {x: [-5, 20], y: [-9, 9]}
+"""
+
+
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("more", "said"),
     [
-        ({"colour": 1}, "unknown key 'colour'"),
-        ({"route": [[0, 0, 3]]}, "at least two points"),
-        ({"route": [[0, 0], [1, 1, 1]]}, "route[0]"),
-        ({"obstacles": [{"kind": "dragon", "at": [1, 2]}]}, "unknown kind 'dragon'"),
-        ({"boxes": [{"name": "b", "low": [1, 0, 0], "high": [0, 1, 1]}]}, "`low` must be below `high`"),
-        ({"boxes": [{"name": "b", "low": [1, 0, 0]}]}, "key 'high' is missing"),
+        ("colour: 1", ":6: a world has no `colour`; it may have name"),
+        ("boxs: []", "did you mean `boxes`?"),
+        ("route: []", ":6: a world: `route` is there twice"),
+        ("obstacles: [{kind: dragon, at: [1, 2]}]", ":6: the kind of an obstacle is `dragon`; it may be pillar"),
+        ("obstacles: {kind: tree}", ":6: `obstacles` should be a list"),
+        ("boxes:\n  - {name: b, low: [1, 0, 0], high: [0, 1, 1]}", ":7: box 'b': `low` must be below `high`"),
+        ("boxes:\n  - {name: b, low: [1, 0, 0]}", ":7: box 'b' needs `high`"),
+        ("boxes: [{name: b, low: [1, .nan, 0], high: [2, 2, 2]}]", "a coordinate of `low` should be a number"),
+        ("boxes: [{name: b, low: [1, 0], high: [2, 2, 2]}]", "`low` should have 3 numbers, not 2"),
+        ("scatter: [{kind: tree, count: 2.5, x: [0, 1], y: [0, 1]}]", "`count` should be a whole number"),
+        ("scatter: [{kind: tree, count: 2, x: [1, 0], y: [0, 1]}]", "`x`: 1 should be below 0"),
+        (
+            "radio_zones: [{name: z, quality: bad, sphere: {at: [0, 0, 0], radius_m: 1}}]",
+            "`quality` is `bad`; it may be good, degraded, critical",
+        ),
+        ("radio_zones: [{name: z, quality: good}]", "a radio zone needs one of box, cylinder, sphere; this one has none"),
+        ("radio_zones: [{name: z, quality: good, sphere: {at: [0, 0, 0], radius_m: -1}}]", "`radius_m` should be a number from 0.01"),
+        ("radio_zones:\n- {name: z, quality: good, cylinder: {at: [0, 0], radius_m: 1}}", ":7: `cylinder` needs `z`"),
+        ("boxes: [", "is no YAML"),
     ],
 )
-def test_a_wrong_description_is_refused_with_the_place(change, said):
-    with pytest.raises(ConfigError, match="test") as caught:
-        world_config_from_dict(yaml.safe_load(YARD.read_text()) | change, "test")
+def test_a_wrong_file_is_refused_with_its_line(more, said, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(SMALL + more + "\n")
+    with pytest.raises(ConfigError, match=re.escape(str(path))) as caught:
+        load_world(path)
     assert said in str(caught.value)
 
 
-def test_a_description_that_is_not_there_is_refused():
-    with pytest.raises(ConfigError, match=r"nowhere\.yaml: can't be read"):
-        load_world_config(Path("nowhere.yaml"))
+def test_a_world_of_nothing_but_ground_can_be_flown_in(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(SMALL)
+    world = World(build_parts(load_world(path), 0))
+    assert world.nearest_obstacle((0.0, 0.0, 3.0)).distance_m == math.inf
+    assert world.nearest((0.0, 0.0, 3.0)).distance_m == pytest.approx(3.0)
+    path.write_text("")
+    with pytest.raises(ConfigError, match="is empty; a world needs name"):
+        load_world(path)
+
+
+def test_worlds_are_found_by_name_and_by_file(tmp_path):
+    assert find_world("forest").name == "forest.yaml"
+    path = tmp_path / "mine.yaml"
+    path.write_text(SMALL)
+    assert find_world(str(path)) == path
+    with pytest.raises(ConfigError, match=r"no world 'forrest': give a file, or one of building, .*did you mean `forest`"):
+        find_world("forrest")
+
+
+def test_radio_zones_are_volumes_and_the_first_that_contains_a_point_counts(tmp_path):
+    path = tmp_path / "mine.yaml"
+    zones = [
+        "{name: core, quality: critical, sphere: {at: [10, 0, 3], radius_m: 2}}",
+        "{name: rim, quality: degraded, cylinder: {at: [10, 0], radius_m: 5, z: [1, 6]}}",
+        "{name: hall, quality: good, box: {low: [8, 3, 0], high: [20, 9, 9]}}",
+    ]
+    path.write_text(SMALL + "radio_zones:\n" + "".join(f"  - {zone}\n" for zone in zones))
+    zones = load_world(path).radio_zones
+    points = {"core": (10, 1.9, 3), "rim": (10, 4.0, 3), "hall": (12, 6.0, 8), None: (10, 0, 7)}
+    for name, point in points.items():
+        zone = radio_zone_at(zones, point)
+        assert (zone.name if zone else None) == name
+    assert radio_zone_at(zones, (10, 1.9, 3)).quality is RadioQuality.CRITICAL
 
 
 def body_at(x, y, z):

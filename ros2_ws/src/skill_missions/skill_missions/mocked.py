@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from alula_common.faults import FaultRequest
 from skill_missions.director import Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
@@ -20,14 +20,6 @@ TICK_PERIOD_S = 0.1
 LATENCY_S = 0.005
 LIMIT_S = 3600.0
 """Mission clock after which a mission that goes round in circles is aborted, and after which twice it is left."""
-
-
-@dataclass(frozen=True)
-class FaultRequest:
-    """A fault of the behaviour, seconds after its anchor; None: at the beginning."""
-
-    name: str
-    after_s: float | None
 
 
 class _Waking:
@@ -88,7 +80,7 @@ class MockedMission:
         self.events: list[tuple[str, EngineEvent]] = []
         self.wall_s = 0.0
         for fault in faults:
-            self.play.fail(fault.name, fault.after_s)
+            self.play.fail(fault)
         self._tick_period_s = tick_period_s
         self._record = None if out is None else MissionRecord(out, plan)
         self._due = False

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from skill_runtime_models import flying_skill, flying_skillset
 
+from alula_common.faults import FaultRequest
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Data, Parameter, Result, ResultKind
 from skill_runtime.core.errors import SkillRuntimeError
@@ -219,16 +220,35 @@ def test_faults_wait_for_their_anchor_and_are_noticed_late(read):
     text = "faults: {pilot: {since: flying.axes USED, delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, early: {set: {flying.sdk: UNAVAILABLE}}}"
     behaviour = read(text + "\nskills: {flying.takeoff: {never: true}}")
     mocked = Mocked(behaviour)
-    mocked.play.fail("pilot", 3.0)
+    mocked.play.fail(FaultRequest("pilot", begin_s=3.0))
     mocked.world.run_for(10.0)
     assert mocked.client.resources["sdk"] == "AVAILABLE"
     assert mocked.call() == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 3.5)
     assert mocked.play.faults == {"pilot": 13.0}
     mocked = Mocked(behaviour)
-    mocked.play.fail("early", 2.0)
+    mocked.play.fail(FaultRequest("early", begin_s=2.0))
     assert mocked.call() == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 2.0)
     with pytest.raises(SkillRuntimeError, match="no fault 'zed' in the behaviour; it has pilot, early"):
-        mocked.play.fail("zed", 1.0)
+        mocked.play.fail(FaultRequest("zed", begin_s=1.0))
+
+
+def test_a_fault_with_an_end_gives_back_what_it_took(read):
+    text = "faults: {pilot: {delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, 'pilot:twice': {set: {flying.axes: USED}}}"
+    mocked = Mocked(read(text))
+    mocked.play.fail(FaultRequest("pilot", "rudely", 2.0, 5.0))
+    mocked.world.run_for(2.6)
+    assert mocked.client.resources["sdk"] == "UNAVAILABLE"
+    mocked.play.take({("flying", "sdk"): "AVAILABLE"})
+    assert mocked.client.resources["sdk"] == "UNAVAILABLE", "a fault holds what it has taken"
+    mocked.world.run_for(2.7)
+    assert mocked.client.resources["sdk"] == "UNAVAILABLE", "its end is noticed late, too"
+    mocked.world.run_for(0.3)
+    assert mocked.client.resources["sdk"] == "AVAILABLE"
+    assert mocked.play.faults == {"pilot": 2.0}
+    assert mocked.play.stage.notes == []
+    behaviour = read(text)
+    assert behaviour.fault(FaultRequest("pilot", "twice"))[0] == "pilot:twice"
+    assert behaviour.fault(FaultRequest("pilot", "once"))[0] == "pilot"
 
 
 def test_data_follow_their_steps_and_their_formulas(read):

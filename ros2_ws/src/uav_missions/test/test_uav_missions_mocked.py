@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from alula_common.faults import FaultRequest
 from skill_missions.director import Outcome
-from skill_missions.mocked import FaultRequest, MockedMission
+from skill_missions.mocked import MockedMission
 from skill_runtime.core import ExecutionEvent
 from skill_runtime.mock import load_behaviour
 from uav_missions import mock_flight
@@ -22,7 +23,7 @@ from uav_missions.plan import mapping_plan
 from uav_missions.route import Route, load_route
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
-ROUTE = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/config/yard.yaml").waypoints
+ROUTE = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml").waypoints
 SKILLSETS = [importlib.import_module(f"{name}_managers.model").SKILLSET for name in ("navigation", "perception", "mapping")]
 BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], SKILLSETS)
 
@@ -78,7 +79,7 @@ def comparable(story: list[tuple[str, str, str]]) -> list[object]:
 
 
 def test_losing_the_zed_is_flown_as_in_the_simulator():
-    mission = make(FaultRequest("zed", 30.0))
+    mission = make(FaultRequest("zed", begin_s=30.0))
     assert mission.run().outcome is Outcome.DEGRADED
     assert comparable(executions(mission)) == comparable(SIMULATED)
     lift_off_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "IN_AIR")
@@ -100,7 +101,7 @@ def test_a_nominal_flight_is_accomplished_in_the_time_that_it_takes_in_the_simul
 
 
 def test_both_sensors_dead_is_given_up_and_landed():
-    mission = make(FaultRequest("zed", 8.0), FaultRequest("lidar", 8.0))
+    mission = make(FaultRequest("zed", begin_s=8.0), FaultRequest("lidar", begin_s=8.0))
     end = mission.run()
     assert end.outcome is Outcome.GIVEN_UP
     assert "zed_ok" in end.reason
@@ -109,7 +110,7 @@ def test_both_sensors_dead_is_given_up_and_landed():
 
 
 def test_a_lidar_that_is_broken_from_the_start_keeps_the_mission_on_the_ground():
-    mission = make(FaultRequest("lidar", None))
+    mission = make(FaultRequest("lidar"))
     end = mission.run()
     assert end.outcome is Outcome.NOT_STARTED
     assert "LiDAR is broken" in end.reason
@@ -125,7 +126,7 @@ def test_an_abort_lands_first():
 
 
 def test_the_same_seed_flies_the_same_flight():
-    first, second = make(FaultRequest("zed", 40.0), seed=5), make(FaultRequest("zed", 40.0), seed=5)
+    first, second = make(FaultRequest("zed", begin_s=40.0), seed=5), make(FaultRequest("zed", begin_s=40.0), seed=5)
     first.run()
     second.run()
     assert [event for _, event in first.events] == [event for _, event in second.events]
@@ -140,7 +141,7 @@ def test_a_campaign_always_comes_to_an_end_and_down():
     outcomes: Counter[Outcome] = Counter()
     for seed in range(100):
         chance = random.Random(seed)  # noqa: S311 - no secret
-        faults = [FaultRequest(name, chance.uniform(0.0, 110.0)) for name in chance.sample(["zed", "lidar"], chance.randint(0, 2))]
+        faults = [FaultRequest(name, begin_s=chance.uniform(0.0, 110.0)) for name in chance.sample(["zed", "lidar"], chance.randint(0, 2))]
         mission = MockedMission(SKILLSETS, troubles, mapping_plan(Route(ROUTE)), faults=faults, seed=seed, tick_period_s=1.0)
         outcomes[mission.run().outcome] += 1
         assert landed(mission), seed
@@ -153,7 +154,7 @@ def test_a_campaign_always_comes_to_an_end_and_down():
 
 
 def arguments(out: Path, *more: str) -> list[str]:
-    route, behaviour = ALULA_ROOT / "ros1_ws/src/uav_simulator/config/yard.yaml", ALULA_ROOT / "skillsets/uav/mock.yaml"
+    route, behaviour = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml", ALULA_ROOT / "skillsets/uav/mock.yaml"
     return ["--out", str(out), "--route", str(route), "--behaviour", str(behaviour), *more]
 
 
@@ -174,7 +175,7 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
 
 def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):
     assert mock_flight.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
-    assert capsys.readouterr().err == "--fail imu: the behaviour has no such fault; it has zed, lidar, pilot\n"
+    assert capsys.readouterr().err == "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot\n"
     assert not (tmp_path / "run").exists()
 
 

@@ -13,9 +13,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula_common.faults import FaultError, FaultRequest, parse_fault
 from skill_missions.director import EXIT_CODES, End, Outcome
 from skill_missions.files import write_json
-from skill_missions.mocked import FaultRequest, MockedMission
+from skill_missions.mocked import MockedMission
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock import Behaviour, load_behaviour
@@ -32,15 +33,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="the run's folder, new or empty")
     parser.add_argument("--route", type=Path, required=True, help="YAML or JSON file with the key 'route': a list of [x, y, z]")
     parser.add_argument("--behaviour", type=Path, action="append", default=[], help="behaviour file; later ones come first")
-    parser.add_argument("--fail", type=fault, action="append", default=[], metavar="WHAT[@SECONDS]", help="a fault of the behaviour")
+    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[:HOW][@SECONDS[-SECONDS]]", help="a fault of the behaviour")
     parser.add_argument("--seed", type=int, default=0, help="seed of the behaviour's chance")
     return parser.parse_args(arguments)
-
-
-def fault(text: str) -> FaultRequest:
-    """Read ``zed@30`` or ``zed``."""
-    name, at, seconds = text.partition("@")
-    return FaultRequest(name, float(seconds) if at else None)
 
 
 def drone() -> list[Skillset]:
@@ -48,19 +43,18 @@ def drone() -> list[Skillset]:
     return [importlib.import_module(f"{name}_managers.model").SKILLSET for name in SKILLSETS]
 
 
-def prepare(options: argparse.Namespace) -> tuple[list[Skillset], Behaviour, Route]:
+def prepare(options: argparse.Namespace) -> tuple[list[Skillset], Behaviour, list[FaultRequest], Route]:
     """Read what the flight needs.
 
     Raises:
-        SkillRuntimeError, RouteError: one of the files, or a fault that the behaviour has not.
+        FaultError, SkillRuntimeError, RouteError: a fault or one of the files, or a fault that the behaviour has not.
     """
     skillsets = drone()
     behaviour = load_behaviour(options.behaviour, skillsets)
-    for request in options.fail:
-        if request.name not in behaviour.faults:
-            known = ", ".join(behaviour.faults) or "none"
-            raise SkillRuntimeError(f"--fail {request.name}: the behaviour has no such fault; it has {known}")
-    return skillsets, behaviour, load_route(options.route)
+    faults = [parse_fault(text) for text in options.fail]
+    for request in faults:
+        behaviour.fault(request)
+    return skillsets, behaviour, faults, load_route(options.route)
 
 
 def write_account(path: Path, mission: MockedMission, lift_off_s: float | None) -> None:
@@ -81,13 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Fly; return the exit code."""
     options = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        skillsets, behaviour, route = prepare(options)
+        skillsets, behaviour, faults, route = prepare(options)
         options.out.mkdir(parents=True, exist_ok=True)
         write_route(options.out, route)
-    except (SkillRuntimeError, RouteError, OSError) as error:
+    except (FaultError, SkillRuntimeError, RouteError, OSError) as error:
         sys.stderr.write(f"{error}\n")
         return CANNOT_START
-    mission = MockedMission(skillsets, behaviour, mapping_plan(route), faults=options.fail, seed=options.seed, out=options.out)
+    mission = MockedMission(skillsets, behaviour, mapping_plan(route), faults=faults, seed=options.seed, out=options.out)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
     end: End = mission.run()

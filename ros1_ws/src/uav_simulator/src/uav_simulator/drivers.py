@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -11,13 +13,21 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, Imu, PointCloud2
 
 from uav_simulator import ros_messages
+from uav_simulator.sensors import degradation
 from uav_simulator.sensors.faults import SensorMode
 from uav_simulator.sensors.imu import ImuReading
-from uav_simulator.sensors.lidar import POINT_DTYPE
 from uav_simulator.simulation import TICK_NS, Simulation
 
-ZERO = (0.0, 0.0, 0.0)
-Pixels = NDArray[np.uint8]
+HELD = (SensorMode.FROZEN, SensorMode.FLICKERING)  # no new measurement
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a driver sends: the moment that it measured, and the call that publishes the messages."""
+
+    taken_ns: int
+    publish: Callable[[], None]
 
 
 class Driver(Protocol):
@@ -27,8 +37,8 @@ class Driver(Protocol):
     every_ticks: int
     at_tick: int  # within its period: sensors take turns, so that the work spreads
 
-    def publish(self, mode: SensorMode) -> int | None:
-        """Publish one measurement of this moment and return its stamp (ns); None when nobody listens."""
+    def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
+        """Measure this moment as the mode has it, with a stamp that is wrong by so much; None when nobody listens."""
 
 
 class _Publisher:
@@ -49,53 +59,55 @@ class ZedDriver:
 
     sensor, every_ticks, at_tick = "zed", 5, 0
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
-        self._images = [_Publisher(f"/zed/{eye}/image_raw", Image) for eye in ("left", "right")]
-        self._infos = [_Publisher(f"/zed/{eye}/camera_info", CameraInfo) for eye in ("left", "right")]
-        camera = simulation.stereo.camera
-        black: Pixels = np.zeros((camera.height, camera.width), dtype=np.uint8)
-        self._black: tuple[Pixels, Pixels] = (black, black)
-        self._last = self._black
+    def __init__(self, simulation: Simulation, rng: Rng) -> None:
+        self._simulation, self._rng = simulation, rng
+        self._publishers = [
+            *(_Publisher(f"/zed/{eye}/camera_info", CameraInfo) for eye in ("left", "right")),
+            *(_Publisher(f"/zed/{eye}/image_raw", Image) for eye in ("left", "right")),
+        ]
+        self._last: degradation.Pair | None = None
 
-    def publish(self, mode: SensorMode) -> int | None:
-        """Publish images of the same stamp."""
+    def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
+        """Take both images at once."""
         simulation = self._simulation
-        stamp_ns = simulation.now_ns
-        for info, right in zip(self._infos, (False, True), strict=True):
-            info.publish(ros_messages.camera_info(simulation.stereo.camera, right=right, stamp_ns=stamp_ns))
-        if not any(p.wanted for p in self._images):
+        if not any(publisher.wanted for publisher in self._publishers):
             return None
-        if mode is SensorMode.OK:
+        stamp_ns = simulation.now_ns + stamp_shift_ns
+        if self._last is None or mode not in HELD:
             self._last = simulation.stereo.render(simulation.pose)
-        images = self._black if mode is SensorMode.BLACK else self._last
-        for publisher, pixels in zip(self._images, images, strict=True):
-            publisher.publish(ros_messages.image(pixels, stamp_ns))
-        return stamp_ns
+        camera = simulation.stereo.camera
+        if mode is SensorMode.WRONG_INFO:
+            camera = camera.scaled(2)
+        messages = [
+            *(ros_messages.camera_info(camera, right=right, stamp_ns=stamp_ns) for right in (False, True)),
+            *(ros_messages.image(pixels, stamp_ns) for pixels in degradation.pair(mode, self._last, self._rng)),
+        ]
+        return Measurement(simulation.now_ns, lambda: self._send(messages))
+
+    def _send(self, messages: list[object]) -> None:
+        for publisher, message in zip(self._publishers, messages, strict=True):
+            publisher.publish(message)
 
 
 class LidarDriver:
-    """The sweep that ends at this moment, 10 Hz."""
+    """The sweep that ends at this moment, 10 Hz; its stamp is the sweep's beginning."""
 
     sensor, every_ticks, at_tick = "lidar", 5, 2
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def __init__(self, simulation: Simulation, rng: Rng) -> None:
+        self._simulation, self._rng = simulation, rng
         self._cloud = _Publisher("/lidar/points", PointCloud2)
-        self._last: NDArray[np.void] = np.empty(0, dtype=POINT_DTYPE)
+        self._last: NDArray[np.void] | None = None
 
-    def publish(self, mode: SensorMode) -> int | None:
-        """Publish a cloud stamped with the sweep's beginning."""
-        if not self._cloud.wanted:
-            return None
+    def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
+        """Scan."""
         start_ns = self._simulation.now_ns - self.every_ticks * TICK_NS
-        if start_ns < 0:
+        if not self._cloud.wanted or start_ns < 0:
             return None
-        if mode is SensorMode.OK:
+        if self._last is None or mode not in HELD:
             self._last = self._simulation.lidar.scan(self._simulation.track, start_ns * 1e-9)
-        points = np.empty(0, dtype=POINT_DTYPE) if mode is SensorMode.BLACK else self._last
-        self._cloud.publish(ros_messages.cloud(points, start_ns))
-        return start_ns
+        message = ros_messages.cloud(degradation.sweep(mode, self._last, self._rng), start_ns + stamp_shift_ns)
+        return Measurement(start_ns, lambda: self._cloud.publish(message))
 
 
 class ImuDriver:
@@ -103,38 +115,51 @@ class ImuDriver:
 
     sensor, every_ticks, at_tick = "imu", 1, 0
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def __init__(self, simulation: Simulation, rng: Rng) -> None:
+        self._simulation, self._rng = simulation, rng
         self._imu = _Publisher("/imu/data", Imu)
-        self._last = ImuReading(ZERO, ZERO)
+        self._last: ImuReading | None = None
 
-    def publish(self, mode: SensorMode) -> int | None:
-        """Publish one reading."""
+    def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
+        """Take one reading."""
         if not self._imu.wanted:
             return None
-        if mode is SensorMode.OK:
-            body = self._simulation.vehicle.body
-            self._last = self._simulation.imu.measure(body.rates, body.specific_force)
-        reading = ImuReading(ZERO, ZERO) if mode is SensorMode.BLACK else self._last
-        self._imu.publish(ros_messages.imu(reading, self._simulation.now_ns))
-        return self._simulation.now_ns
+        simulation = self._simulation
+        if self._last is None or mode not in HELD:
+            body = simulation.vehicle.body
+            self._last = simulation.imu.measure(body.rates, body.specific_force)
+        message = ros_messages.imu(degradation.inertial(mode, self._last, self._rng), simulation.now_ns + stamp_shift_ns)
+        return Measurement(simulation.now_ns, lambda: self._imu.publish(message))
 
 
 class Drivers:
-    """All drivers, each at its time."""
+    """All drivers, each at its time; what a late sensor has measured is published when it arrives."""
 
     def __init__(self, simulation: Simulation, measured: Callable[[str, float], None]) -> None:
         """``measured`` is told the sensor and the stamp (seconds) of what was published."""
         self._simulation = simulation
         self._measured = measured
-        self._drivers: list[Driver] = [ZedDriver(simulation), LidarDriver(simulation), ImuDriver(simulation)]
+        rngs = [np.random.default_rng([simulation.seed, 6, n]) for n in range(3)]
+        self._drivers: list[Driver] = [ZedDriver(simulation, rngs[0]), LidarDriver(simulation, rngs[1]), ImuDriver(simulation, rngs[2])]
+        self._under_way: dict[str, deque[tuple[int, Measurement]]] = {driver.sensor: deque() for driver in self._drivers}
 
     def publish_due(self) -> None:
-        """Let the drivers publish whose time has come."""
-        tick = self._simulation.now_ns // TICK_NS
+        """Let the drivers measure whose time has come, and publish what has arrived."""
+        now_ns = self._simulation.now_ns
         for driver in self._drivers:
             mode = self._simulation.sensors.mode(driver.sensor)
-            if tick % driver.every_ticks == driver.at_tick and mode is not SensorMode.DEAD:
-                stamp_ns = driver.publish(mode)
-                if stamp_ns is not None:
-                    self._measured(driver.sensor, stamp_ns * 1e-9)
+            under_way = self._under_way[driver.sensor]
+            if mode is SensorMode.DEAD:
+                under_way.clear()
+            elif now_ns // TICK_NS % driver.every_ticks == driver.at_tick:
+                measurement = driver.measure(mode, degradation.FUTURE_NS if mode is SensorMode.FUTURE else 0)
+                if measurement is not None:
+                    under_way.append((now_ns + (degradation.LATE_NS if mode is SensorMode.LATE else 0), measurement))
+            while under_way and under_way[0][0] <= now_ns:
+                self._publish(driver.sensor, mode, under_way.popleft()[1])
+
+    def _publish(self, sensor: str, mode: SensorMode, measurement: Measurement) -> None:
+        measurement.publish()
+        # Nobody can be waited for who rightly refuses a stamp of the future.
+        if mode is not SensorMode.FUTURE:
+            self._measured(sensor, measurement.taken_ns * 1e-9)

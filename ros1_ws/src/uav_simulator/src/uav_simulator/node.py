@@ -17,16 +17,17 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
+from alula_common.faults import FaultError, parse_faults
 from uav_simulator import ros_messages
 from uav_simulator.autopilot.tcp_link import TcpLink
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError
 from uav_simulator.pacing import Pacer, header_stamp_s
 from uav_simulator.pilot_hooks import apply_pilot_word
-from uav_simulator.sensors.faults import parse_faults
+from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.settings import Settings, settings_from_params
 from uav_simulator.simulation import TICK_S, Simulation
-from uav_simulator.world.config import load_world_config
+from uav_simulator.world.config import find_world, load_world
 from uav_simulator.world.ply import write_mesh
 
 POSE_PERIOD_NS = 50_000_000
@@ -40,8 +41,8 @@ class SimulatorNode:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        config = load_world_config(Path(settings.world))
-        faults = parse_faults(settings.faults)
+        config = load_world(find_world(settings.world))
+        faults = parse_faults(settings.faults, FAULTS)
         self._simulation = Simulation(config, seed=settings.seed, faults=faults, boot_before_s=settings.boot_before_s)
         if settings.world_path:
             write_mesh(Path(settings.world_path), self._simulation.world.vertices, self._simulation.world.triangles)
@@ -147,7 +148,7 @@ def main() -> None:
     rospy.init_node("uav_simulator", disable_signals=True)
     try:
         node = SimulatorNode(settings_from_params(rospy.get_param("~", {})))
-    except SimulatorError as error:
+    except (SimulatorError, FaultError) as error:
         rospy.logfatal(str(error))
         raise SystemExit(2) from error
     for number in (signal.SIGINT, signal.SIGTERM):

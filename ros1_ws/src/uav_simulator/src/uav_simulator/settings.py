@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 from uav_simulator.errors import ConfigError
-
-PACKAGE = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)
@@ -16,9 +13,9 @@ class Settings:
     """Private parameters of the node."""
 
     seed: int = 0
-    world: str = str(PACKAGE / "config" / "yard.yaml")  # description of the world
+    world: str = "yard"  # name of a world that comes with the simulator, or a world file
     world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
-    faults: str = ""  # SENSOR[:MODE][@SECONDS after lift-off],...
+    faults: str = ""  # between commas; how each is written: alula_common.faults, what there is: sensors.faults
     mavlink_port: int = 5760  # on loopback; 0: any free one, told by /sim/state's neighbour ~mavlink_port
     rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
     pace_topics: tuple[str, ...] = ()  # of those who work for simulated time: TOPIC, or TOPIC=SENSOR for who deals with its measurements

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from alula_common.faults import FaultRequest
 from uav_simulator.autopilot.core import Autopilot
 from uav_simulator.autopilot.endpoint import Endpoint
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor
-from uav_simulator.sensors.faults import Fault, SensorBoard
+from uav_simulator.sensors.faults import SensorBoard
 from uav_simulator.sensors.imu import Imu
 from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.pose_track import Pose, PoseTrack
@@ -22,8 +23,8 @@ from uav_simulator.vehicle.airframe import Airframe
 from uav_simulator.vehicle.hexacopter import Hexacopter
 from uav_simulator.vehicle.noise import Wind
 from uav_simulator.world.config import WorldConfig
+from uav_simulator.world.parts import build_parts
 from uav_simulator.world.scene import World
-from uav_simulator.world.yard import build_parts
 
 TICK_NS = 20_000_000
 TICK_S = TICK_NS * 1e-9
@@ -45,8 +46,9 @@ class State:
 class Simulation:
     """Steps everything; who runs it decides when, and asks for the measurements it wants."""
 
-    def __init__(self, config: WorldConfig, *, seed: int, faults: list[Fault], boot_before_s: float) -> None:
+    def __init__(self, config: WorldConfig, *, seed: int, faults: list[FaultRequest], boot_before_s: float) -> None:
         airframe = Airframe()
+        self.seed = seed
         self.now_ns = 0
         self.world = World(build_parts(config, seed))
         self.vehicle = Hexacopter(airframe, Wind(seed=seed), config.home, yaw_rad=0.0)

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from alula_common.faults import FaultRequest
 from skill_model.model import ResultKind, Skill
+from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.mock.formula import Formula
 
 Value = Formula | float | str | bool | Callable[..., object]
@@ -90,7 +92,7 @@ class Happening:
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that a user can have fail, for good: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``."""
+    """Something that a user can have fail: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``."""
 
     states: Mapping[Place, str]
     delay: Value = 0.0
@@ -127,6 +129,17 @@ class Behaviour:
             faults={**other.faults, **self.faults},
             data={**other.data, **self.data},
         )
+
+    def fault(self, request: FaultRequest) -> tuple[str, Fault]:
+        """Return the fault that a request means, with its name: the one for the way of failing, else the one for the thing.
+
+        Raises:
+            SkillRuntimeError: there is none.
+        """
+        name = next((name for name in (f"{request.what}:{request.how}", request.what) if name in self.faults), None)
+        if name is None:
+            raise SkillRuntimeError(f"there is no fault '{request.what}' in the behaviour; it has {', '.join(self.faults) or 'none'}")
+        return name, self.faults[name]
 
     def of(self, skillsets: frozenset[str]) -> Behaviour:
         """Return what concerns these skillsets alone, for a process that has no others."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 import functools
 import random
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
+from alula_common.faults import FaultRequest
 from skill_model.model import Skillset
-from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Happening, Place, Value
+from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Place, Value
 from skill_runtime.mock.formula import Formula, FormulaError
 from skill_runtime.mock.skill import MockSkill
-from skill_runtime.mock.stage import Stage
+from skill_runtime.mock.stage import Job, Stage
 
 
 class Play:
@@ -35,7 +35,9 @@ class Play:
         self._began_s = 0.0
         self._held: dict[Place, str] = {}
         """What faults hold resources at, whatever else the script says of them."""
-        self._awaited: dict[tuple[Place, str], list[tuple[float, Happening | tuple[str, Fault]]]] = {}
+        self._before: dict[str, dict[Place, str]] = {}
+        """What the resources of a fault were before it."""
+        self._awaited: dict[tuple[Place, str], list[tuple[float, Job]]] = {}
         self._entered_s: dict[tuple[Place, str], float] = {}
 
     def hooks_of(self, skillset: Skillset) -> dict[str, MockSkill]:
@@ -52,29 +54,23 @@ class Play:
         """Let the clock's part of the play begin."""
         self._began_s = self.stage.now_s
         for happening in self._behaviour.timeline:
-            delay_s = self.number(happening.after_s, {})
-            if happening.anchor is None:
-                self._later(delay_s, happening)
-            else:
-                self._await(happening.anchor, delay_s, happening)
+            self._schedule(happening.anchor, self.number(happening.after_s, {}), functools.partial(self.take, happening.states))
         for place, script in self._behaviour.data.items():
             self._do(0.0, functools.partial(self._publish, place, script))
 
-    def fail(self, name: str, after_s: float | None = None) -> None:
-        """Have a fault of the behaviour happen, seconds after its anchor; None: at the beginning.
+    def fail(self, request: FaultRequest) -> None:
+        """Have a fault of the behaviour happen, and end where the request says so; without a time it happens at the beginning.
+
+        A fault may be written for one way of failing, ``zed:dark``, or for all, ``zed``.
 
         Raises:
             SkillRuntimeError: there is no such fault.
         """
-        fault = self._behaviour.faults.get(name)
-        if fault is None:
-            raise SkillRuntimeError(f"there is no fault '{name}' in the behaviour; it has {', '.join(self._behaviour.faults) or 'none'}")
-        if after_s is None:
-            self._later(0.0, (name, fault))
-        elif fault.anchor is None:
-            self._later(after_s, (name, fault))
-        else:
-            self._await(fault.anchor, after_s, (name, fault))
+        name, fault = self._behaviour.fault(request)
+        anchor = None if request.begin_s is None else fault.anchor
+        self._schedule(anchor, request.begin_s or 0.0, functools.partial(self._break, name, fault))
+        if request.end_s is not None:
+            self._schedule(anchor, request.end_s, functools.partial(self._mend, name, fault))
 
     def on_state(self, skillset: str, resource: str, state: str) -> None:
         """Note that a resource has entered a state; only the first time counts."""
@@ -82,8 +78,8 @@ class Play:
         if entered in self._entered_s:
             return
         self._entered_s[entered] = self.stage.now_s
-        for delay_s, what in self._awaited.pop(entered, ()):
-            self._later(delay_s, what)
+        for delay_s, job in self._awaited.pop(entered, ()):
+            self._do(delay_s, job)
 
     # --- for the skills ----------------------------------------------------------------------------------------------
 
@@ -121,16 +117,16 @@ class Play:
 
     # --- the clock's part --------------------------------------------------------------------------------------------
 
-    def _await(self, anchor: tuple[Place, str], delay_s: float, what: Happening | tuple[str, Fault]) -> None:
-        if anchor in self._entered_s:
-            self._later(self._entered_s[anchor] + delay_s - self.stage.now_s, what)
+    def _schedule(self, anchor: tuple[Place, str] | None, delay_s: float, job: Job) -> None:
+        """Have a job done so long after a resource first enters a state; None: after now."""
+        if anchor is None:
+            self._do(delay_s, job)
+        elif anchor in self._entered_s:
+            self._do(self._entered_s[anchor] + delay_s - self.stage.now_s, job)
         else:
-            self._awaited.setdefault(anchor, []).append((delay_s, what))
+            self._awaited.setdefault(anchor, []).append((delay_s, job))
 
-    def _later(self, delay_s: float, what: Happening | tuple[str, Fault]) -> None:
-        self._do(delay_s, lambda: self._happen(what))
-
-    def _do(self, delay_s: float, job: Callable[[], None]) -> None:
+    def _do(self, delay_s: float, job: Job) -> None:
         """Have a job done after a delay; a formula in it that has no value is told, and the play goes on."""
 
         def safely() -> None:
@@ -141,17 +137,23 @@ class Play:
 
         self.stage.after(max(0.0, delay_s), safely)
 
-    def _happen(self, what: Happening | tuple[str, Fault]) -> None:
-        if isinstance(what, Happening):
-            self.take(what.states)
-            return
-        name, fault = what
+    def _break(self, name: str, fault: Fault) -> None:
         self.faults.setdefault(name, self.stage.now_s)
-        self._do(self.number(fault.delay, {}), lambda: self._hold(fault))
+        self._do(self.number(fault.delay, {}), lambda: self._hold(name, fault))
 
-    def _hold(self, fault: Fault) -> None:
+    def _mend(self, name: str, fault: Fault) -> None:
+        self._do(self.number(fault.delay, {}), lambda: self._release(name))
+
+    def _hold(self, name: str, fault: Fault) -> None:
+        self._before.setdefault(name, {place: self.stage.state(*place) for place in fault.states})
         self._held |= fault.states
         self.take(fault.states)
+
+    def _release(self, name: str) -> None:
+        before = self._before.pop(name, {})
+        for place in before:
+            self._held.pop(place, None)
+        self.take(before)
 
     def _publish(self, place: Place, script: DataScript) -> None:
         self._do(script.period_s, lambda: self._publish(place, script))

@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from alula_common.faults import FaultError, FaultRequest, parse_fault
 from skill_language.errors import LanguageError
 from skill_language.load import load_robot
 from skill_language.robot import Robot
@@ -52,12 +53,12 @@ class Cast:
 class MockNodes:
     """The nodes of a play; ``spin`` serves them until it is told to stop. rclpy must be initialised."""
 
-    def __init__(self, cast: Cast, behaviour: Behaviour, *, seed: int = 0, faults: Sequence[tuple[str, float | None]] = ()) -> None:
+    def __init__(self, cast: Cast, behaviour: Behaviour, *, seed: int = 0, faults: Sequence[FaultRequest] = ()) -> None:
         self.helper = Node("skill_mocks")
         self.stage = RosStage(self.helper, cast.bindings)
         self.play = Play(behaviour.of(frozenset(cast.interfaces)), self.stage, seed=seed)
-        for name, after_s in faults:
-            self.play.fail(name, after_s)
+        for fault in faults:
+            self.play.fail(fault)
         self.stage.watch(list(cast.interfaces), self.play.on_state)
         for skillset in cast.skillsets:
             for resource in skillset.resources:
@@ -95,22 +96,18 @@ def parse(words: Sequence[str], *, program: str, folder: bool) -> argparse.Names
         parser.add_argument("robot", type=Path, help=f"a robot's folder: models, bindings, and {BEHAVIOUR_FILE} if there is one")
         parser.add_argument("--skillset", action="append", default=[], metavar="NAME", help="only this one of the robot's (several)")
     parser.add_argument("--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what they do, on top of the robot's")
-    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[@SECONDS]", help="a fault of the behaviour")
+    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[:HOW][@SECONDS[-SECONDS]]", help="a fault of the behaviour")
     parser.add_argument("--seed", type=int, default=0, help="of the behaviour's chance (default 0)")
     parser.add_argument("--starter", action="store_true", help="print a behaviour file to begin with, and end")
     return parser.parse_args(words)
 
 
-def parse_fault(text: str) -> tuple[str, float | None]:
-    """Read ``zed@30`` or ``zed``; raise MockRequestError."""
-    name, at, seconds = text.partition("@")
+def read_faults(texts: Sequence[str]) -> list[FaultRequest]:
+    """Read the faults of the command line; raise MockRequestError."""
     try:
-        when_s = float(seconds) if at else None
-    except ValueError:
-        when_s = -1.0
-    if not name or (when_s is not None and not 0.0 <= when_s < float("inf")):
-        raise MockRequestError(f"--fail {text}: write WHAT@SECONDS, as in zed@30, or WHAT alone for a failure from the start")
-    return name, when_s
+        return [parse_fault(text) for text in texts]
+    except FaultError as error:
+        raise MockRequestError(f"--fail: {error}") from None
 
 
 def make_cast(robot: Robot, names: Sequence[str]) -> Cast:
@@ -140,7 +137,7 @@ def _interfaces(skillset: Skillset) -> ModuleType:
 def run(cast: Cast, behaviours: Sequence[Path], known: Sequence[Skillset], options: argparse.Namespace, words: Sequence[str]) -> int:
     """Serve until a signal comes; raise SkillRuntimeError before anything is served."""
     behaviour = load_behaviour([*behaviours, *options.behaviour], known)
-    faults = [parse_fault(text) for text in options.fail]
+    faults = read_faults(options.fail)
     rclpy.init(args=list(words), signal_handler_options=SignalHandlerOptions.NO)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

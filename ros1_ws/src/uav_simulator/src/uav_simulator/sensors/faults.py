@@ -1,14 +1,15 @@
-"""How each sensor fares: ok or broken in one of three ways, now or at a moment of the flight."""
+"""Which sensor fares how: the ways in which each can fail, and when they do."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from alula_common.faults import FaultRequest
+from alula_common.located_yaml import choices
 from uav_simulator.errors import ConfigError
-
-SENSORS = ("zed", "lidar", "imu")
 
 
 class SensorMode(Enum):
@@ -16,17 +17,39 @@ class SensorMode(Enum):
 
     OK = "ok"
     DEAD = "dead"  # nothing
-    BLACK = "black"  # measurements without content: images of zeros, no returns, zero rates and forces
     FROZEN = "frozen"  # the last measurement again and again, with new stamps
+    FLICKERING = "flickering"  # frozen but for one value that changes
+    BLACK = "black"  # measurements without content: images of zeros, no returns, zero rates and forces
+    DARK = "dark"  # images of next to no light and the sensor's noise
+    WHITE = "white"  # overexposed images
+    BLURRED = "blurred"  # images out of focus
+    SHIFTED = "shifted"  # the right image 3 pixels lower
+    ROTATED = "rotated"  # the right image turned by 1 degree
+    SWAPPED = "swapped"  # left and right exchanged
+    WRONG_INFO = "wrong_info"  # infos of twice the resolution
+    THINNED = "thinned"  # one point of 500
+    SECTOR = "sector"  # no returns from the front half
+    BIASED = "biased"  # ranges 0.5 m too long; rates and forces off by a constant
+    LATE = "late"  # arrives half a second after its stamp
+    FUTURE = "future"  # stamps ten seconds ahead
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A sensor's change of mode; ``after_lift_off_s`` None: at the start of the simulation."""
-
-    sensor: str
-    mode: SensorMode
-    after_lift_off_s: float | None
+_ALWAYS = (SensorMode.DEAD, SensorMode.FROZEN, SensorMode.FLICKERING, SensorMode.BLACK, SensorMode.LATE, SensorMode.FUTURE)
+_IMAGES = (
+    SensorMode.DARK,
+    SensorMode.WHITE,
+    SensorMode.BLURRED,
+    SensorMode.SHIFTED,
+    SensorMode.ROTATED,
+    SensorMode.SWAPPED,
+    SensorMode.WRONG_INFO,
+)
+FAULTS: dict[str, tuple[str, ...]] = {
+    "zed": tuple(mode.value for mode in (*_ALWAYS, *_IMAGES)),
+    "lidar": tuple(mode.value for mode in (*_ALWAYS, SensorMode.THINNED, SensorMode.SECTOR, SensorMode.BIASED)),
+    "imu": tuple(mode.value for mode in (*_ALWAYS, SensorMode.BIASED)),
+}
+"""The sensors, each with the ways in which it can fail; the first one counts where none is named."""
 
 
 @dataclass(frozen=True)
@@ -38,38 +61,21 @@ class FaultRecord:
     t_s: float
 
 
-def parse_faults(text: str) -> list[Fault]:
-    """Read ``SENSOR[:MODE][@SECONDS],...``, for example ``zed@30,lidar:black@40``; raises ConfigError naming the wrong word."""
-    faults = []
-    for word in (w.strip() for w in text.split(",")):
-        if not word:
-            continue
-        what, at, seconds = word.partition("@")
-        sensor, _, mode = what.partition(":")
-        _check_names(sensor, mode or "dead")
-        try:
-            after = float(seconds) if at else None
-        except ValueError:
-            raise ConfigError(f"fault {word!r}: {seconds!r} is no number of seconds") from None
-        faults.append(Fault(sensor, SensorMode(mode or "dead"), after))
-    return faults
-
-
-def _check_names(sensor: str, mode: str) -> None:
-    if sensor not in SENSORS:
-        raise ConfigError(f"unknown sensor {sensor!r}; known are {', '.join(SENSORS)}")
-    known = [m.value for m in SensorMode]
-    if mode not in known:
-        raise ConfigError(f"unknown sensor mode {mode!r}; known are {', '.join(known)}")
+@dataclass(frozen=True)
+class _Change:
+    sensor: str
+    mode: SensorMode
+    after_lift_off_s: float | None
 
 
 class SensorBoard:
     """The sensors' modes. Set from a service's thread, read from the simulation's."""
 
-    def __init__(self, faults: list[Fault]) -> None:
+    def __init__(self, faults: Sequence[FaultRequest]) -> None:
+        """``faults`` of the sensors, as `alula_common.faults` reads them with FAULTS."""
         self._lock = threading.Lock()
-        self._modes = dict.fromkeys(SENSORS, SensorMode.OK)
-        self._pending = list(faults)
+        self._modes = dict.fromkeys(FAULTS, SensorMode.OK)
+        self._pending = [change for fault in faults for change in _changes(fault)]
         self._records: list[FaultRecord] = []
 
     def mode(self, sensor: str) -> SensorMode:
@@ -91,21 +97,31 @@ class SensorBoard:
 
     def set(self, sensor: str, mode: str, t_s: float) -> None:
         """Break or mend a sensor at a moment of the simulated clock; raises ConfigError for a wrong name."""
-        _check_names(sensor, mode)
+        if sensor not in FAULTS:
+            raise ConfigError(f"unknown sensor {sensor!r}; known are {choices(sensor, FAULTS)}")
+        known = (SensorMode.OK.value, *FAULTS[sensor])
+        if mode not in known:
+            raise ConfigError(f"{sensor} has no mode {mode!r}; it has {choices(mode, known)}")
         with self._lock:
             self._modes[sensor] = SensorMode(mode)
             self._records.append(FaultRecord(sensor, SensorMode(mode), t_s))
 
     def apply_due(self, now_s: float, lift_off_s: float | None) -> bool:
-        """Let the scheduled faults happen that are due; return whether one did."""
-        due = [f for f in self._pending if _is_due(f, now_s, lift_off_s)]
-        for fault in due:
-            self._pending.remove(fault)
-            self.set(fault.sensor, fault.mode.value, now_s)
+        """Let the scheduled changes happen that are due; return whether one did."""
+        due = [change for change in self._pending if _is_due(change, now_s, lift_off_s)]
+        for change in due:
+            self._pending.remove(change)
+            self.set(change.sensor, change.mode.value, now_s)
         return bool(due)
 
 
-def _is_due(fault: Fault, now_s: float, lift_off_s: float | None) -> bool:
-    if fault.after_lift_off_s is None:
+def _changes(fault: FaultRequest) -> list[_Change]:
+    """Return the beginning of a fault, and its end if it has one."""
+    begin = _Change(fault.what, SensorMode(fault.how or FAULTS[fault.what][0]), fault.begin_s)
+    return [begin] if fault.end_s is None else [begin, _Change(fault.what, SensorMode.OK, fault.end_s)]
+
+
+def _is_due(change: _Change, now_s: float, lift_off_s: float | None) -> bool:
+    if change.after_lift_off_s is None:
         return True
-    return lift_off_s is not None and now_s >= lift_off_s + fault.after_lift_off_s - 1e-6
+    return lift_off_s is not None and now_s >= lift_off_s + change.after_lift_off_s - 1e-6

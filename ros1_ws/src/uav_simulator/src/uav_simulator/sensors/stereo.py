@@ -40,6 +40,10 @@ class Pinhole:
         """Return the principal point, the image's centre."""
         return (self.width - 1) / 2.0, (self.height - 1) / 2.0
 
+    def scaled(self, factor: int) -> Pinhole:
+        """Return the same camera with so many times the resolution."""
+        return Pinhole(self.width * factor, self.height * factor, self.focal_px * factor, self.baseline_m)
+
 
 class StereoPair:
     """Renders what both eyes see from a pose."""

@@ -1,1 +1,1 @@
-"""The yard: its description, its meshes and what rays and distances meet in it."""
+"""A world: its file, its meshes, what rays and distances meet in it, and where the radio is bad."""

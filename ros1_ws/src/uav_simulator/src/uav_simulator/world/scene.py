@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,8 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from uav_simulator.frames import Vec3
+from uav_simulator.world.parts import Part
 from uav_simulator.world.shapes import Floats, merged
-from uav_simulator.world.yard import Part
 
 Floats32 = NDArray[np.float32]
 UInts = NDArray[np.uint32]
@@ -46,7 +47,8 @@ class World:
         self.normals: Floats = normal / np.linalg.norm(normal, axis=1, keepdims=True)
         self.plane_offsets: Floats = np.einsum("ij,ij->i", self.normals, corners[:, 0])
         self._all = _scene(self.vertices, self.triangles)
-        self._obstacles = _scene(self.vertices, self.triangles[len(parts[0].mesh.triangles) :])
+        obstacles = self.triangles[len(parts[0].mesh.triangles) :]
+        self._obstacles = _scene(self.vertices, obstacles) if len(obstacles) else None
 
     def cast(self, rays: Floats32) -> Hits:
         """Cast rays (N, 6) float32 (origin, unit direction, map)."""
@@ -58,8 +60,8 @@ class World:
         return _nearest(self._all, position)
 
     def nearest_obstacle(self, position: Vec3) -> Nearest:
-        """Return the nearest surface that is not the ground."""
-        return _nearest(self._obstacles, position)
+        """Return the nearest surface that is not the ground; infinitely far where there is none."""
+        return Nearest(math.inf, position) if self._obstacles is None else _nearest(self._obstacles, position)
 
 
 def _scene(vertices: Floats, triangles: NDArray[np.int64]) -> o3d.t.geometry.RaycastingScene:

@@ -12,11 +12,13 @@ import open3d as o3d
 
 from uav_simulator.errors import ConfigError
 from uav_simulator.frames import Vec3
-from uav_simulator.world.config import Obstacle, WorldConfig
+from uav_simulator.world.config import Obstacle, Scatter, WorldConfig
 from uav_simulator.world.shapes import Floats, Mesh, ball, box, cylinder, merged, rectangle
 
 ROUTE_SAMPLE_M = 0.25
+AHEAD_M = 5.0
 PUSHES = 12
+DRAWS = 40
 Rng = np.random.Generator
 
 
@@ -33,11 +35,20 @@ def route_samples(route: tuple[Vec3, ...]) -> Floats:
     """Return points along the route, (N, 3), at most 0.25 m apart, with the ways up to its start and down from its end."""
     first, last = route[0], route[-1]
     corners = [(first[0], first[1], 0.9), *route, (last[0], last[1], 0.9)]
+    return np.concatenate([_line_samples(a, b) for a, b in pairwise(corners)])
+
+
+def samples_ahead(route: tuple[Vec3, ...]) -> Floats:
+    """Return points on the 5 m beyond each leg, (N, 3): who watches ahead must not be stopped before a corner."""
     pieces = []
-    for a, b in pairwise(corners):
-        count = max(2, math.ceil(math.dist(a, b) / ROUTE_SAMPLE_M) + 1)
-        pieces.append(np.linspace(a, b, count))
+    for a, b in pairwise(np.array(route)):
+        pieces.append(_line_samples(b, b + AHEAD_M * (b - a) / max(float(np.linalg.norm(b - a)), 1e-6)))
     return np.concatenate(pieces)
+
+
+def _line_samples(a: Vec3 | Floats, b: Vec3 | Floats) -> Floats:
+    count = max(2, math.ceil(math.dist(a, b) / ROUTE_SAMPLE_M) + 1)
+    return np.linspace(a, b, count, dtype=np.float64)
 
 
 def distances_to_mesh(mesh: Mesh, points: Floats) -> tuple[Floats, Floats]:
@@ -99,6 +110,17 @@ def place(obstacle: Obstacle, route: Floats, keep_clear_m: float, rng: Rng) -> M
     raise ConfigError(f"obstacle {obstacle.kind} at {obstacle.at} can't be kept {keep_clear_m} m from the route: move it")
 
 
+def scatter(entry: Scatter, route: Floats, keep_clear_m: float, rng: Rng) -> Mesh:
+    """Return a thing at a random place that is as far from the route as it has to be; raises ConfigError when none is found."""
+    mesh = SHAPES[entry.kind](rng).turned(rng.uniform(0.0, math.tau))
+    for _ in range(DRAWS):
+        there = mesh.moved((rng.uniform(*entry.x), rng.uniform(*entry.y), 0.0))
+        distance, _ = distances_to_mesh(there, route)
+        if distance.min() >= keep_clear_m:
+            return there
+    raise ConfigError(f"a scattered {entry.kind} finds no place {keep_clear_m} m from the route in x {entry.x}, y {entry.y}: widen it")
+
+
 def build_parts(config: WorldConfig, seed: int) -> list[Part]:
     """Return the world's parts, the ground first; the same for the same seed."""
     rng = np.random.default_rng([seed, 1])
@@ -108,4 +130,9 @@ def build_parts(config: WorldConfig, seed: int) -> list[Part]:
     for index, obstacle in enumerate(config.obstacles):
         mesh = place(obstacle, route, config.keep_clear_m, rng)
         parts.append(Part(f"{obstacle.kind} {index}", mesh, BRIGHTNESS[obstacle.kind] * rng.uniform(0.8, 1.2)))
+    wide = np.concatenate([route, samples_ahead(config.route)])
+    for entry in config.scatter:
+        for index in range(entry.count):
+            mesh = scatter(entry, wide, config.keep_clear_m, rng)
+            parts.append(Part(f"scattered {entry.kind} {index}", mesh, BRIGHTNESS[entry.kind] * rng.uniform(0.8, 1.2)))
     return parts
