@@ -199,8 +199,13 @@ def test_obstacle_stops_it_and_it_goes_on_when_clear(bench):
 
     wait_until(lambda: see_and(lambda s: s.obstacle_stop and s.still_s > 3.0), timeout_s=10.0, what="held back, and it counts as still")
     assert bench.autopilot.enu[0] < obstacle_at - 1.0
-    bench.show_obstacle(None)
-    bench.until(lambda s: not s.obstacle_stop and s.position_enu_m.x > obstacle_at, "going on")
+
+    def clear_and(condition: Callable[[GuidanceState], bool]) -> bool:
+        bench.show_obstacle(None)
+        return condition(bench.state)
+
+    wait_until(lambda: clear_and(lambda s: not s.obstacle_stop and s.position_enu_m.x > obstacle_at), timeout_s=15.0, what="going on")
+    bench.until(lambda s: s.unwatched and s.obstacle_stop, "nobody watches any more")
 
 
 def test_reconnects_and_asks_for_its_streams_again(bench):

@@ -24,6 +24,8 @@ from uav_simulator_link import (
     Link,
 )
 
+from uav_simulator.autopilot.endpoint import Endpoint
+
 NAN = math.nan
 
 
@@ -87,10 +89,10 @@ def test_a_client_that_comes_back_finds_a_fresh_link():
 
 def test_origin_and_home_are_told_when_they_are_set():
     link = Link(boot_before_s=0.0)
-    link.run(39.0)
+    link.run(41.5)
     assert not link.of("GPS_GLOBAL_ORIGIN")
     assert not link.of("HOME_POSITION")
-    link.run(2.0)
+    link.run(1.0)
     assert len(link.of("GPS_GLOBAL_ORIGIN")) == 1
     assert len(link.of("HOME_POSITION")) == 1
 
@@ -148,17 +150,52 @@ def test_an_unknown_command_is_unsupported():
 # --- 4 arming ------------------------------------------------------------------------------------------------------------
 
 
-def test_before_it_is_ready_arming_fails_with_a_reason_and_guided_is_accepted():
-    link = Link(boot_before_s=0.0)
-    link.ask(1, hz=2)
+def healthy(link):
+    link.run(0.5)
+    return bool(link.of("SYS_STATUS")[-1].onboard_control_sensors_health & 0x10000000)
+
+
+def test_before_it_has_a_position_arming_fails_with_a_reason_and_guided_is_accepted():
+    link = Link(boot_before_s=3.0)
+    link.ask(1, 32, hz=4)
     assert link.command(176, 1, GUIDED) == ACCEPTED
-    link.run(1.0)
-    assert not link.of("SYS_STATUS")[-1].onboard_control_sensors_health & 0x10000000
+    assert not healthy(link)
     assert link.command(400, 1) == FAILED
     assert any(t.startswith("Arm: ") for t in link.texts())
-    link.run(39.5)
-    assert link.of("SYS_STATUS")[-1].onboard_control_sensors_health & 0x10000000
+    link.run(37.5)
+    assert not healthy(link)
+    assert not link.of("LOCAL_POSITION_NED")
+    assert "PreArm: Need Position Estimate" in link.texts()
+    assert link.command(400, 1) == FAILED
+    assert link.texts() == ["Arm: Need Position Estimate"]
+    link.run(0.5)
+    assert healthy(link)
+    assert link.of("LOCAL_POSITION_NED")
     assert link.command(400, 1) == ACCEPTED
+
+
+def test_without_the_need_of_a_position_it_is_ready_earlier_and_falls_back_in_guided():
+    link = Link(boot_before_s=22.0)
+    link.ask(1, hz=4)
+    assert not healthy(link)
+    link.run(0.5)
+    assert healthy(link), "in STABILIZE, 23 s after power-up"
+    assert link.command(176, 1, GUIDED) == ACCEPTED
+    assert not healthy(link)
+    link.command(176, 1, 0)
+    assert healthy(link)
+
+
+def test_guided_right_after_power_up_falls_back():
+    link = Link(boot_before_s=0.5)
+    assert link.command(176, 1, GUIDED) == ACCEPTED
+    assert link.run_until(lambda: link.pilot.mode == 0, timeout_s=3.0) == pytest.approx(1.4, abs=0.05)
+    assert link.command(176, 1, GUIDED) == ACCEPTED
+    link.run(0.1)
+    link = Link(boot_before_s=2.1)
+    link.command(176, 1, GUIDED)
+    link.run(3.0)
+    assert link.pilot.mode == GUIDED
 
 
 def test_on_the_ground_it_disarms_itself_ten_seconds_after_arming():
@@ -428,6 +465,49 @@ def test_with_fs_gcs_enable_it_returns_when_the_ground_station_falls_silent():
     assert link.of("PARAM_VALUE")[-1].param_value == 1.0
     link.endpoint.gcs_present = False
     assert link.run_until(lambda: link.pilot.mode == RTL, timeout_s=8.0) == pytest.approx(5.0, abs=1.1)
+
+
+def ground_station(link):
+    """Open a second link, and return it with a function that sends a heartbeat over it."""
+    ground = Endpoint(link.pilot, gcs_present=False)
+    link.endpoint.gcs_present = False
+    link.endpoint.connect(ground)
+    station = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    beat = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3)
+    return ground, lambda: ground.feed(beat.pack(station))
+
+
+def test_a_ground_station_on_a_link_of_its_own_is_heard_and_forwarded():
+    link = Link()
+    ground, beat = ground_station(link)
+    beat()
+    link.run(0.1)
+    assert len(link.of("HEARTBEAT", system=255)) == 1
+    ground.take_output()
+    assert link.command(176, 1, GUIDED) == ACCEPTED
+    assert link.command(21) == ACCEPTED
+    heard = mavlink.MAVLink(None).parse_buffer(ground.take_output())
+    assert {m.custom_mode for m in heard if m.get_type() == "HEARTBEAT"} == {GUIDED, LAND}
+    assert not [m for m in heard if m.get_type() == "COMMAND_ACK"], "answers go to who has asked"
+    link.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+    assert [m.get_srcComponent() for m in mavlink.MAVLink(None).parse_buffer(ground.take_output())] == [191]
+
+
+def test_the_control_link_is_lost_and_comes_back():
+    link = Link(params={"FS_GCS_ENABLE": 1.0}).flying()
+    _, beat = ground_station(link)
+    for _ in range(8):
+        beat()
+        link.run(1.0)
+    assert link.pilot.mode == GUIDED
+    link.received.clear()
+    assert link.run_until(lambda: link.pilot.mode == RTL, timeout_s=8.0) == pytest.approx(4.0, abs=0.3)
+    link.run(1.1)
+    assert "GCS Failsafe" in link.texts()
+    assert link.of("HEARTBEAT")[-1].system_status == 5
+    beat()
+    link.run(1.1)
+    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 4)
 
 
 def test_rc_loss_returns_home_and_stays_when_rc_comes_back():

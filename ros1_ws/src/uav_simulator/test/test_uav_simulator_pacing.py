@@ -7,8 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from uav_simulator_link import Link
 
+from uav_simulator.autopilot.params import parse_parameters
 from uav_simulator.autopilot.tcp_link import TcpLink
 from uav_simulator.autopilot.types import Mode
+from uav_simulator.autopilot.udp_link import UdpLink
 from uav_simulator.errors import ConfigError, SimulatorError
 from uav_simulator.pacing import Pacer, header_stamp_s
 from uav_simulator.pilot_hooks import apply_pilot_word
@@ -56,15 +58,22 @@ def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
 
 def test_who_works_on_measurements_is_waited_for_while_there_are_some():
     p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
-    p.measured("zed", 10.0)
+    p.measured("zed", 10.0, 10.0)
     p.heard("/depth/done", 10.0)
     assert p.may_advance(99.0, 0.0), "a dead camera holds nobody up"
-    p.measured("zed", 10.1)
-    assert p.may_advance(10.1, 0.0), "one measurement may be under way"
-    p.measured("zed", 10.2)
-    assert not p.may_advance(10.2, 0.0)
+    p.measured("zed", 10.1, 10.1)
+    assert p.may_advance(10.18, 0.0), "a measurement is worked on"
+    assert not p.may_advance(10.2, 0.0), "but not when the next one is due"
     p.heard("/depth/done", 10.1)
     assert p.may_advance(10.2, 0.1)
+
+
+def test_a_late_measurement_is_waited_for_from_its_arrival():
+    p = Pacer(["/depth/done=zed"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    p.heard("/depth/done", 9.9)
+    p.measured("zed", 10.0, 10.5)
+    assert p.may_advance(10.58, 0.0)
+    assert not p.may_advance(10.6, 0.0)
 
 
 def test_the_slowest_of_many_holds():
@@ -110,6 +119,14 @@ def test_a_wrong_parameter_is_named(params, said):
         settings_from_params(params)
 
 
+def test_parameters_of_the_autopilot_are_read():
+    assert parse_parameters("FS_GCS_ENABLE=1, LAND_SPEED=30") == {"FS_GCS_ENABLE": 1.0, "LAND_SPEED": 30.0}
+    assert parse_parameters("") == {}
+    for wrong, said in (("FS_GCS=1", "no 'FS_GCS'.*did you mean"), ("LAND_SPEED", "'' is no number")):
+        with pytest.raises(ConfigError, match=said):
+            parse_parameters(wrong)
+
+
 def test_pilot_words():
     link = Link().flying()
     apply_pilot_word("LOITER", link.pilot, link.endpoint)
@@ -123,10 +140,11 @@ def test_pilot_words():
             apply_pilot_word(wrong, link.pilot, link.endpoint)
 
 
-def test_a_taken_port_is_named():
-    first = TcpLink(Link().endpoint, 0)
+@pytest.mark.parametrize("kind", [TcpLink, UdpLink])
+def test_a_taken_port_is_named(kind):
+    first = kind(Link().endpoint, 0)
     try:
         with pytest.raises(SimulatorError, match=str(first.port)):
-            TcpLink(Link().endpoint, first.port)
+            kind(Link().endpoint, first.port)
     finally:
         first.close()

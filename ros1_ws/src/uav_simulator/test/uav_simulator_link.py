@@ -22,10 +22,10 @@ POSITION, POSITION_YAW, VELOCITY = 0x0DF8, 0x09F8, 0x0DC7
 class Link:
     """One client of one autopilot on a vehicle in still air."""
 
-    def __init__(self, *, boot_before_s: float = 60.0, system: int = 1, component: int = 191):
+    def __init__(self, *, boot_before_s: float = 60.0, system: int = 1, component: int = 191, params=None):
         airframe = Airframe()
         self.vehicle = Hexacopter(airframe, wind=None)
-        self.pilot = Autopilot(self.vehicle, airframe, seed=0, boot_before_s=boot_before_s)
+        self.pilot = Autopilot(self.vehicle, airframe, seed=0, boot_before_s=boot_before_s, params=params)
         self.endpoint = Endpoint(self.pilot)
         self.me = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
         self._parser = mavlink.MAVLink(None)

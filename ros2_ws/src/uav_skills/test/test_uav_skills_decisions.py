@@ -24,6 +24,7 @@ class State:
     still_s: float = 0.0
     obstacle_stop: bool = False
     obstacle_m: float = math.inf
+    unwatched: bool = False
 
 
 @pytest.mark.parametrize(
@@ -67,6 +68,8 @@ def test_goto(change, result):
 def test_a_blocked_flight_tells_of_the_obstacle():
     verdict = decisions.decide_goto(State(still_s=6.0, obstacle_stop=True, obstacle_m=2.4))
     assert verdict == Verdict("BLOCKED", "held back for 6.0 s by an obstacle 2.4 m ahead")
+    verdict = decisions.decide_goto(State(still_s=6.0, obstacle_stop=True, unwatched=True))
+    assert verdict == Verdict("BLOCKED", "held back for 6.0 s: no sensor watches the way ahead")
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ class GuidanceReport(Protocol):
     still_s: float
     obstacle_stop: bool
     obstacle_m: float
+    unwatched: bool
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ DEFAULT_THRESHOLDS = Thresholds()
 def _blocked(state: GuidanceReport, limits: Thresholds) -> Verdict | None:
     if state.still_s <= limits.blocked_s:
         return None
+    if state.unwatched:
+        return Verdict("BLOCKED", f"held back for {state.still_s:.1f} s: no sensor watches the way ahead")
     if state.obstacle_stop:
         return Verdict("BLOCKED", f"held back for {state.still_s:.1f} s by an obstacle {state.obstacle_m:.1f} m ahead")
     return Verdict("BLOCKED", f"no nearer to the target for {state.still_s:.1f} s")

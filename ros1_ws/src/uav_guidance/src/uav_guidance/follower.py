@@ -42,6 +42,7 @@ class Course:
     still_s: float
     obstacle_stop: bool
     obstacle_m: float
+    unwatched: bool
 
 
 class Follower:
@@ -87,6 +88,8 @@ class Follower:
         dt_s = 0.0 if self._last_step_s is None else min(max(now_s - self._last_step_s, 0.0), LONGEST_STEP_S)
         self._last_step_s = now_s
         self._seen_armed |= vehicle.armed
+        if vehicle.on_ground and not vehicle.armed:
+            self.obstacles.forget_sensors()
         setpoint = self._follow(vehicle, now_s, dt_s) if commanded else None
         self._measure_stillness(vehicle, now_s)
         return setpoint
@@ -107,6 +110,7 @@ class Follower:
             still_s=self._still_s,
             obstacle_stop=self._blocked,
             obstacle_m=self.obstacles.nearest_m(now_s),
+            unwatched=self.obstacles.unwatched(now_s),
         )
 
     def _follow(self, vehicle: Vehicle, now_s: float, dt_s: float) -> Setpoint | None:

@@ -93,9 +93,9 @@ class Guidance:
         if self._procedure is not None:
             self._procedure.on_text(severity, text)
 
-    def on_obstacle(self, sighting: Sighting) -> None:
-        """Take a sensor's word about the corridor ahead."""
-        self._follower.obstacles.see(sighting)
+    def on_obstacle(self, sighting: Sighting, now_s: float) -> None:
+        """Take a sensor's verdict on the corridor ahead."""
+        self._follower.obstacles.see(sighting, now_s)
 
     def ask(self, request: Request, now_s: float) -> Decision:
         """Accept a request or refuse it with a reason; a refused one changes nothing."""

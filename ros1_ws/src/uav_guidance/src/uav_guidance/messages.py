@@ -35,6 +35,7 @@ def sighting(message: Obstacle) -> Sighting:
         detected=message.detected,
         distance_m=message.distance_m,
         nearest_enu_m=vec3(message.nearest_enu_m),
+        unknown=message.unknown,
     )
 
 
@@ -66,6 +67,7 @@ def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
         still_s=course.still_s,
         obstacle_stop=course.obstacle_stop,
         obstacle_m=course.obstacle_m,
+        unwatched=course.unwatched,
     )
     message.header.stamp = stamp
     message.header.frame_id = FRAME

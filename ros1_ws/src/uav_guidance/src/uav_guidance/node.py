@@ -134,7 +134,7 @@ class GuidanceNode:
 
     def _on_obstacle(self, message: Obstacle) -> None:
         with self._changed:
-            self._guidance.on_obstacle(sighting(message))
+            self._guidance.on_obstacle(sighting(message), _now_s())
 
     def _on_clock(self, message: Clock) -> None:
         self._fine_clock.tick(message.clock.to_nsec(), time.monotonic_ns())

@@ -1,9 +1,13 @@
-"""Whether something stands in the way: the last words of each sensor, and when to go on."""
+"""Whether the way ahead is free: the last verdict of each sensor, when to hold and when to go on.
+
+A vehicle moves on when a sensor has just said that the way is free. What no sensor could judge is not free, and neither is what no
+sensor looks at any more. Where nobody has watched since the vehicle stood on the ground, it flies unwatched: that is the operator's choice.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from uav_guidance.carrot import braking_distance
 from uav_guidance.settings import Settings
@@ -23,6 +27,14 @@ class Sighting:
     detected: bool
     distance_m: float
     nearest_enu_m: Vec3 = ZERO
+    unknown: bool = False
+    """The sensor could not judge the corridor."""
+
+
+@dataclass(frozen=True)
+class _Heard:
+    sighting: Sighting
+    arrival_s: float
 
 
 @dataclass(frozen=True)
@@ -35,36 +47,53 @@ class Way:
 
 
 class ObstacleWatch:
-    """Remember the last sighting of each sensor and decide when to hold and when to go on."""
+    """Remember the last verdict of each sensor and decide when to hold and when to go on."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._sightings: dict[str, Sighting] = {}
+        self._heard: dict[str, _Heard] = {}
         self._last_in_way_s: float | None = None
 
-    def see(self, sighting: Sighting) -> None:
-        """Take a sensor's word."""
-        self._sightings[sighting.source] = sighting
+    def see(self, sighting: Sighting, now_s: float) -> None:
+        """Take a sensor's verdict; one that is no newer than the last one, or of the future, is none."""
+        last = self._heard.get(sighting.source)
+        if not sighting.stamp_s <= now_s + self._settings.watch_age_s:
+            sighting = replace(sighting, stamp_s=-math.inf)
+        if last is None or sighting.stamp_s > last.sighting.stamp_s or now_s < last.arrival_s:
+            self._heard[sighting.source] = _Heard(sighting, now_s)
 
-    def nearest_m(self, now_s: float) -> float:
-        """Return the distance to the nearest obstacle ahead; infinite when there is none or nobody watches."""
-        return min((sighting.distance_m for sighting in self._fresh(now_s)), default=math.inf)
+    def forget_sensors(self) -> None:
+        """Begin anew on the ground: nobody watches before somebody says so."""
+        self._heard.clear()
 
     def forget_hold(self) -> None:
         """Start anew with another reference: its way is another one."""
         self._last_in_way_s = None
 
+    def nearest_m(self, now_s: float) -> float:
+        """Return the distance to the nearest obstacle ahead; infinite when there is none or nobody watches."""
+        return min((s.distance_m for s in self._fresh(now_s) if _seen(s)), default=math.inf)
+
+    def unwatched(self, now_s: float) -> bool:
+        """Return whether somebody has watched in this flight, and nobody who watches now can judge the way."""
+        return bool(self._heard) and all(sighting.unknown for sighting in self._fresh(now_s))
+
     def blocked(self, way: Way, now_s: float) -> bool:
-        """Return whether to hold: something is in the way, or it was until less than half a second ago."""
-        if any(self._in_way(sighting, way) for sighting in self._fresh(now_s)):
+        """Return whether to hold: something is in the way, or was until less than half a second ago, or nobody watches."""
+        if any(_seen(sighting) and self._in_way(sighting, way) for sighting in self._fresh(now_s)):
             self._last_in_way_s = now_s
         elif self._last_in_way_s is not None and now_s - self._last_in_way_s >= self._settings.obstacle_clear_s:
             self._last_in_way_s = None
-        return self._last_in_way_s is not None
+        return self._last_in_way_s is not None or self.unwatched(now_s)
 
     def _fresh(self, now_s: float) -> list[Sighting]:
-        age_s = self._settings.obstacle_age_s
-        return [s for s in self._sightings.values() if s.detected and abs(now_s - s.stamp_s) < age_s and not math.isnan(s.distance_m)]
+        """Return the verdicts that still hold: just arrived, and on a measurement that is not old."""
+        settings = self._settings
+        return [
+            heard.sighting
+            for heard in self._heard.values()
+            if abs(now_s - heard.arrival_s) <= settings.watch_age_s and now_s - heard.sighting.stamp_s <= settings.obstacle_age_s
+        ]
 
     def _in_way(self, sighting: Sighting, way: Way) -> bool:
         settings = self._settings
@@ -73,6 +102,10 @@ class ObstacleWatch:
             return False
         needed_m = braking_distance(way.speed_m_s, settings.max_accel_m_s2) + settings.obstacle_clearance_m
         return sighting.distance_m < max(settings.obstacle_stop_m, needed_m) and not _aside(sighting, way)
+
+
+def _seen(sighting: Sighting) -> bool:
+    return sighting.detected and not math.isnan(sighting.distance_m)
 
 
 def _aside(sighting: Sighting, way: Way) -> bool:

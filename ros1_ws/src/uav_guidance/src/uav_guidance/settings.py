@@ -47,8 +47,10 @@ class Settings:
     """An obstacle in the way nearer than this (from the vehicle's centre) makes it brake and hold."""
     obstacle_clearance_m: float = 2.0
     """It also brakes in time to stop this far off; an obstacle that stays farther than this from the target is not in the way."""
-    obstacle_age_s: float = 1.0
-    """An older message does not count."""
+    watch_age_s: float = 0.25
+    """Longer after the arrival of a sensor's last verdict nobody watches, and the vehicle brakes. Sensors send at 10 Hz."""
+    obstacle_age_s: float = 0.6
+    """A verdict on an older measurement does not count, even if it has just arrived."""
     obstacle_clear_s: float = 0.5
     """For so long the way must be clear before it goes on."""
 

@@ -135,12 +135,15 @@ class ImuDriver:
 class Drivers:
     """All drivers, each at its time; what a late sensor has measured is published when it arrives."""
 
-    def __init__(self, simulation: Simulation, measured: Callable[[str, float], None]) -> None:
-        """``measured`` is told the sensor and the stamp (seconds) of what was published."""
+    def __init__(self, simulation: Simulation, measured: Callable[[str, float, float], None]) -> None:
+        """``measured`` is told the sensor, the stamp of what was published, and the present time (seconds)."""
         self._simulation = simulation
         self._measured = measured
         rngs = [np.random.default_rng([simulation.seed, 6, n]) for n in range(3)]
         self._drivers: list[Driver] = [ZedDriver(simulation, rngs[0]), LidarDriver(simulation, rngs[1]), ImuDriver(simulation, rngs[2])]
+        errors = simulation.imperfections
+        latency_s = {"zed": errors.zed_latency_s, "lidar": errors.lidar_latency_s, "imu": errors.imu_latency_s}
+        self._latency_ns = {sensor: round(seconds * 1e9) for sensor, seconds in latency_s.items()}
         self._under_way: dict[str, deque[tuple[int, Measurement]]] = {driver.sensor: deque() for driver in self._drivers}
 
     def publish_due(self) -> None:
@@ -154,7 +157,8 @@ class Drivers:
             elif now_ns // TICK_NS % driver.every_ticks == driver.at_tick:
                 measurement = driver.measure(mode, degradation.FUTURE_NS if mode is SensorMode.FUTURE else 0)
                 if measurement is not None:
-                    under_way.append((now_ns + (degradation.LATE_NS if mode is SensorMode.LATE else 0), measurement))
+                    late_ns = degradation.LATE_NS if mode is SensorMode.LATE else 0
+                    under_way.append((now_ns + self._latency_ns[driver.sensor] + late_ns, measurement))
             while under_way and under_way[0][0] <= now_ns:
                 self._publish(driver.sensor, mode, under_way.popleft()[1])
 
@@ -162,4 +166,4 @@ class Drivers:
         measurement.publish()
         # Nobody can be waited for who rightly refuses a stamp of the future.
         if mode is not SensorMode.FUTURE:
-            self._measured(sensor, measurement.taken_ns * 1e-9)
+            self._measured(sensor, measurement.taken_ns * 1e-9, self._simulation.now_s)

@@ -19,9 +19,11 @@ from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
 from alula_common.faults import FaultError, parse_faults
 from uav_simulator import ros_messages
-from uav_simulator.autopilot.tcp_link import TcpLink
+from uav_simulator.autopilot.link_server import LinkServer
+from uav_simulator.autopilot.params import parse_parameters
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError
+from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.pacing import Pacer, header_stamp_s
 from uav_simulator.pilot_hooks import apply_pilot_word
 from uav_simulator.sensors.faults import FAULTS
@@ -43,10 +45,18 @@ class SimulatorNode:
         self._settings = settings
         config = load_world(find_world(settings.world))
         faults = parse_faults(settings.faults, FAULTS)
-        self._simulation = Simulation(config, seed=settings.seed, faults=faults, boot_before_s=settings.boot_before_s)
+        self._simulation = simulation = Simulation(
+            config,
+            seed=settings.seed,
+            faults=faults,
+            boot_before_s=settings.boot_before_s,
+            params=parse_parameters(settings.autopilot_params),
+            ground_link=settings.gcs_port >= 0,
+            imperfections=parse_imperfections(settings.imperfections),
+        )
         if settings.world_path:
             write_mesh(Path(settings.world_path), self._simulation.world.vertices, self._simulation.world.triangles)
-        self._link = TcpLink(self._simulation.endpoint, settings.mavlink_port)
+        self._link = LinkServer(simulation.endpoint, simulation.ground_endpoint, port=settings.mavlink_port, gcs_port=settings.gcs_port)
         self._pacer = Pacer(settings.pace_topics, limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
         self._pilot_words: queue.SimpleQueue[str] = queue.SimpleQueue()
         # Holds more ticks than a pace limit lets through at once, so a paced run loses none; flat out, the oldest may be dropped.
@@ -60,6 +70,8 @@ class SimulatorNode:
         self._left_out: list[str] = []
         self._stopping = threading.Event()
         rospy.set_param("~mavlink_port", self._link.port)
+        if settings.gcs_port >= 0:
+            rospy.set_param("~gcs_port", self._link.gcs_port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
         rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
         for topic in (word.partition("=")[0] for word in settings.pace_topics):

@@ -16,7 +16,10 @@ class Settings:
     world: str = "yard"  # name of a world that comes with the simulator, or a world file
     world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
     faults: str = ""  # between commas; how each is written: alula_common.faults, what there is: sensors.faults
-    mavlink_port: int = 5760  # on loopback; 0: any free one, told by /sim/state's neighbour ~mavlink_port
+    imperfections: str = "off"  # off, realistic, or NAME=VALUE,... as in imperfections.py
+    mavlink_port: int = 5760  # TCP on loopback, for the companion; 0: any free one, which the parameter then tells
+    gcs_port: int = -1  # UDP on loopback, for a ground station; 0: any free one, which the parameter then tells; -1: one is made up
+    autopilot_params: str = ""  # NAME=VALUE,... on top of autopilot.params.DEFAULTS, for example FS_GCS_ENABLE=1
     rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
     pace_topics: tuple[str, ...] = ()  # of those who work for simulated time: TOPIC, or TOPIC=SENSOR for who deals with its measurements
     pace_limit_s: float = 0.3

@@ -7,13 +7,16 @@ same commands give the same flight, images and clouds.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from alula_common.faults import FaultRequest
 from uav_simulator.autopilot.core import Autopilot
 from uav_simulator.autopilot.endpoint import Endpoint
 from uav_simulator.autopilot.types import LandedState
+from uav_simulator.autopilot.estimator import PERFECT
 from uav_simulator.contacts import ContactMonitor
+from uav_simulator.imperfections import Imperfections
 from uav_simulator.sensors.faults import SensorBoard
 from uav_simulator.sensors.imu import Imu
 from uav_simulator.sensors.lidar import Lidar
@@ -46,17 +49,32 @@ class State:
 class Simulation:
     """Steps everything; who runs it decides when, and asks for the measurements it wants."""
 
-    def __init__(self, config: WorldConfig, *, seed: int, faults: list[FaultRequest], boot_before_s: float) -> None:
+    def __init__(
+        self,
+        config: WorldConfig,
+        *,
+        seed: int,
+        faults: Sequence[FaultRequest] = (),
+        boot_before_s: float = 60.0,
+        params: Mapping[str, float] | None = None,
+        ground_link: bool = False,
+        imperfections: Imperfections = PERFECT,
+    ) -> None:
+        """``params`` of the autopilot; ``ground_link``: a ground station speaks over a link of its own, so none is made up."""
         airframe = Airframe()
         self.seed = seed
         self.now_ns = 0
         self.world = World(build_parts(config, seed))
         self.vehicle = Hexacopter(airframe, Wind(seed=seed), config.home, yaw_rad=0.0)
-        self.autopilot = Autopilot(self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s)
-        self.endpoint = Endpoint(self.autopilot)
-        self.stereo = StereoPair(self.world, seed)
-        self.lidar = Lidar(self.world, seed)
-        self.imu = Imu(seed)
+        self.autopilot = Autopilot(self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections)
+        self.endpoint = Endpoint(self.autopilot, gcs_present=not ground_link)
+        self.ground_endpoint = Endpoint(self.autopilot, gcs_present=False) if ground_link else None
+        if self.ground_endpoint is not None:
+            self.endpoint.connect(self.ground_endpoint)
+        self.imperfections = imperfections
+        self.stereo = StereoPair(self.world, seed, noise=imperfections.pixel_noise, exposure=imperfections.exposure)
+        self.lidar = Lidar(self.world, seed, noise_m=imperfections.range_noise_m)
+        self.imu = Imu(seed, gyro_bias_rad_s=imperfections.gyro_bias_rad_s, accel_bias_m_s2=imperfections.accel_bias_m_s2)
         self.sensors = SensorBoard(faults)
         self.track = PoseTrack()
         self._contacts = ContactMonitor(self.world, airframe.radius_m)
@@ -82,6 +100,8 @@ class Simulation:
         self.now_ns += TICK_NS
         self.autopilot.step(self.now_s, TICK_S)
         self.endpoint.step()
+        if self.ground_endpoint is not None:
+            self.ground_endpoint.step()
         landed_state = self.autopilot.landed_state
         if self.lift_off_s is None and landed_state is not LandedState.ON_GROUND:
             self.lift_off_s = self.now_s

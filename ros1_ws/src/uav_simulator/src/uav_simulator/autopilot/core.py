@@ -7,9 +7,10 @@ The numbers in brackets are those of the observed behaviours of ArduCopter that 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from uav_simulator.autopilot.estimator import READY_AFTER_S, Estimator
+from uav_simulator.autopilot.estimator import ALIGNED_AFTER_S, LOCATED_AFTER_S, PERFECT, Estimator
 from uav_simulator.autopilot.failsafe import Failsafes
 from uav_simulator.autopilot.ground_contact import TouchDown
 from uav_simulator.autopilot.navigator import Goal, Navigator
@@ -18,6 +19,7 @@ from uav_simulator.autopilot.return_home import ReturnHome
 from uav_simulator.autopilot.setpoint import RawSetpoint, read_setpoint
 from uav_simulator.autopilot.types import LandedState, Mode, Notice, Result, Severity, SystemStatus, Text
 from uav_simulator.frames import Vec3, wrap_pi
+from uav_simulator.imperfections import Imperfections
 from uav_simulator.vehicle.airframe import Airframe
 from uav_simulator.vehicle.controller import Gains, PositionLoop
 from uav_simulator.vehicle.hexacopter import Hexacopter
@@ -25,6 +27,9 @@ from uav_simulator.vehicle.hexacopter import Hexacopter
 SPOOL_UP_S = 2.4
 DISARM_AFTER_LANDING_S = 0.5
 SLOW_LANDING_BELOW_M = 10.0
+MANUAL = (Mode.STABILIZE, Mode.ALT_HOLD)  # need no position
+EARLY_S, EARLY_STAY_S = 2.0, 1.4  # a mode that needs a position and is taken so early after power-up does not stay
+PREARM_PERIOD_S = 30.0  # of the texts that say what is missing
 NOT_ARMABLE = (Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE)
 FORCE_MAGIC = 21196.0  # param2 of MAV_CMD_COMPONENT_ARM_DISARM
 
@@ -41,11 +46,20 @@ class Takeoff:
 class Autopilot:
     """Flies a hexacopter; ``step`` every 20 ms."""
 
-    def __init__(self, vehicle: Hexacopter, airframe: Airframe, *, seed: int, boot_before_s: float) -> None:
+    def __init__(
+        self,
+        vehicle: Hexacopter,
+        airframe: Airframe,
+        *,
+        seed: int,
+        boot_before_s: float,
+        params: Mapping[str, float] | None = None,
+        imperfections: Imperfections = PERFECT,
+    ) -> None:
         self._vehicle = vehicle
         self._boot_before_s = boot_before_s
-        self.params = Parameters()
-        self._estimator = Estimator(seed)
+        self.params = Parameters(params)
+        self._estimator = Estimator(seed, imperfections)
         self.estimate = self._estimator.step(vehicle.body, 0.0)
         self._position_loop = PositionLoop(airframe, Gains())
         self._touch_down = TouchDown(airframe.hover_thrust_n)
@@ -62,7 +76,9 @@ class Autopilot:
         self._return: ReturnHome | None = None
         self._texts: list[Text] = []
         self._notices: list[Notice] = []
-        if self.ready:
+        self._falls_back_s = math.inf
+        self._prearm_due_s = 0.0
+        if self.located:
             self.home = self.estimate.position
 
     # --- what a client can see ---------------------------------------------------------------------------------------
@@ -73,9 +89,14 @@ class Autopilot:
         return self.now_s + self._boot_before_s
 
     @property
+    def located(self) -> bool:
+        """Return whether the estimator has a position [4]."""
+        return self.boot_s >= LOCATED_AFTER_S
+
+    @property
     def ready(self) -> bool:
-        """Return whether the pre-arm checks pass: the estimator has settled and has a position [4]."""
-        return self.boot_s >= READY_AFTER_S
+        """Return whether the pre-arm checks pass: the estimator has settled, and has a position where the mode needs one [4]."""
+        return self.boot_s >= ALIGNED_AFTER_S if self.mode in MANUAL else self.located
 
     @property
     def landed_state(self) -> LandedState:
@@ -124,6 +145,8 @@ class Autopilot:
             return self._refused("Mode change to AUTO failed: init failed")
         if mode is not self.mode:
             self._enter(mode)
+            early = self.boot_s < EARLY_S and mode not in MANUAL
+            self._falls_back_s = self.now_s + EARLY_STAY_S if early else math.inf
         return Result.ACCEPTED
 
     def arm(self, *, force: bool = False) -> Result:
@@ -131,8 +154,7 @@ class Autopilot:
         if self.armed:
             return Result.ACCEPTED
         if not self.ready and not force:
-            self._say(Severity.CRITICAL, "Arm: AHRS: EKF3 not started")
-            return self._refused("Arm: Need Position Estimate")
+            return self._refused(f"Arm: {self._missing}")
         if self.mode in NOT_ARMABLE:
             return self._refused(f"Arm: {self.mode.name} mode not armable")
         self._say(Severity.INFO, "Arming motors")
@@ -223,12 +245,13 @@ class Autopilot:
 
     def step(self, now_s: float, dt_s: float) -> None:
         """Decide and set the vehicle's targets for the next period."""
-        was_ready = self.ready
+        was_located = self.located
         self.now_s = now_s
         self.estimate = self._estimator.step(self._vehicle.body, dt_s)
-        if self.ready and not was_ready:
+        if self.located and not was_located:
             self._notices.append(Notice.ORIGIN)
             self._set_home()
+        self._wait_for_readiness()
         if self.armed and self._failsafes.gcs_falls_silent(now_s):
             self._fail_safe("GCS Failsafe")
         self._progress_takeoff()
@@ -245,6 +268,23 @@ class Autopilot:
     def _refused(self, text: str) -> Result:
         self._say(Severity.CRITICAL, text)
         return Result.FAILED
+
+    @property
+    def _missing(self) -> str:
+        """Return what the pre-arm checks miss, in ArduCopter's words."""
+        return "Need Position Estimate" if self.boot_s >= ALIGNED_AFTER_S else "AHRS: not using configured AHRS type"
+
+    def _wait_for_readiness(self) -> None:
+        """Say now and then what is missing; leave a mode that was taken too early [4]."""
+        if self.now_s >= self._falls_back_s:
+            self._falls_back_s = math.inf
+            if not self.armed and self.mode not in MANUAL:
+                self._enter(Mode.STABILIZE)
+        if self.ready or self.armed:
+            self._prearm_due_s = self.now_s
+        elif self.now_s >= self._prearm_due_s and self.boot_s >= EARLY_S:
+            self._prearm_due_s = self.now_s + PREARM_PERIOD_S
+            self._say(Severity.CRITICAL, f"PreArm: {self._missing}")
 
     def _set_home(self) -> None:
         self.home = self.estimate.position

@@ -1,4 +1,4 @@
-"""The MAVLink side of the autopilot: bytes in, bytes out; it knows one link and nothing of sockets.
+"""The MAVLink side of the autopilot: bytes in, bytes out; an endpoint knows one link and nothing of sockets.
 
 Packing and parsing are pymavlink's, dialect ardupilotmega, MAVLink 2.
 """
@@ -28,13 +28,16 @@ Message = Any  # pymavlink's messages have no types
 class Endpoint:
     """One link: parses what comes, acknowledges, streams what was asked for.
 
-    A ground station on another link is part of the picture: its heartbeats are forwarded to this one, as ArduPilot does, so
+    Texts and notices go to every link of the autopilot, and the heartbeats of one are forwarded to the others, as ArduPilot does.
+    Where no other link is open for a ground station (``connect``), one is part of the picture: its heartbeats come to this link, so
     that a client which does not filter on system and component is found out.
     """
 
-    def __init__(self, pilot: Autopilot) -> None:
+    def __init__(self, pilot: Autopilot, *, gcs_present: bool = True) -> None:
+        """``gcs_present``: a ground station is part of the picture."""
         self._pilot = pilot
-        self.gcs_present = True
+        self.gcs_present = gcs_present
+        self._others: list[Endpoint] = []
         self._gcs_due_s = 0.0
         self._timesync_due_s = 0.0
         self._out = bytearray()
@@ -68,6 +71,11 @@ class Endpoint:
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
             mavlink.MAV_CMD_REQUEST_MESSAGE: lambda p: self._send_once(round(p[0])),
         }
+
+    def connect(self, other: Endpoint) -> None:
+        """Share the autopilot with another link."""
+        self._others.append(other)
+        other._others.append(self)
 
     def open_link(self) -> None:
         """Begin with a fresh link: nothing asked for, nothing left over."""
@@ -112,10 +120,11 @@ class Endpoint:
     def _tell(self) -> None:
         """Send texts and what changed."""
         builders = {Notice.HEARTBEAT: telemetry.heartbeat, Notice.HOME: telemetry.home_position, Notice.ORIGIN: telemetry.gps_global_origin}
-        for text in self._pilot.take_texts():
-            self._send(mavlink.MAVLink_statustext_message(int(text.severity), text.text[:50].encode()))
-        for notice in dict.fromkeys(self._pilot.take_notices()):
-            self._send(builders[notice](self._pilot))
+        messages = [mavlink.MAVLink_statustext_message(int(text.severity), text.text[:50].encode()) for text in self._pilot.take_texts()]
+        messages += [builders[notice](self._pilot) for notice in dict.fromkeys(self._pilot.take_notices())]
+        for message in messages:
+            for endpoint in (self, *self._others):
+                endpoint._send(message)  # noqa: SLF001 - one class
 
     def _send_once(self, message_id: int) -> Result:
         builder = telemetry.BUILDERS.get(message_id)
@@ -131,6 +140,8 @@ class Endpoint:
 
     def _on_heartbeat(self, message: Message) -> None:
         self._hear_gcs(message.get_srcSystem())
+        for endpoint in self._others:
+            endpoint._out += message.get_msgbuf()  # noqa: SLF001 - one class
 
     def _on_command_long(self, message: Message) -> None:
         params = [message.param1, message.param2, message.param3, message.param4, message.param5, message.param6, message.param7]

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import dataclass
 
 from uav_simulator.frames import Quat, Vec3, wrap_pi
+from uav_simulator.imperfections import Imperfections
 from uav_simulator.vehicle.noise import SlowNoise
 from uav_simulator.vehicle.quaternion import euler_zyx, from_yaw, multiply
 from uav_simulator.vehicle.rigid_body import RigidBody
 
-READY_AFTER_S = 40.0  # of power: tilt alignment, GPS fix, origin
+ALIGNED_AFTER_S = 23.0  # of power: tilt alignment; enough for modes that need no position
+LOCATED_AFTER_S = 42.0  # of power: GPS fix, origin, position
+PERFECT = Imperfections()
+HOVER_M_S = 0.2  # slower is no travel
+BEARING_RAD_SQRT_M = 0.05  # how fast the drift changes its direction
 
 
 @dataclass(frozen=True)
@@ -34,22 +40,60 @@ class Estimate:
         return wrap_pi(self.euler[2])
 
 
-class Estimator:
-    """Adds the errors; each axis stays within 1.7 cm, so the position within 3 cm."""
+class Drift:
+    """An error of position and heading that grows with the way flown, and jumps now and then. Zero on the ground before the first flight."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, imperfections: Imperfections, seed: int) -> None:
+        self._imperfections = imperfections
+        self._random = random.Random(f"ekf drift {seed}")  # noqa: S311 - repeatable on purpose
+        self._turn_sign = self._random.choice((-1.0, 1.0))
+        self._bearing_rad = self._random.uniform(-math.pi, math.pi)
+        self._last: Vec3 | None = None
+        self._jump_due_s = imperfections.jump_every_s
+        self.offset: Vec3 = (0.0, 0.0, 0.0)
+        self.yaw_rad = 0.0
+
+    def step(self, body: RigidBody, dt_s: float) -> None:
+        """Go on with the body."""
+        here, last = body.position, self._last or body.position
+        self._last = here
+        if body.on_ground:
+            return
+        # A standing vehicle's hover is no way: the wind moves it by centimetres.
+        way_m = math.hypot(here[0] - last[0], here[1] - last[1]) if math.hypot(*body.velocity[:2]) > HOVER_M_S else 0.0
+        limits = self._imperfections
+        self._bearing_rad += self._random.gauss(0.0, BEARING_RAD_SQRT_M) * math.sqrt(way_m)
+        self._move(limits.position_drift * way_m, self._bearing_rad)
+        self.yaw_rad += self._turn_sign * math.radians(limits.yaw_drift_deg) * way_m / 100.0
+        self._jump_due_s -= dt_s
+        if limits.position_jump_m > 0.0 and self._jump_due_s <= 0.0:
+            self._jump_due_s += max(limits.jump_every_s, 1.0)
+            self._move(limits.position_jump_m, self._random.uniform(-math.pi, math.pi))
+
+    def _move(self, length_m: float, bearing_rad: float) -> None:
+        x, y, z = self.offset
+        self.offset = (x + length_m * math.cos(bearing_rad), y + length_m * math.sin(bearing_rad), z)
+
+
+class Estimator:
+    """Adds the errors; without any drift each axis stays within 1.7 cm, so the position within 3 cm."""
+
+    def __init__(self, seed: int, imperfections: Imperfections = PERFECT) -> None:
+        self._drift = Drift(imperfections, seed)
         self._position = SlowNoise(sigma=0.007, tau_s=20.0, limit=0.017, seed=f"ekf position {seed}")
         self._velocity = SlowNoise(sigma=0.01, tau_s=2.0, limit=0.03, seed=f"ekf velocity {seed}")
         self._yaw = SlowNoise(sigma=math.radians(0.3), tau_s=30.0, limit=math.radians(1.0), seed=f"ekf yaw {seed}")
 
     def step(self, body: RigidBody, dt_s: float) -> Estimate:
         """Return the estimate of a body's state."""
-        dp, dv, yaw = self._position.step(dt_s), self._velocity.step(dt_s), self._yaw.step(dt_s)[0]
+        dp, dv = self._position.step(dt_s), self._velocity.step(dt_s)
+        self._drift.step(body, dt_s)
+        yaw, drift = self._yaw.step(dt_s)[0] + self._drift.yaw_rad, self._drift.offset
         if body.on_ground:
             dv = (0.0, 0.0, 0.0)  # zero-velocity updates hold the filter while the vehicle stands
         p, v = body.position, body.velocity
         return Estimate(
-            position=(p[0] + dp[0], p[1] + dp[1], p[2] + dp[2]),
+            position=(p[0] + dp[0] + drift[0], p[1] + dp[1] + drift[1], p[2] + dp[2] + drift[2]),
             velocity=(v[0] + dv[0], v[1] + dv[1], v[2] + dv[2]),
             attitude=multiply(from_yaw(yaw), body.attitude),
             rates=body.rates,

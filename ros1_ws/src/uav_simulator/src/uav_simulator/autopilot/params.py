@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from alula_common.located_yaml import choices
+
+from uav_simulator.errors import ConfigError
+
 DEFAULTS: dict[str, float] = {
     "ATC_SLEW_YAW": 6000.0,  # cdeg/s
     "DISARM_DELAY": 10.0,  # s on the ground
@@ -24,11 +30,25 @@ DEFAULTS: dict[str, float] = {
 }
 
 
+def parse_parameters(text: str) -> dict[str, float]:
+    """Read ``NAME=VALUE,...``, for example ``FS_GCS_ENABLE=1``; raises ConfigError naming the wrong word."""
+    values = {}
+    for word in (w.strip() for w in text.split(",") if w.strip()):
+        name, _, value = word.partition("=")
+        if name not in DEFAULTS:
+            raise ConfigError(f"autopilot parameter {word!r}: there is no {name!r}; there are {choices(name, DEFAULTS)}")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            raise ConfigError(f"autopilot parameter {word!r}: {value!r} is no number") from None
+    return values
+
+
 class Parameters:
     """Named floats in the order of their names."""
 
-    def __init__(self) -> None:
-        self._values = dict(DEFAULTS)
+    def __init__(self, changes: Mapping[str, float] | None = None) -> None:
+        self._values = DEFAULTS | dict(changes or {})
         self.names = tuple(sorted(self._values))
 
     def __getitem__(self, name: str) -> float:

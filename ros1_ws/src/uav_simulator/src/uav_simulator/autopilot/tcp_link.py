@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import select
 import socket
 
 from uav_simulator.autopilot.endpoint import Endpoint
@@ -30,17 +29,33 @@ class TcpLink:
         self._server.setblocking(False)
         self.port: int = self._server.getsockname()[1]
 
-    def serve(self, wait_s: float = 0.0) -> None:
-        """Handle what has come, or comes within ``wait_s``, and send what is ready."""
-        self._flush()
-        waiting = [self._client] if self._client else [self._server]
-        readable, _, _ = select.select(waiting, [], [], max(0.0, wait_s))
-        if not readable:
-            return
+    @property
+    def socket(self) -> socket.socket:
+        """The socket to wait for."""
+        return self._client or self._server
+
+    def receive(self) -> None:
+        """Handle what has come: a client, or its bytes."""
         if self._client is None:
             self._accept()
         self._receive()
-        self._flush()
+
+    def send(self) -> None:
+        """Send what is ready."""
+        out = self._endpoint.take_output()
+        if self._client is None:
+            return
+        self._unsent += out
+        try:
+            if self._unsent:
+                sent = self._client.send(self._unsent)
+                del self._unsent[:sent]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._drop()
+        if len(self._unsent) > OUT_LIMIT:
+            self._drop()
 
     def close(self) -> None:
         """Let the client go and free the port."""
@@ -48,7 +63,10 @@ class TcpLink:
         self._server.close()
 
     def _accept(self) -> None:
-        self._client, _ = self._server.accept()
+        try:
+            self._client, _ = self._server.accept()
+        except BlockingIOError:
+            return
         self._client.setblocking(False)
         self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._endpoint.open_link()
@@ -71,20 +89,4 @@ class TcpLink:
         if data:
             self._endpoint.feed(data)
         else:
-            self._drop()
-
-    def _flush(self) -> None:
-        out = self._endpoint.take_output()
-        if self._client is None:
-            return
-        self._unsent += out
-        try:
-            if self._unsent:
-                sent = self._client.send(self._unsent)
-                del self._unsent[:sent]
-        except BlockingIOError:
-            pass
-        except OSError:
-            self._drop()
-        if len(self._unsent) > OUT_LIMIT:
             self._drop()

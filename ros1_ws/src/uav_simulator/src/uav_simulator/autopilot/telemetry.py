@@ -80,8 +80,10 @@ def attitude_quaternion(pilot: Autopilot) -> Message:
     return mavlink.MAVLink_attitude_quaternion_message(boot_ms(pilot), w, x, y, z, p, q, r)
 
 
-def local_position(pilot: Autopilot) -> Message:
-    """Return LOCAL_POSITION_NED."""
+def local_position(pilot: Autopilot) -> Message | None:
+    """Return LOCAL_POSITION_NED, None as long as there is no position."""
+    if not pilot.located:
+        return None
     return mavlink.MAVLink_local_position_ned_message(
         boot_ms(pilot), *ned_from_enu(pilot.estimate.position), *ned_from_enu(pilot.estimate.velocity)
     )
@@ -137,7 +139,7 @@ def home_position(pilot: Autopilot) -> Message | None:
 
 def gps_global_origin(pilot: Autopilot) -> Message | None:
     """Return GPS_GLOBAL_ORIGIN, None as long as there is none."""
-    if not pilot.ready:
+    if not pilot.located:
         return None
     lat, lon, alt = ORIGIN
     return mavlink.MAVLink_gps_global_origin_message(round(lat * 1e7), round(lon * 1e7), round(alt * 1000))

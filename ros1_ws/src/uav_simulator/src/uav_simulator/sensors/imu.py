@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from dataclasses import dataclass
 
@@ -24,10 +25,11 @@ class ImuReading:
 class Imu:
     """Measures a body."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, *, gyro_bias_rad_s: float = 0.0, accel_bias_m_s2: float = 0.0) -> None:
+        """Standard deviations of the biases, on top of those that are always there."""
         self._random = random.Random(f"imu {seed}")  # noqa: S311 - repeatable on purpose
-        self._gyro_bias = self._noisy((0.0, 0.0, 0.0), GYRO_BIAS_RAD_S)
-        self._accel_bias = self._noisy((0.0, 0.0, 0.0), ACCEL_BIAS_M_S2)
+        self._gyro_bias = self._noisy((0.0, 0.0, 0.0), math.hypot(GYRO_BIAS_RAD_S, gyro_bias_rad_s))
+        self._accel_bias = self._noisy((0.0, 0.0, 0.0), math.hypot(ACCEL_BIAS_M_S2, accel_bias_m_s2))
 
     def measure(self, rates: Vec3, specific_force: Vec3) -> ImuReading:
         """Return one reading."""

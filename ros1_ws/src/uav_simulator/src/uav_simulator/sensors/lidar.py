@@ -32,8 +32,10 @@ class LidarSpec:
 class Lidar:
     """Scans a world along a track of poses."""
 
-    def __init__(self, world: World, seed: int, spec: LidarSpec | None = None) -> None:
+    def __init__(self, world: World, seed: int, spec: LidarSpec | None = None, *, noise_m: float = 0.0) -> None:
+        """``noise_m``: standard deviation of the ranges on top of the specification's."""
         self.spec = spec or LidarSpec()
+        self._noise_m = math.hypot(self.spec.noise_m, noise_m)
         self._world = world
         self._rng = np.random.default_rng([seed, 5])
         spec = self.spec
@@ -54,7 +56,7 @@ class Lidar:
         spec = self.spec
         seen = (hits.triangle != NO_HIT) & (hits.range_m >= spec.min_range_m) & (hits.range_m <= spec.max_range_m)
         triangles = hits.triangle[seen]
-        ranges = hits.range_m[seen] + self._rng.normal(0.0, spec.noise_m, len(triangles))
+        ranges = hits.range_m[seen] + self._rng.normal(0.0, self._noise_m, len(triangles))
         facing = np.abs(np.einsum("ij,ij->i", self._world.normals[triangles], rays[seen][:, 3:]))
         points = np.empty(len(triangles), dtype=POINT_DTYPE)
         points["x"], points["y"], points["z"] = (self._directions[seen] * ranges[:, None]).T

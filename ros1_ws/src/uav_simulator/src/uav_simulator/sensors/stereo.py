@@ -6,6 +6,7 @@ of the block's triangle. That is a quarter of the rays at the price of outlines 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from uav_simulator.sensors.mounts import STEREO_BASELINE_M, ZED_LEFT, ZED_RIGHT, rotation_matrix
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.texture import GRAINS, layer, noise_tiles, surface_table
+from uav_simulator.vehicle.noise import SlowNoise
 from uav_simulator.world.scene import NO_HIT, World
 
 Floats = NDArray[np.float64]
@@ -24,6 +26,7 @@ SKY_M = 100.0  # only the scale of the clouds: both eyes see the sky alike, at a
 SKY_GREY = 190.0
 PIXEL_NOISE = 2.0  # grey values, standard deviation
 NOISE_BANK = 1 << 20
+FRAME_S = 0.1  # from one pair to the next
 
 
 @dataclass(frozen=True)
@@ -48,13 +51,15 @@ class Pinhole:
 class StereoPair:
     """Renders what both eyes see from a pose."""
 
-    def __init__(self, world: World, seed: int, camera: Pinhole | None = None) -> None:
+    def __init__(self, world: World, seed: int, camera: Pinhole | None = None, *, noise: float = 0.0, exposure: float = 0.0) -> None:
+        """``noise``: standard deviation of grey values on top of 2; ``exposure``: part by which the brightness wanders."""
+        self._exposure = SlowNoise(sigma=exposure / 2.0, tau_s=4.0, limit=exposure, seed=f"exposure {seed}")
         self.camera = camera or Pinhole()
         self._world = world
         self._table = surface_table(world, seed)
         self._tiles = noise_tiles(seed)
         self._rng = np.random.default_rng([seed, 3])
-        self._noise = np.random.default_rng([seed, 4]).normal(0.0, PIXEL_NOISE, NOISE_BANK).astype(np.float32)
+        self._noise = np.random.default_rng([seed, 4]).normal(0.0, math.hypot(PIXEL_NOISE, noise), NOISE_BANK).astype(np.float32)
         cx, cy = self.camera.centre_px
         x = (np.arange(0, self.camera.width, 2) + 0.5 - cx) / self.camera.focal_px
         y = (np.arange(0, self.camera.height, 2) + 0.5 - cy) / self.camera.focal_px
@@ -69,6 +74,7 @@ class StereoPair:
         eyes = np.array([np.asarray(pose.position) + r_map_body @ np.asarray(m.translation) for m in (ZED_LEFT, ZED_RIGHT)])
         index, depth = self._cast(r_map_camera, eyes)
         grey = self._shade(index, depth, self._coefficients(r_map_camera, eyes))
+        grey *= np.float32(1.0 + self._exposure.step(FRAME_S)[0])
         start = int(self._rng.integers(0, NOISE_BANK - grey.size))
         grey += self._noise[start : start + grey.size].reshape(grey.shape)
         images = np.clip(grey, 0.0, 255.0).astype(np.uint8)
