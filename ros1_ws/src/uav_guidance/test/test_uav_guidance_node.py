@@ -70,7 +70,7 @@ class Bench:
     def state(self) -> GuidanceState:
         return self.states[-1] if self.states else GuidanceState()
 
-    def until(self, condition: Callable[[GuidanceState], bool], what: str, timeout_s: float = 15.0) -> None:
+    def until(self, condition: Callable[[GuidanceState], bool], what: str, timeout_s: float = 60.0) -> None:
         wait_until(lambda: bool(self.states) and condition(self.state), timeout_s=timeout_s, what=what)
 
     def call(self, name: str, kind: type, *arguments: object) -> object:

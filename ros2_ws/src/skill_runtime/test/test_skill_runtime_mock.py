@@ -233,7 +233,7 @@ def test_faults_wait_for_their_anchor_and_are_noticed_late(read):
 
 
 def test_a_fault_with_an_end_gives_back_what_it_took(read):
-    text = "faults: {pilot: {delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, 'pilot:twice': {set: {flying.axes: USED}}}"
+    text = "faults: {pilot: {delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, 'pilot:twice': {set: {flying.sdk: UNAVAILABLE}}}"
     mocked = Mocked(read(text))
     mocked.play.fail(FaultRequest("pilot", "rudely", 2.0, 5.0))
     mocked.world.run_for(2.6)
