@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from alula_common.faults import FaultRequest
 from uav_simulator.autopilot.core import Autopilot
 from uav_simulator.autopilot.endpoint import Endpoint
-from uav_simulator.autopilot.types import LandedState
 from uav_simulator.autopilot.estimator import PERFECT
+from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor
 from uav_simulator.imperfections import Imperfections
 from uav_simulator.sensors.faults import SensorBoard
@@ -66,7 +66,9 @@ class Simulation:
         self.now_ns = 0
         self.world = World(build_parts(config, seed))
         self.vehicle = Hexacopter(airframe, Wind(seed=seed), config.home, yaw_rad=0.0)
-        self.autopilot = Autopilot(self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections)
+        self.autopilot = Autopilot(
+            self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections
+        )
         self.endpoint = Endpoint(self.autopilot, gcs_present=not ground_link)
         self.ground_endpoint = Endpoint(self.autopilot, gcs_present=False) if ground_link else None
         if self.ground_endpoint is not None:

@@ -41,7 +41,7 @@ class Estimate:
 
 
 class Drift:
-    """An error of position and heading that grows with the way flown, and jumps now and then. Zero on the ground before the first flight."""
+    """An error of position and heading that grows with the way flown and jumps now and then; zero before the first flight."""
 
     def __init__(self, imperfections: Imperfections, seed: int) -> None:
         self._imperfections = imperfections
