@@ -71,26 +71,25 @@ def worlds(*names: str, **known: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("world", [*names, *failing])
 
 
-LOST = "answers are lost when many questions are asked at once"
 ORPHAN = "a goal that its client has given up runs on"
 
 
-@worlds("ros1", "local", ros2=LOST)
+@worlds("ros1", "ros2", "local")
 def test_each_of_100_transitions_at_once_is_answered(attack):
     assert attack("hundred_transitions") == {"unanswered": []}
 
 
-@worlds("ros1", "local", ros2=LOST)
+@worlds("ros1", "ros2", "local")
 def test_each_of_300_goals_at_once_is_served(attack):
     assert attack("three_hundred_goals") == {"outcomes": {"RUNNING": 1, "NOT_READY": 299}, "messages": []}
 
 
-@worlds("ros1", "local", ros2=LOST)
+@worlds("ros1", "ros2", "local")
 def test_each_of_20_pauses_at_once_is_answered(attack):
     assert attack("twenty_pauses") == {"unanswered": [], "refused": []}
 
 
-@worlds("ros1", ros2="the process aborts when its spinning thread is still there")
+@worlds("ros1", "ros2")
 def test_a_script_may_end_without_closing_its_client(attack):
     found = attack("unclosed")
     assert (found["outcome"], found["code"]) == ("INTERRUPTED", 0), found
@@ -98,12 +97,12 @@ def test_a_script_may_end_without_closing_its_client(attack):
     assert "Traceback" not in found["said"]
 
 
-@worlds(ros1=ORPHAN, ros2=ORPHAN)
+@worlds("ros2", ros1=ORPHAN)
 def test_what_a_client_has_given_up_does_not_run_on_when_frozen_managers_come_back(attack):
     assert attack("freeze") == {"before": "FAILED", "meanwhile": "FAILED", "afterwards": ""}
 
 
-@worlds(ros1="the first managers are shut down", ros2="both serve")
+@worlds("ros2", ros1="the first managers are shut down")
 def test_second_managers_of_a_skillset_refuse_to_start(attack):
     found = attack("second_managers")
     assert found["code"] == 2, found

@@ -10,7 +10,7 @@ import yaml
 
 from skill_model.model import Skill
 
-FLOATS = ("double", "float")
+FLOATS = ("float64", "float32")
 TRUE, FALSE = ("true", "yes", "1", "on"), ("false", "no", "0", "off")
 
 
@@ -20,7 +20,7 @@ class FormError(ValueError):
 
 @dataclass(frozen=True)
 class Field:
-    """One input: ``kind`` as ROS names it (``double``, ``geometry_msgs/Point``), ``said`` what the model says of it."""
+    """One input: ``kind`` as ROS names it (``float64``, ``geometry_msgs/Point``), ``said`` what the model says of it."""
 
     name: str
     kind: str
@@ -50,11 +50,11 @@ def default_text(kind: str) -> str:
         return "0.0"
     if kind.startswith(("int", "uint")) and "[" not in kind:
         return "0"
-    if kind == "boolean":
+    if kind == "bool":
         return "false"
     if kind == "string":
         return ""
-    if kind.startswith("sequence<") or "[" in kind:
+    if "[" in kind:
         return "[]"
     return "0, 0, 0" if kind.endswith(("/Point", "/Vector3", "/Point32")) else "{}"
 
@@ -71,7 +71,7 @@ def value_of(field: Field, text: str) -> object:
     """
     if field.kind == "string":
         return text
-    if field.kind == "boolean":
+    if field.kind == "bool":
         return _truth(field, text)
     if field.kind in FLOATS:
         return _number(field, text, float)

@@ -12,6 +12,8 @@ from typing import Any
 
 from skill_model.model import Resource, Skillset
 from skill_model.situation import Situation
+from skill_runtime.core.events import EngineEvent, ExecutionEvent
+from skill_runtime.core.records import SkillRecord
 from skill_runtime.core.why import unmet
 
 NANOSECONDS = 1e9
@@ -97,20 +99,18 @@ class SkillsetView:
             self._states = dict(states)
             self.version += 1
 
-    def heard_event(self, event: Any) -> None:
-        """Take a skillset_interfaces/Event."""
-        self.say(f"{_stamp(event.header.stamp)}  {_told(event)}")
+    def heard_event(self, event: EngineEvent) -> None:
+        """Take an event."""
+        self.say(f"{event.stamp_ns / NANOSECONDS:.2f}  {_told(event)}")
 
-    def heard_skills(self, skills: Mapping[str, Any]) -> None:
-        """Take a skillset_interfaces/SkillState by skill."""
+    def heard_skills(self, skills: Mapping[str, SkillRecord]) -> None:
+        """Take what is known by skill."""
         with self._lock:
             open_ones = [(name, one) for name, skill in skills.items() for one in skill.open]
-            known = self._running
-            self._running = {
-                one.id: Running(one.id, name, one.state, known[one.id].progress if one.id in known else None) for name, one in open_ones
-            }
-            ends = {name: skill.last[0] for name, skill in skills.items() if skill.last}
-            self._last = {name: " ".join(word for word in (last.state, last.result) if word) for name, last in ends.items()}
+            progress = {identifier: one.progress for identifier, one in self._running.items()}
+            self._running = {one.id: Running(one.id, name, one.state.value, progress.get(one.id)) for name, one in open_ones}
+            ends = {name: skill.last for name, skill in skills.items() if skill.last is not None}
+            self._last = {name: " ".join(word for word in (last.state.value, last.result) if word) for name, last in ends.items()}
             self.version += 1
 
     def heard_progress(self, execution_id: str, progress: float) -> None:
@@ -208,12 +208,8 @@ def _named(fields: dict[str, Any]) -> Any:
     return fields["data"] if set(fields) == {"data"} else SimpleNamespace(**fields)
 
 
-def _stamp(stamp: Any) -> str:
-    return f"{stamp.sec + stamp.nanosec / NANOSECONDS:.2f}"
-
-
-def _told(event: Any) -> str:
-    if event.skill:
-        words = [event.skill, event.id[:6], event.state, event.result]
+def _told(event: EngineEvent) -> str:
+    if isinstance(event, ExecutionEvent):
+        words = [event.skill, event.id[:6], event.state.value, event.result]
         return " ".join(word for word in words if word) + (f": {event.message}" if event.message else "")
     return f"{event.resource} {event.from_state} -> {event.to_state} by {event.cause}"

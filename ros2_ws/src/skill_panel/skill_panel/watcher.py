@@ -11,6 +11,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from skill_panel.view import SkillsetView
+from skill_runtime.core.events import EngineEvent
+from skill_runtime.core.records import SkillRecord
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Report, SkillHandle
 from skill_runtime.ros2.client import SkillsetClient
@@ -45,7 +47,7 @@ class Watched:
         self.client = SkillsetClient(node, name, namespace=space or "/")
         self.view: SkillsetView | None = None
         self._handles: dict[str, SkillHandle] = {}
-        self._heard: list[Any] = []
+        self._heard: list[EngineEvent] = []
         self._asked: dict[str, Pending[DataReading]] = {}
         self.client.on_event(self._on_event)
         self.client.on_change(self._on_change)
@@ -134,7 +136,7 @@ class Watched:
         if answer.failure:
             self.say(f"{what}: {answer.failure}")
 
-    def _on_event(self, event: Any) -> None:
+    def _on_event(self, event: EngineEvent) -> None:
         if self.view is None:
             self._heard.append(event)
         else:
@@ -144,7 +146,7 @@ class Watched:
         if self.view is not None:
             self.view.heard_states(states)
 
-    def _on_skills(self, skills: dict[str, Any]) -> None:
+    def _on_skills(self, skills: dict[str, SkillRecord]) -> None:
         if self.view is not None:
             self.view.heard_skills(skills)
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from skill_model.execution_state import ExecutionState
 from skill_model.model import (
     Comparison,
     DataIs,
@@ -22,6 +23,7 @@ from skill_model.model import Data as ModelData
 from skill_panel.form import Field, FormError, fields, value_of, values
 from skill_panel.memory import Memory
 from skill_panel.view import DataRow, ResourceRow, Running, SkillRow, SkillsetView, one_line
+from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 
 FULL = DataIs("battery", ("percentage",), Comparison.GT, 0.2)
 GO = Skill(
@@ -41,11 +43,11 @@ def view():
 
 
 def execution(identifier: str, state: str, result: str = ""):
-    return SimpleNamespace(id=identifier, state=state, result=result)
+    return SimpleNamespace(id=identifier, state=ExecutionState(state), result=result)
 
 
 def skills(**states):
-    return {name: SimpleNamespace(open=open_ones, last=last) for name, (open_ones, last) in states.items()}
+    return {name: SimpleNamespace(open=open_ones, last=last[0] if last else None) for name, (open_ones, last) in states.items()}
 
 
 def test_resources_have_the_extern_transitions_that_are_possible(view):
@@ -98,10 +100,9 @@ def test_skills_show_what_runs_and_how_it_ended(view):
 
 def test_the_log_and_the_version_follow_every_change(view):
     before = view.version
-    stamp = SimpleNamespace(sec=12, nanosec=340_000_000)
-    common = {"header": SimpleNamespace(stamp=stamp)}
-    view.heard_event(SimpleNamespace(**common, skill="go", id="0123456789ab", state="NOT_READY", result="open", message="door is SHUT"))
-    view.heard_event(SimpleNamespace(**common, skill="", resource="door", from_state="SHUT", to_state="OPEN", cause="extern"))
+    stamp_ns = 12_340_000_000
+    view.heard_event(ExecutionEvent(1, stamp_ns, "go", "0123456789ab", ExecutionState.NOT_READY, "open", "door is SHUT", None, {}))
+    view.heard_event(TransitionEvent(2, stamp_ns, "door", "SHUT", "OPEN", "extern"))
     assert list(view.log) == ["12.34  go 012345 NOT_READY open: door is SHUT", "12.34  door SHUT -> OPEN by extern"]
     assert (view.logged, view.version) == (2, before + 2)
     view.heard_life(alive=True)  # nothing new
@@ -114,11 +115,11 @@ def test_values_fit_on_a_line():
     assert one_line(json.dumps("x" * 99), width=10) == "x" * 9 + "…"
 
 
-KINDS = {"speed": "double", "tries": "int64"}
+KINDS = {"speed": "float64", "tries": "int64"}
 
 
 def test_fields_begin_with_what_was_last_used_or_the_models_default():
-    assert [(field.text, field.label) for field in fields(GO, KINDS, {})] == [("0.0", "speed (double, m/s)"), ("3", "tries (int64)")]
+    assert [(field.text, field.label) for field in fields(GO, KINDS, {})] == [("0.0", "speed (float64, m/s)"), ("3", "tries (int64)")]
     made = fields(GO, KINDS, {"speed": "2.5", "gone": "1"})
     assert [field.text for field in made] == ["2.5", "3"]
     assert values(made, {"speed": " 1e-1 ", "tries": "4"}) == {"speed": 0.1, "tries": 4}
@@ -127,13 +128,13 @@ def test_fields_begin_with_what_was_last_used_or_the_models_default():
 @pytest.mark.parametrize(
     ("kind", "text", "value"),
     [
-        ("boolean", "Yes", True),
-        ("boolean", "off", False),
+        ("bool", "Yes", True),
+        ("bool", "off", False),
         ("string", "1, 2", "1, 2"),
         ("geometry_msgs/Point", "1, 2, 3", [1, 2, 3]),
         ("geometry_msgs/Point", "{x: 1, y: 2.5}", {"x": 1, "y": 2.5}),
-        ("sequence<double>", "[1, 2]", [1, 2]),
-        ("sequence<double>", "[]", []),
+        ("float64[]", "[1, 2]", [1, 2]),
+        ("float64[]", "[]", []),
         ("uint8", "7", 7),
     ],
 )
@@ -144,12 +145,12 @@ def test_what_texts_mean(kind, text, value):
 @pytest.mark.parametrize(
     ("kind", "text", "said"),
     [
-        ("double", "fast", "f: 'fast' is no number"),
+        ("float64", "fast", "f: 'fast' is no number"),
         ("int32", "1.5", "f: '1.5' is no whole number"),
-        ("boolean", "maybe", "f: write true or false, not 'maybe'"),
+        ("bool", "maybe", "f: write true or false, not 'maybe'"),
         ("geometry_msgs/Point", "here", "f: 'here' is no geometry_msgs/Point; write it as 1, 2, 3"),
         ("geometry_msgs/Pose", "{x", "f: '{x' is no geometry_msgs/Pose; write it as {field: value}"),
-        ("sequence<double>", "7", r"f: '7' is no sequence<double>; write it as [1, 2]"),
+        ("float64[]", "7", r"f: '7' is no float64[]; write it as [1, 2]"),
     ],
 )
 def test_texts_that_mean_nothing_are_told_by_name(kind, text, said):

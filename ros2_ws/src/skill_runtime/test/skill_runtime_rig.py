@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import threading
 
 import navigation_interfaces.action as navigation_actions
@@ -19,9 +20,9 @@ from alula_testing import waits
 from alula_testing.recorder import Recorder
 from alula_testing.ros2 import spin
 from skill_model.execution_state import ExecutionState
+from skill_runtime.hook_processes import HookServer, RemoteHooks, pipe_address
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 from skill_runtime.ros2.names import EVENTS
-from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode
 
 S = ExecutionState
 SOON_S = 10.0
@@ -58,6 +59,7 @@ class Spinning:
 
     def __init__(self) -> None:
         self.running: list = []
+        self.pipes: list = []
 
     def spin(self, node):
         executor = SingleThreadedExecutor()
@@ -67,6 +69,15 @@ class Spinning:
         self.running.append((node, executor, thread))
         return node
 
+    def elsewhere(self, skillset, hooks) -> RemoteHooks:
+        """Have hooks called over the pipe, as if they were in processes of their own."""
+        address = pipe_address("test", str(next(NUMBERS)), str(os.getpid()))
+        remote = RemoteHooks(skillset, address, print)
+        self.pipes += [HookServer(skillset.name, skill, one, address, print) for skill, one in hooks.items()]
+        assert remote.wait(READY_S) == []
+        self.pipes.append(remote)
+        return remote
+
     def close(self) -> None:
         for node, executor, thread in reversed(self.running):
             if hasattr(node, "close"):
@@ -74,6 +85,8 @@ class Spinning:
             executor.shutdown(timeout_sec=5.0)
             thread.join(5.0)
             node.destroy_node()
+        for pipe in self.pipes:
+            pipe.close(*() if isinstance(pipe, RemoteHooks) else ("the test is over", 5.0))
 
 
 class Navigation:
@@ -85,9 +98,9 @@ class Navigation:
             hooks.make_inputs = lambda values, name=name: ABSTRACT_HOOKS[name].inputs_type(**values)
         namespace = str(node_options.get("namespace", ""))
         if separate:
-            self.managers = spinning.spin(SeparateResourceNode(SKILLSET, navigation_actions, **node_options))
-            for name in self.hooks:
-                spinning.spin(SkillNode(SKILLSET, name, navigation_actions, lambda _: self.hooks, **node_options))
+            self.managers = spinning.spin(
+                SkillsetNode(SKILLSET, navigation_actions, spinning.elsewhere(SKILLSET, self.hooks), **node_options)
+            )
         else:
             self.managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, lambda _: self.hooks, **node_options))
         self.node = Node(f"skill_runtime_tester_{next(NUMBERS)}", namespace=namespace)

@@ -35,7 +35,6 @@ from skill_runtime.core import ExecutionEvent  # noqa: E402
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode  # noqa: E402
 from skill_runtime.ros2.convert import fields_of, values_of  # noqa: E402
 from skill_runtime.ros2.names import action_type  # noqa: E402
-from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode  # noqa: E402
 
 NAMES = dict(zip(SKILLS, ("land", "hover", "takeoff"), strict=True))
 """Skills of the random model, and those of the navigation whose actions they have."""
@@ -57,23 +56,12 @@ class LiveBench:
         # Each example has a namespace of its own: DDS forgets the nodes of the last one only after a while.
         self.place = {"namespace": f"race{next(NUMBERS)}"}
         limit = [Parameter("interrupt_timeout_s", value=STOP_S)]
-        self.managers = self.make(SeparateResourceNode if separate else SkillsetNode, limit, separate=separate)
+        hooks = spinning.elsewhere(self.skillset, self.hooks) if separate else (lambda _: self.hooks)
+        self.managers = spinning.spin(
+            SkillsetNode(self.skillset, navigation_actions, hooks, data_bindings={}, parameter_overrides=limit, **self.place)
+        )
+        self.managers.managers.on_step.insert(0, lambda events: self.steps.append(tuple(events)))
         self.engine = self.managers.engine
-
-    def make(self, kind, limit, *, separate: bool):
-        steps = self.steps
-
-        class Recording(kind):
-            def on_step(self, events) -> None:
-                steps.append(tuple(events))
-                super().on_step(events)
-
-        hooks = () if separate else (lambda _: self.hooks,)
-        managers = Recording(self.skillset, navigation_actions, *hooks, data_bindings={}, parameter_overrides=limit, **self.place)
-        if separate:
-            for name in self.hooks:
-                self.spinning.spin(SkillNode(self.skillset, name, navigation_actions, lambda _: self.hooks, **self.place))
-        return self.spinning.spin(managers)
 
     def connect(self) -> None:
         node = Node(f"skill_runtime_racer_{next(NUMBERS)}", **self.place)

@@ -16,6 +16,7 @@ from skill_model.execution_state import ExecutionState
 from skill_runtime.bench.cases import FREE, INPUT, LOST, Case, make_skillset, resource_name, skill_name
 from skill_runtime.bench.processes import follow
 from skill_runtime.bench.servers import ACTION, BARE_ACTION, BARE_TOPIC, make_interfaces
+from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.ros2 import SkillHandle, SkillsetClient
 from skill_runtime.ros2.names import EVENTS
 from skill_runtime.ros2.session import Session
@@ -132,11 +133,12 @@ class SkillRequests:
         request_ms.append((states.wait(ExecutionState.RUNNING) - asked_ns) / NS_PER_MS)
         return index, states
 
-    def _hear(self, event: Any) -> None:
+    def _hear(self, event: EngineEvent) -> None:
         with self._news:
-            if event.kind == Event.TRANSITION and event.to_state == LOST:
-                self._lost_ns[event.resource] = Time.from_msg(event.header.stamp).nanoseconds
-            elif event.kind == Event.EXECUTION and event.state == ExecutionState.RESOURCE_INVARIANT_VIOLATED.value:
+            if isinstance(event, TransitionEvent):
+                if event.to_state == LOST:
+                    self._lost_ns[event.resource] = event.stamp_ns
+            elif event.state is ExecutionState.RESOURCE_INVARIANT_VIOLATED:
                 self._told_ns[event.id] = self._now_ns()
             self._news.notify_all()
 

@@ -13,7 +13,6 @@ from skill_runtime.bench.clients import follow_bare, follow_skills
 from skill_runtime.bench.figures import Load, Measured, Samples, idle_percent, join, times_of
 from skill_runtime.bench.processes import Child, usage
 from skill_runtime.bench.servers import serve_bare, serve_managers
-from skill_runtime.ros2.skill_manager import RESULT_KEPT_S
 
 Say = Callable[[str], None]
 
@@ -80,8 +79,7 @@ class Bench:
 
 
 def rest(server: Child, idle_s: float) -> Load:
-    """Return what a process takes from when its last results are forgotten, over a time of wall clock."""
-    time.sleep(RESULT_KEPT_S)
+    """Return what a process takes over a time of wall clock in which nothing is asked of it."""
     begin_s, before = time.monotonic(), usage(server.pid)
     time.sleep(idle_s)
     after = usage(server.pid)

@@ -17,11 +17,12 @@ from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
 from skill_model.model import Skillset
+from skill_model.ros_types import camel
 from skill_runtime.bench.cases import Case, make_skillset
 from skill_runtime.bench.processes import follow
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2 import SkillsetNode
-from skill_runtime.ros2.names import EVENTS, camel
+from skill_runtime.ros2.names import EVENTS
 from skill_runtime.ros2.session import Session
 from skill_runtime.ros2.spin import spin_until
 

@@ -116,11 +116,13 @@ class ClientNews:
         self.heard += 1
         self.states_after = states.after
         self.resources = {name: value.state for name, value in states.resources.items()}
-        for callback in self.on_changes:
-            callback(dict(self.resources))
-        for tracker in self._trackers():
-            tracker.settle()
-        self.connection.heard_states()
+        try:
+            for callback in self.on_changes:
+                callback(dict(self.resources))
+        finally:
+            for tracker in self._trackers():
+                tracker.settle()
+            self.connection.heard_states()
 
     def _on_told(self, told: Told) -> None:
         event = told.event
@@ -134,11 +136,13 @@ class ClientNews:
             self._last_transition = event.sequence
         if gap:
             self._ask_endings()
-        # A goal that has ended by an event ends after all others know of the event.
-        for callback in self.on_events:
-            callback(event)
-        if isinstance(event, ExecutionEvent):
-            self._follow_event(event, told.life)
+        try:
+            for callback in self.on_events:
+                callback(event)
+        finally:
+            # Whatever a callback raises: a goal that has ended ends for its handle.
+            if isinstance(event, ExecutionEvent):
+                self._follow_event(event, told.life)
 
     def _follow_event(self, event: ExecutionEvent, life: str) -> None:
         if event.state.terminal:

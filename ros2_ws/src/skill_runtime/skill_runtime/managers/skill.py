@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from skill_model.execution_state import ExecutionState
 from skill_model.model import Skill
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import ExecutionEvent
@@ -51,15 +50,20 @@ class SkillManager:
 
     def _on_goal(self, goal: Goal) -> None:
         self._goals[goal.id] = goal
+        inputs, problem = self._inputs(goal)
         # Registered here, on the loop that also brings cancellations: none finds its execution unknown.
+        self._engine.register(self._skill.name, inputs, execution_id=goal.id)
+        if problem:
+            self._engine.fail(goal.id, problem)
+        else:
+            self._engine.run(goal.id, self._middleware.defer)
+
+    def _inputs(self, goal: Goal) -> tuple[object, str]:
+        """Return what hooks get, or the plain inputs and what is wrong with them: they are made by the developer's class."""
         try:
-            self._engine.register(self._skill.name, self._make_inputs(self._skill.name, goal.inputs), execution_id=goal.id)
-        except Exception as error:  # noqa: BLE001 - inputs are made by the developer's class
-            del self._goals[goal.id]
-            message = f"the request could not be taken down: {type(error).__name__}: {error}"
-            goal.finish(ExecutionEvent(0, 0, self._skill.name, goal.id, ExecutionState.FAILED, "", message, None, {}))
-            return
-        self._engine.run(goal.id, self._middleware.defer)
+            return self._make_inputs(self._skill.name, goal.inputs), ""
+        except Exception as error:  # noqa: BLE001 - told to the caller
+            return dict(goal.inputs), f"the request could not be taken down: {type(error).__name__}: {error}"
 
     def _on_cancel(self, goal_id: str) -> None:
         self._middleware.defer(lambda: self._engine.interrupt(goal_id))

@@ -3,7 +3,7 @@
 from skill_runtime.handle import SkillHandle
 from skill_runtime.ros2.client import SkillsetClient
 from skill_runtime.ros2.hooks_ros import RosHooks
-from skill_runtime.ros2.manager_node import SkillsetNode
+from skill_runtime.ros2.node import SkillsetNode
 from skill_runtime.ros2.robot import Robot
 from skill_runtime.ros2.spin import run_skillset
 

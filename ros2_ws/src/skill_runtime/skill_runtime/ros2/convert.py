@@ -1,17 +1,12 @@
-"""Fields of ROS 2 messages, and inputs of skills as plain values."""
+"""Fields of ROS 2 messages."""
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skill_runtime.fitting import INTEGERS
-from skill_runtime.plain import FieldTypes, to_plain
-
-if TYPE_CHECKING:
-    from skill_runtime.hooks import SkillHooks
+from skill_runtime.plain import FieldTypes
 
 _ARRAY = re.compile(r"^sequence<(.*?)(, \d+)?>$|\[.*\]$")
 
@@ -30,16 +25,15 @@ _TYPES = FieldTypes(fields_of, _element_of, floats={"double", "float"}, integers
 fill = _TYPES.fill
 values_of = _TYPES.values_of
 
-
-def values_from_json(action: Any, skill: str, inputs_json: str) -> dict[str, object]:
-    """Return a skill's inputs as plain values; raise ValueError where the JSON is no object of inputs that fit the goal."""
-    values = json.loads(inputs_json)
-    if not isinstance(values, dict):
-        raise ValueError(f"inputs of {skill} are a JSON object, not {inputs_json}")  # noqa: TRY004 - as for every other misfit
-    plain: dict[str, object] = to_plain(fill(action.Goal(), values, f"inputs of {skill}"))
-    return plain
+_PLAIN_NAMES = {"double": "float64", "float": "float32", "boolean": "bool"}
 
 
-def inputs_from_values(hooks: SkillHooks, action: Any, skill: str, values: Mapping[str, object]) -> object:
-    """Make what hooks get from plain values of the inputs; raise ValueError where they don't fit."""
-    return hooks.make_inputs(values_of(fill(action.Goal(), values, f"inputs of {skill}")))
+def ros_types(message: Any) -> dict[str, str]:
+    """Return a message's fields with their types as interface files have them: ``float64``, ``geometry_msgs/Point[]``."""
+    return {name: _interface_type(kind) for name, kind in fields_of(message).items()}
+
+
+def _interface_type(kind: str) -> str:
+    if element := _element_of(kind):
+        return f"{_interface_type(element)}[]"
+    return _PLAIN_NAMES.get(kind, kind)

@@ -8,8 +8,8 @@ import sys
 from types import ModuleType
 
 from skill_model.model import Skillset
-from skill_runtime.ros2.data_manager import DataBindings
-from skill_runtime.ros2.manager_node import HooksFactory
+from skill_runtime.managers import DataBindings
+from skill_runtime.ros2.node import HooksFactory
 from skill_runtime.ros2.spin import run_skillset
 
 

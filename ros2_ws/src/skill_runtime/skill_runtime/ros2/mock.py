@@ -27,10 +27,10 @@ from skill_language.load import load_robot
 from skill_language.robot import Robot
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.managers import DataBindings
 from skill_runtime.mock import Behaviour, Play, load_behaviour, starter
-from skill_runtime.ros2.data_manager import DataBindings
-from skill_runtime.ros2.manager_node import SkillsetNode
 from skill_runtime.ros2.mock_stage import RosStage
+from skill_runtime.ros2.node import SkillsetNode
 from skill_runtime.ros2.spin import ros2_arguments, spin_until
 
 CANNOT_START = 2

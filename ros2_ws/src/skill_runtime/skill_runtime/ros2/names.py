@@ -8,15 +8,21 @@ from types import ModuleType
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
+from skill_model.ros_types import camel
+
 LIVELINESS_LEASE_S = 2.0
 """Without a sign of life for so long (wall clock), a manager process is taken for dead; DDS itself sends the signs."""
 
-LATCHED = QoSProfile(
-    depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
-EVENTS = QoSProfile(
-    depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
-)
+
+def latched(depth: int) -> QoSProfile:
+    """Return the quality of topics that keep their last messages for who subscribes late."""
+    return QoSProfile(
+        depth=depth, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    )
+
+
+LATCHED = latched(1)
+EVENTS = latched(1000)
 ALIVE = QoSProfile(
     depth=1,
     history=HistoryPolicy.KEEP_LAST,
@@ -25,25 +31,12 @@ ALIVE = QoSProfile(
     liveliness=LivelinessPolicy.AUTOMATIC,
     liveliness_lease_duration=Duration(seconds=LIVELINESS_LEASE_S),
 )
-"""``LATCHED`` with signs of life, for ``resource_states``."""
+"""``LATCHED`` with signs of life, for ``alive``."""
 
-LINK = QoSProfile(
-    depth=1000,
-    history=HistoryPolicy.KEEP_LAST,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-    liveliness=LivelinessPolicy.AUTOMATIC,
-    liveliness_lease_duration=Duration(seconds=LIVELINESS_LEASE_S),
-)
-"""Between the resource manager and the skill managers in other processes."""
-
-GOALS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
-"""Of the services of an action: with ROS's default, the eleventh request of a burst is lost."""
-
-
-def camel(skill: str) -> str:
-    """Return the interface's name of a skill: ``goto_straight`` to ``GotoStraight``."""
-    return "".join(word[:1].upper() + word[1:] for word in skill.split("_"))
+SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
+"""Of all services: with ROS's default, the eleventh request of a burst is lost."""
+SOURCE = QoSProfile(depth=10)
+"""Of the functional layer's topics."""
 
 
 def action_module(skillset: str) -> ModuleType:

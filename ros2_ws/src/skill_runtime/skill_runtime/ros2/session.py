@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import threading
 import traceback
@@ -33,6 +34,8 @@ class Session:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._spin, name=f"{name}_spin", daemon=True)
         self._thread.start()
+        # A script that ends without closing: the spinning thread must not be in DDS when the interpreter goes.
+        atexit.register(self.close)
 
     def follow_clock(self) -> None:
         """Take the mission clock of ``/clock`` where somebody publishes one."""
@@ -40,7 +43,10 @@ class Session:
             self.node.set_parameters([Parameter("use_sim_time", value=True)])
 
     def close(self) -> None:
-        """End the spinning, the node and the context."""
+        """End the spinning, the node and the context; a second call does nothing."""
+        atexit.unregister(self.close)
+        if self._over.is_set():
+            return
         self._over.set()
         self._executor.shutdown(timeout_sec=0)
         if threading.current_thread() is not self._thread:

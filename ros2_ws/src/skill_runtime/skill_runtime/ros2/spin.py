@@ -4,24 +4,35 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
+import os
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from types import FrameType, ModuleType
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Header
 
 from skill_model.model import Skillset
-from skill_runtime.ros2.data_manager import DataBindings
-from skill_runtime.ros2.manager_node import HooksFactory, SkillsetNode
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.hook_processes import RemoteHooks, pipe_address
+from skill_runtime.managers import DataBindings
+from skill_runtime.ros2.names import latched
+from skill_runtime.ros2.node import HooksFactory, HooksNode, SkillsetNode
 from skill_runtime.ros2.processes import RESOURCES, end_with, supervise, wait_for
-from skill_runtime.ros2.separate import SeparateResourceNode, SkillNode
 
 END_S = 2.0
+LISTEN_FIRST_S = 0.5
+"""How long (wall clock) managers that begin listen for others."""
+PROCESSES_S = 0.5
+REFUSED = 2
 END_LIMIT_S = 30.0
 """Wall clock; hooks may take some seconds to stop their functions."""
 ROS_ARGUMENTS = "--ros-args"
@@ -64,24 +75,68 @@ def run_skillset(
         return
     # Our own handlers: rclpy's would shut the context down before the callers were told.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+    refusals: list[str] = []
+
+    def refuse(reason: str) -> None:
+        refusals.append(reason)
+        stop.set()
+
     try:
-        node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings)
-        spin_until(node, stop, at_stop=_limit_the_end)
-        node.destroy_node()
+        if options.part in {ALL, RESOURCES} and rivals_there(skillset.name):
+            refuse(f"managers of {skillset.name} are there already; end them first")
+        else:
+            address = pipe_address(os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
+            node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
+            if node is not None:
+                spin_until(node, stop, at_stop=_limit_the_end)
+                node.destroy_node()
+    except SkillRuntimeError as error:
+        refuse(str(error))
     finally:
         rclpy.try_shutdown()
         faulthandler.cancel_dump_traceback_later()
+    if refusals:
+        sys.stderr.write(f"{refusals[0]}\n")
+        sys.exit(REFUSED)
+
+
+def rivals_there(skillset: str) -> bool:
+    """Tell whether managers of this skillset give signs of life, before anything is done that might disturb them."""
+    node = Node(skillset, enable_rosout=False)
+    heard: list[object] = []
+    node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    end_s = time.monotonic() + LISTEN_FIRST_S
+    while not heard and (left_s := end_s - time.monotonic()) > 0:
+        executor.spin_once(timeout_sec=left_s)
+    executor.shutdown(timeout_sec=0)
+    node.destroy_node()
+    return bool(heard)
 
 
 def make_part(
-    part: str, skillset: Skillset, interfaces: ModuleType, hooks_factory: HooksFactory, data_bindings: DataBindings | None
-) -> SkillsetNode | SeparateResourceNode | SkillNode:
-    """Make the node of a part: ``all`` managers, the ``resources``' or that of a skill."""
+    part: str,
+    skillset: Skillset,
+    interfaces: ModuleType,
+    hooks_factory: HooksFactory,
+    data_bindings: DataBindings | None,
+    *,
+    address: str,
+    stop: threading.Event,
+    on_rival: Callable[[str], None],
+) -> SkillsetNode | HooksNode | None:
+    """Make the node of a part: ``all`` managers, the ``resources``' or the hooks of a skill; None when ``stop`` came before."""
     if part == ALL:
-        return SkillsetNode(skillset, interfaces, hooks_factory, data_bindings=data_bindings)
-    if part == RESOURCES:
-        return SeparateResourceNode(skillset, interfaces, data_bindings=data_bindings)
-    return SkillNode(skillset, part, interfaces, hooks_factory)
+        return SkillsetNode(skillset, interfaces, hooks_factory, data_bindings=data_bindings, on_rival=on_rival)
+    if part != RESOURCES:
+        return HooksNode(skillset, part, hooks_factory, address)
+    hooks = RemoteHooks(skillset, address, get_logger(skillset.name).error)
+    # Who finds the skillset can call all of it.
+    while hooks.wait(PROCESSES_S):
+        if stop.is_set():
+            return None
+    return SkillsetNode(skillset, interfaces, hooks, data_bindings=data_bindings, on_rival=on_rival)
 
 
 def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
@@ -105,9 +160,7 @@ def nothing_more() -> None:
     """Do nothing more at the stop."""
 
 
-def spin_until(
-    node: SkillsetNode | SeparateResourceNode | SkillNode, stop: threading.Event, *, at_stop: Callable[[], None] = nothing_more
-) -> None:
+def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop: Callable[[], None] = nothing_more) -> None:
     """Spin a node in a thread of its own until ``stop``; then end its executions while it still spins.
 
     A callback that raises (most are of hooks) fails what runs, for nobody knows whose function is without its watch now;
@@ -127,7 +180,7 @@ def spin_until(
             except Exception as error:  # noqa: BLE001 - told and failed below
                 node.get_logger().error("".join(traceback.format_exception(error)))
                 last_line = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
-                node.engine.fail_all(f"a callback raised {last_line}")
+                node.fail_all(f"a callback raised {last_line}")
         stop.set()
 
     def end() -> None:

@@ -1,0 +1,230 @@
+"""Skills as ROS 2 actions: the server is rclpy's, the client speaks to its services and its feedback topic itself.
+
+So a client asks again for what got lost, with the same goal id, and needs no status messages; its results it hears by the events.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from action_msgs.msg import GoalInfo
+from action_msgs.srv import CancelGoal
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import GoalEvent, RCLError
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from unique_identifier_msgs.msg import UUID
+
+from skill_model.execution_state import ExecutionState
+from skill_runtime.core.events import ExecutionEvent
+from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnValue
+from skill_runtime.ros2.convert import fields_of, fill, ros_types, values_of
+from skill_runtime.ros2.names import SERVICE
+
+if TYPE_CHECKING:
+    from skill_runtime.ros2.middleware import RclpyMiddleware
+
+ID_DIGITS = 12
+UUID_BYTES = 16
+GOAL_S = 60.0
+"""How long a goal is offered to managers that don't answer; who has offered it gives up before."""
+_FEEDBACK_FIELDS = ("progress", "state")
+_RESULT_FIELDS = ("outcome", "result", "message")
+
+
+def execution_id(goal_id: Any) -> str:
+    """Return the execution's id of an action's goal: the first 12 hexadecimal digits of the goal's UUID."""
+    return bytes(goal_id.uuid).hex()[:ID_DIGITS]
+
+
+class RclpyGoal:
+    """A goal at its server."""
+
+    def __init__(self, server: RclpyServer, handle: Any) -> None:
+        self.id = execution_id(handle.goal_id)
+        self.inputs: Mapping[str, object] = values_of(handle.request)
+        self._server = server
+        self._handle = handle
+
+    def report(self, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
+        """Send feedback."""
+        feedback = self._server.action.Feedback(progress=progress, state=state.value)
+        self._server.fill_outputs(feedback, outputs)
+        self._handle.publish_feedback(feedback)
+
+    def finish(self, event: ExecutionEvent) -> None:
+        """Set the goal's state and send its result, on the executor: goals change state there only."""
+        self._server.finish(self._handle, event)
+
+
+class RclpyServer:
+    """A skill's action at its manager. Every goal is accepted: how its execution ends is its result."""
+
+    def __init__(
+        self, middleware: RclpyMiddleware, action: Any, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]
+    ) -> None:
+        self.action = action
+        self._middleware = middleware
+        self._skill = skill
+        self._on_goal = on_goal
+        self._on_cancel = on_cancel
+        self._server = ActionServer(
+            middleware.node,
+            action,
+            middleware.name(f"skill/{skill}"),
+            execute_callback=_unexpected,
+            goal_callback=lambda _: GoalResponse.ACCEPT,
+            handle_accepted_callback=middleware.on_loop(self._accepted),
+            cancel_callback=middleware.on_loop(self._cancel),
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            goal_service_qos_profile=SERVICE,
+            result_service_qos_profile=SERVICE,
+            cancel_service_qos_profile=SERVICE,
+        )
+
+    def inputs_of(self, plain: Mapping[str, object]) -> dict[str, object]:
+        """Return inputs as a goal carries them."""
+        return values_of(fill(self.action.Goal(), plain, f"inputs of {self._skill}"))
+
+    def fill_outputs(self, message: Any, outputs: Mapping[str, object]) -> str:
+        """Set the outputs of a message; return what is wrong with them, or ""."""
+        try:
+            fill(message, outputs, f"outputs of {self._skill}")
+        except ValueError as error:
+            self._middleware.log(str(error))
+            return str(error)
+        return ""
+
+    def finish(self, handle: Any, event: ExecutionEvent) -> None:
+        """End a goal."""
+        self._server.notify_execute(handle, lambda goal: self._result(goal, event))
+
+    def _accepted(self, handle: Any) -> None:
+        # Not `handle.execute()`, which would demand the result at once; the state belongs on the action's status topic.
+        handle._update_state(GoalEvent.EXECUTE)  # noqa: SLF001
+        self._on_goal(RclpyGoal(self, handle))
+
+    def _cancel(self, handle: Any) -> Any:
+        self._on_cancel(execution_id(handle.goal_id))
+        return CancelResponse.ACCEPT
+
+    def _result(self, handle: Any, event: ExecutionEvent) -> Any:
+        """Set the goal's state and return its result."""
+        result = self.action.Result(outcome=event.state.value, result=event.result, message=event.message)
+        wrong = self.fill_outputs(result, event.outputs)
+        if wrong:
+            result.message = f"{result.message} ({wrong})".strip()
+        try:
+            if event.state is ExecutionState.TERMINATED:
+                handle.succeed()
+            elif event.state is ExecutionState.INTERRUPTED and handle.is_cancel_requested:
+                handle.canceled()
+            else:
+                handle.abort()
+        except RCLError as error:
+            self._middleware.log(f"goal {event.id} of {self._skill}: {error}")
+        return result
+
+
+class RclpyLink:
+    """A skill's action at a client; the executor waits for it only while something is awaited of it."""
+
+    def __init__(self, middleware: RclpyMiddleware, action: Any, skill: str, listener: GoalListener) -> None:
+        self._middleware = middleware
+        self._action = action
+        self._skill = skill
+        self._listener = listener
+        self._lock = threading.Lock()
+        self._goals: dict[str, Any] = {}
+        place = f"skill/{skill}/_action"
+        self._send = middleware.calls(f"{place}/send_goal", action.Impl.SendGoalService)
+        self._cancel = middleware.calls(f"{place}/cancel_goal", CancelGoal)
+        self._result = middleware.calls(f"{place}/get_result", action.Impl.GetResultService)
+        self._feedback = middleware.resting_subscription(
+            f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback, awake=lambda: bool(self._goals)
+        )
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether the action's services are there."""
+        return self._send.ready and self._cancel.ready and self._result.ready
+
+    @property
+    def input_types(self) -> dict[str, str]:
+        """The inputs with their types."""
+        return ros_types(self._action.Goal)
+
+    def fit(self, inputs: Mapping[str, object], place: str) -> Any:
+        """Return the goal's message."""
+        return fill(self._action.Goal(), inputs, place)
+
+    def outputs_of(self, plain: Mapping[str, object]) -> dict[str, Any]:
+        """Return outputs as a result carries them."""
+        return _outputs(fill(self._action.Result(), plain, f"outputs of {self._skill}"), _RESULT_FIELDS)
+
+    def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:
+        """Send a goal."""
+        identifier = UUID(uuid=list(bytes.fromhex(goal_id) + os.urandom(UUID_BYTES - ID_DIGITS // 2)))
+        with self._lock:
+            self._goals[goal_id] = identifier
+
+        def answered(response: Any, tries: int) -> None:
+            # Who is offered a goal twice refuses the second offer; the first may have been taken.
+            if response.accepted or tries == 1:
+                on_answer(bool(response.accepted))
+
+        request = self._action.Impl.SendGoalService.Request(goal_id=identifier, goal=goal)
+        self._send.call(request, answered, _nothing, timeout_s=GOAL_S, once=False)
+
+    def cancel(self, goal_id: str) -> None:
+        """Cancel a goal."""
+        identifier = self._goals.get(goal_id)
+        if identifier is not None:
+            request = CancelGoal.Request(goal_info=GoalInfo(goal_id=identifier))
+            self._cancel.call(request, lambda *_: None, _nothing, timeout_s=CALL_S, once=False)
+
+    def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:
+        """Cancel all goals: a goal of zeros at a time of zero (action_msgs/srv/CancelGoal)."""
+        counted = lambda response, _: on_count(len(response.goals_canceling))  # noqa: E731
+        self._cancel.call(CancelGoal.Request(), counted, on_error, timeout_s=CALL_S, once=False)
+
+    def ask_ending(self, goal_id: str) -> None:
+        """Ask for a goal's result; who does not know the goal answers at once."""
+        identifier = self._goals.get(goal_id)
+        if identifier is None:
+            return
+
+        def answered(response: Any, _: int) -> None:
+            result = response.result
+            known = (
+                Ending(ExecutionState(result.outcome), result.result, result.message, _outputs(result, _RESULT_FIELDS))
+                if result.outcome
+                else None
+            )
+            self._listener.on_ending(goal_id, known)
+
+        self._result.call(self._action.Impl.GetResultService.Request(goal_id=identifier), answered, _nothing, timeout_s=GOAL_S, once=True)
+
+    def release(self, goal_id: str) -> None:
+        """Follow a goal no more."""
+        with self._lock:
+            self._goals.pop(goal_id, None)
+
+    def _on_feedback(self, message: Any) -> None:
+        goal_id = execution_id(message.goal_id)
+        if goal_id in self._goals:
+            self._listener.on_feedback(goal_id, message.feedback.progress, _outputs(message.feedback, _FEEDBACK_FIELDS))
+
+
+def _outputs(message: Any, others: tuple[str, ...]) -> dict[str, Any]:
+    return {name: getattr(message, name) for name in fields_of(message) if name not in others}
+
+
+def _nothing(reason: str) -> None:
+    """Leave it to who waits: the goal is given up elsewhere."""
+
+
+def _unexpected(handle: Any) -> Any:
+    raise RuntimeError(f"goal {execution_id(handle.goal_id)} was executed by somebody else")
