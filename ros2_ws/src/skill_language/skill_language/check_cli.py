@@ -16,12 +16,13 @@ from dataclasses import replace
 from time import monotonic
 
 from skill_language.errors import Diagnostic, Severity, has_errors, render
-from skill_language.models import ModelFile, check_files
+from skill_language.models import ModelFile, check_files, models_in
 from skill_language.notation import Notation
 from skill_language.printer import print_file
 from skill_model.model import Skillset
 
 UNREADABLE = "ALU0"
+FILES_HELP = "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input"
 EXIT_CODES = """
 exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of syntax) or a property fails; 2 a file can't be read
 (not there, no UTF-8 text, too large), or the arguments are wrong
@@ -31,9 +32,10 @@ exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of synt
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
     options = _parser().parse_args(arguments)
-    files = check_files(list(dict.fromkeys(options.files)))
+    paths = dict.fromkeys(path for given in options.files for path in models_in(given))
+    files = check_files(list(paths), sys.stdin.buffer)
     if options.proofs and options.to is None:
-        _prove(files, options.time)
+        _prove(files, options.time, closed_world=options.closed_world)
     for file in files:
         file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
     findings = [finding for file in files for finding in file.findings]
@@ -54,11 +56,19 @@ def exit_code(findings: Sequence[Diagnostic]) -> int:
 def _parser() -> argparse.ArgumentParser:
     description = "Read skill models, say what is wrong with them and where, and prove the rest."
     parser = argparse.ArgumentParser(prog="alula check", description=description, epilog=EXIT_CODES)
-    parser.add_argument("files", nargs="+", metavar="FILE", help="skillsets in the paper's notation (*.skill) or the Robot Language (*.rl)")
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help=FILES_HELP,
+    )
     parser.add_argument(
         "--json",
         action="store_true",
         help="print one JSON object: each finding's place, code, counterexample",
+    )
+    parser.add_argument(
+        "--closed-world", action="store_true", help="nothing takes an arrow that no effect of the model takes and that is not extern"
     )
     parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
     parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
@@ -67,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _prove(files: Sequence[ModelFile], timeout_s: float) -> None:
+def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> None:
     """Add the prover's findings about every skillset of a file that is free of errors."""
     # The prover brings its solvers along, which nobody should wait for who only converts.
     from skill_language.prove import prove
@@ -81,7 +91,8 @@ def _prove(files: Sequence[ModelFile], timeout_s: float) -> None:
             if number and monotonic() >= end:
                 found.append(_not_begun(file.skillsets[number:], timeout_s))
                 break
-            found += [finding.diagnostic() for finding in prove(skillset, timeout_s=max(0.0, end - monotonic()))]
+            proved = prove(skillset, closed_world=closed_world, timeout_s=max(0.0, end - monotonic()))
+            found += [finding.diagnostic() for finding in proved]
         file.add(found)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+from skill_language.stories import NO_STORY, Story
 from skill_model.model import NOWHERE, Span
 
 
@@ -22,7 +23,7 @@ class Diagnostic:
     """One finding.
 
     ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about.
-    ``counterexample`` tells a proof's way to the fault, a line for each state or step; empty where there is none.
+    ``example`` and ``story`` are a proof's counterexample: what must come together, and the run in which it does.
     """
 
     code: str
@@ -31,8 +32,14 @@ class Diagnostic:
     severity: Severity = Severity.ERROR
     hint: str = ""
     expected: tuple[str, ...] = ()
-    counterexample: tuple[str, ...] = ()
+    example: tuple[str, ...] = ()
+    story: Story = NO_STORY
     source_line: str = field(default="", compare=False)
+
+    @property
+    def counterexample(self) -> tuple[str, ...]:
+        """The lines of example and story."""
+        return (*self.example, *self.story.lines)
 
     def render(self) -> str:
         """Return the finding as text for people: place, code, message, the line with a caret, what was expected, hint."""
@@ -61,6 +68,7 @@ class Diagnostic:
             "hint": self.hint,
             "expected": list(self.expected),
             "counterexample": list(self.counterexample) or None,
+            "steps": [step.as_json() for step in self.story.steps] or None,
         }
 
 

@@ -57,9 +57,6 @@ def load_robot(folder: str | Path) -> Robot:
         findings += [_generated(finding) for finding in file.findings]
         skillsets += file.skillsets
         for skillset in file.skillsets:
-            if skillset.name in files:
-                message = f"skillset `{skillset.name}` is defined in {files[skillset.name]} already"
-                findings.append(Diagnostic("ALU404", message, skillset.span))
             files.setdefault(skillset.name, f"{place.resolve().name}/{path.name}")
     types, more = side_files.load_types(place / "types.yaml")
     findings += more

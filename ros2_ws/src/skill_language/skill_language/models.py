@@ -6,16 +6,23 @@ A skillset that says `use other` knows the types of skillset `other`, which is i
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
+from typing import BinaryIO
 
-from skill_language.check import check
+from skill_language.check import MAX_FINDINGS, check
 from skill_language.errors import Diagnostic, LanguageError, Severity, nearest
 from skill_language.lexer import MAX_CHARACTERS
 from skill_language.notation import SUFFIXES, Notation, read
 from skill_language.syntax.document import Document, typed_elements, with_known_types
 from skill_model.model import Skillset, Span
+
+MAX_BYTES = 4 * MAX_CHARACTERS
+STANDARD_INPUT = "<standard input>"
 
 
 @dataclass
@@ -39,16 +46,29 @@ class ModelFile:
         """Something could not be read."""
         return self.document is None or self.document.damaged
 
+    @cached_property
+    def _lines(self) -> list[str]:
+        return self.text.split("\n")
+
     def add(self, findings: Iterable[Diagnostic]) -> None:
-        """Add findings, in the order of the source, each with the line that it is about."""
-        lines = self.text.split("\n")
-        found = [_with_line(finding, lines) for finding in findings]
+        """Add findings (at most ``MAX_FINDINGS`` at a time), in the order of the source, each with the line that it is about."""
+        found = [_with_line(finding, self._lines) for finding in islice(findings, MAX_FINDINGS)]
         self.findings = sorted((*self.findings, *found), key=lambda d: (d.span.line, d.span.column, d.code))
 
 
-def check_files(paths: Sequence[str | Path]) -> list[ModelFile]:
-    """Read and check files together; all trouble is in their findings, in the order of the source."""
-    return check_texts([_read_file(Path(path), str(path)) for path in paths])
+def check_files(paths: Sequence[str | Path], standard_input: BinaryIO | None = None) -> list[ModelFile]:
+    """Read and check files together; all trouble is in their findings, in the order of the source.
+
+    ``-`` stands for the standard input where that is given.
+    """
+    streams = {"-": standard_input}
+    return check_texts([_read_file(Path(path), str(path), streams.get(str(path))) for path in paths])
+
+
+def models_in(path: str) -> list[str]:
+    """Return the models of a folder in the order of their names; the path itself where it is none, or has none."""
+    found = sorted(one for one in Path(path).glob("*") if one.suffix in SUFFIXES) if path != "-" else []
+    return [str(one) for one in found] or [path]
 
 
 def check_texts(files: Sequence[ModelFile], notation: Notation | None = None) -> list[ModelFile]:
@@ -59,6 +79,7 @@ def check_texts(files: Sequence[ModelFile], notation: Notation | None = None) ->
             file.declared = file.document.skillsets
             file.findings += source.diagnostics
     _resolve(files)
+    _report_duplicates(files)
     for file in files:
         file.add(_meaning(file))
     return list(files)
@@ -67,15 +88,26 @@ def check_texts(files: Sequence[ModelFile], notation: Notation | None = None) ->
 def read_text(path: Path) -> str:
     """Return a file's text with its line ends as newlines; raise LanguageError (ALU001 to ALU003) when it is no readable text."""
     try:
-        if path.stat().st_size > 4 * MAX_CHARACTERS:
-            raise LanguageError([about(path, "ALU003", f"{path.stat().st_size} bytes are too much for a model")])
-        return path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeDecodeError as error:
-        message = f"not UTF-8 text: byte {error.start} is 0x{error.object[error.start]:02x}"
-        raise LanguageError([about(path, "ALU002", message)]) from error
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise LanguageError([about(path, "ALU006", f"no {' or '.join(f'*{suffix}' for suffix in SUFFIXES)} file in this folder")])
+        if not stat.S_ISREG(mode):
+            raise LanguageError([about(path, "ALU001", "can't be read: it is no regular file; `-` reads the standard input")])
+        with path.open("rb") as file:
+            return _decoded(path, file.read(MAX_BYTES + 1))
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else "") or str(error)
         raise LanguageError([about(path, "ALU001", f"can't be read: {reason}")]) from error
+
+
+def _decoded(path: Path, content: bytes) -> str:
+    if len(content) > MAX_BYTES:
+        raise LanguageError([about(path, "ALU003", f"more than {MAX_BYTES} bytes are too much for a model")])
+    try:
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        message = f"not UTF-8 text: byte {error.start} is 0x{error.object[error.start]:02x}"
+        raise LanguageError([about(path, "ALU002", message)]) from error
 
 
 def about(path: Path, code: str, message: str) -> Diagnostic:
@@ -83,9 +115,11 @@ def about(path: Path, code: str, message: str) -> Diagnostic:
     return Diagnostic(code, message, Span(str(path), 0, 0, 0))
 
 
-def _read_file(path: Path, name: str) -> ModelFile:
+def _read_file(path: Path, name: str, stream: BinaryIO | None = None) -> ModelFile:
+    if stream is not None:
+        path, name = Path(STANDARD_INPUT), STANDARD_INPUT
     try:
-        return ModelFile(name, read_text(path))
+        return ModelFile(name, read_text(path) if stream is None else _decoded(path, stream.read(MAX_BYTES + 1)))
     except LanguageError as error:
         return ModelFile(name, findings=list(error.diagnostics))
 
@@ -100,6 +134,12 @@ def _meaning(file: ModelFile) -> Iterator[Diagnostic]:
             # What seems unused or unknown may be in the part that is missing.
             if not document.damaged or (finding.severity is Severity.ERROR and finding.code != "ALU222"):
                 yield finding
+    first: dict[str, Span] = {}
+    for shared in document.types:
+        if shared.name in first:
+            hint = f"it is declared in line {first[shared.name].line} first"
+            yield Diagnostic("ALU201", f"type `{shared.name}` is declared twice", shared.span, hint=hint)
+        first.setdefault(shared.name, shared.span)
     if not document.damaged and len(document.skillsets) > 1:
         used = {element.type for skillset in document.skillsets for element in typed_elements(skillset)}
         for shared in document.types:
@@ -120,6 +160,25 @@ def _resolve(files: Sequence[ModelFile]) -> None:
         if file.document is not None and any(skillset.uses for skillset in file.skillsets):
             resolved = tuple(_resolved(file, skillset, known) for skillset in file.skillsets)
             file.document = replace(file.document, skillsets=resolved)
+
+
+def _report_duplicates(files: Sequence[ModelFile]) -> None:
+    """Report skillsets of one name: an error in one folder, whose skillsets make one robot; a warning elsewhere."""
+    first: dict[str, tuple[ModelFile, Span]] = {}
+    for file in files:
+        file.add(_defined_before(file, first))
+
+
+def _defined_before(file: ModelFile, first: dict[str, tuple[ModelFile, Span]]) -> Iterator[Diagnostic]:
+    """Yield a finding for each skillset of a file whose name is in ``first`` already; enter the others."""
+    for skillset in file.skillsets:
+        if skillset.name not in first:
+            first[skillset.name] = (file, skillset.span)
+            continue
+        other, span = first[skillset.name]
+        severity = Severity.ERROR if Path(other.path).parent == Path(file.path).parent else Severity.WARNING
+        message = f"skillset `{skillset.name}` is defined in {span.file or other.path}, line {span.line}, already"
+        yield Diagnostic("ALU404", message, skillset.span, severity, "name one of them otherwise")
 
 
 def _resolved(file: ModelFile, skillset: Skillset, known: Mapping[str, Skillset]) -> Skillset:

@@ -48,6 +48,15 @@ def sniff(tokens: list[Token]) -> Notation:
 
 def read(text: str, file: str = "", notation: Notation | None = None) -> tuple[Document, Source]:
     """Return what could be read of a text, and the source with what is wrong with it (the notation only, not the meaning)."""
+    told = notation or SUFFIXES.get(PurePath(file).suffix.lower())
+    if told is not None:
+        return _read_in(text, file, told)
+    likely = notation_of(file, text)
+    other = next(one for one in Notation if one is not likely)
+    # A few words may not tell; then the notation in which it reads well does.
+    return min((_read_in(text, file, one) for one in (likely, other)), key=lambda found: len(found[1].diagnostics))
+
+
+def _read_in(text: str, file: str, notation: Notation) -> tuple[Document, Source]:
     source = Source(file, text)
-    dialect = _DIALECTS[notation or notation_of(file, text)]
-    return read_document(source, dialect), source
+    return read_document(source, _DIALECTS[notation]), source

@@ -47,7 +47,7 @@ def test_a_file_that_is_not_there(tmp_path, capsys):
 
 
 def test_text(tmp_path, capsys):
-    main(write(tmp_path, a=SOUND, b=WRONG, c=WARNED))
+    main(write(tmp_path, a=SOUND, b=WRONG.replace("skillset s", "skillset b"), c=WARNED.replace("skillset s", "skillset c")))
     lines = capsys.readouterr().out.splitlines()
     assert [line.rsplit("/", 1)[-1] for line in lines if line.endswith(("ok", "errors", "error", "warning"))] == [
         "a.skill: ok",
@@ -74,6 +74,7 @@ def test_json(tmp_path, capsys):
         "hint": "",
         "expected": [],
         "counterexample": None,
+        "steps": None,
     }
 
 

@@ -19,7 +19,7 @@ def test_files_that_are_no_text(tmp_path):
     missing = tmp_path / "missing.skill"
     with pytest.raises(LanguageError, match=r"missing\.skill: error ALU001: can't be read: No such file") as caught:
         load_skillset(missing)
-    with pytest.raises(LanguageError, match="ALU001"):
+    with pytest.raises(LanguageError, match="ALU006"):
         load_skillset(tmp_path)
     with pytest.raises(LanguageError, match="ALU001"):
         load_skillset("a\0b")

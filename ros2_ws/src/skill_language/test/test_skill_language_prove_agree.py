@@ -44,7 +44,7 @@ def test_sets_hold_every_situation_and_where_no_order_matters_no_other(skillset)
     graph = graph_of(skillset)
     if not graph.complete:
         return
-    sets = Sets(encode(without_data(skillset, ANY_TIME), 2), ANY_TIME)
+    sets = Sets(encode(without_data(skillset, ANY_TIME), 2, ANY_TIME), ANY_TIME)
     for state in graph.states:
         assert sets.contains(sets.reached, state)
     if order_is_irrelevant(skillset):

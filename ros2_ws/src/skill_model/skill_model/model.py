@@ -7,9 +7,10 @@ it came from, so that whoever finds something wrong with it can show where.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,29 @@ class Resource:
 
     def has_arrow(self, source: str, target: str, *, extern: bool) -> bool:
         """Tell whether the functional layer (extern) or a skill (not extern) may go from source to target."""
-        return any(t.source == source and t.target == target and t.extern == extern for t in self.transitions)
+        return target in self._targets.get((source, extern), ())
+
+    def targets(self, source: str, *, extern: bool) -> tuple[str, ...]:
+        """Return where the functional layer (extern) or skills (not extern) may go from a state, in the order of the source."""
+        return tuple(self._targets.get((source, extern), ()))
+
+    def reachable(self) -> frozenset[str]:
+        """Return the states with a way of arrows from the initial one, whoever takes them."""
+        found, todo = {self.initial}, [self.initial]
+        while todo:
+            source = todo.pop()
+            following = {*self.targets(source, extern=False), *self.targets(source, extern=True)} - found
+            found |= following
+            todo += following
+        return frozenset(found)
+
+    @cached_property
+    def _targets(self) -> Mapping[tuple[str, bool], Mapping[str, None]]:
+        """The arrows by source and kind; the targets of each in the order of the source."""
+        index: dict[tuple[str, bool], dict[str, None]] = {}
+        for arrow in self.transitions:
+            index.setdefault((arrow.source, arrow.extern), {})[arrow.target] = None
+        return index
 
 
 @dataclass(frozen=True)
@@ -392,14 +415,20 @@ class Skillset:
 
     def resource(self, name: str) -> Resource:
         """Return the resource of this name; raise KeyError."""
-        for resource in self.resources:
-            if resource.name == name:
-                return resource
+        if name in self._resources:
+            return self._resources[name]
         raise KeyError(f"skillset {self.name} has no resource {name}; it has {', '.join(r.name for r in self.resources)}")
 
     def skill(self, name: str) -> Skill:
         """Return the skill of this name; raise KeyError."""
-        for skill in self.skills:
-            if skill.name == name:
-                return skill
+        if name in self._skills:
+            return self._skills[name]
         raise KeyError(f"skillset {self.name} has no skill {name}; it has {', '.join(s.name for s in self.skills)}")
+
+    @cached_property
+    def _resources(self) -> Mapping[str, Resource]:
+        return {resource.name: resource for resource in reversed(self.resources)}
+
+    @cached_property
+    def _skills(self) -> Mapping[str, Skill]:
+        return {skill.name: skill for skill in reversed(self.skills)}

@@ -23,6 +23,12 @@ PRIMITIVES: Mapping[str, str] = {
 }
 """ROS primitives and the Python type that stands for each."""
 
+INTEGER_RANGES: Mapping[str, tuple[int, int]] = {
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+}
+"""The smallest and the largest value of each integer type."""
+
 _FIELD = re.compile(r"[a-z](?:_?[a-z0-9])*")
 _TYPE = re.compile(r"(?:(?P<package>[a-z][a-z0-9_]*)/(?:msg/)?)?(?P<name>[A-Za-z][A-Za-z0-9]*)(?P<array>\[\])?")
 

@@ -3,6 +3,6 @@
 Names that lead nowhere, effects that no arrow allows, periods, duplicates, names that ROS or generated code can't have.
 """
 
-from skill_language.check.findings import check
+from skill_language.check.findings import MAX_FINDINGS, check
 
-__all__ = ["check"]
+__all__ = ["MAX_FINDINGS", "check"]

@@ -86,12 +86,7 @@ def _initial(resource: Resource) -> Iterator[Diagnostic]:
 def _reach(resource: Resource) -> Iterator[Diagnostic]:
     if not resource.initial or resource.initial not in resource.states:
         return
-    reached, todo = {resource.initial}, [resource.initial]
-    while todo:
-        source = todo.pop()
-        following = {arrow.target for arrow in resource.transitions if arrow.source == source} - reached
-        reached |= following
-        todo += following
+    reached = resource.reachable()
     for state in resource.states:
         if state not in reached:
             message = f"state `{state}` of `{resource.name}` can't be reached from `{resource.initial}`"

@@ -32,6 +32,9 @@ from skill_model.model import (
     atoms,
 )
 
+Arrow = tuple[str, str, str]
+"""Resource, source and target."""
+
 
 @dataclass(frozen=True)
 class Breaker:
@@ -46,23 +49,29 @@ class Breaker:
 class Abstraction:
     """The skillset over resources alone, and what else can happen in it.
 
-    ``births`` tell when an invariant over data may be false right after the start: ``when`` is asked before it.
+    ``births`` tell when an invariant over data may be false right after the start: ``when`` is asked before it. ``original`` is
+    the skillset with its data, ``outside`` are the arrows (resource, source, target) that nothing in the model takes.
     """
 
     skillset: Skillset
+    original: Skillset
+    solver: Solver
     breakers: tuple[Breaker, ...] = ()
     births: tuple[Breaker, ...] = ()
+    outside: frozenset[Arrow] = frozenset()
 
 
-def without_data(skillset: Skillset, deadline: Deadline) -> Abstraction:
+def without_data(skillset: Skillset, deadline: Deadline, outside: frozenset[Arrow] = frozenset()) -> Abstraction:
     """Return the skillset for the search."""
-    possibly = _Possibly(Solver(skillset, deadline))
+    solver = Solver(skillset, deadline)
+    possibly = _Possibly(solver)
     skills = tuple(_skill(skill, possibly) for skill in skillset.skills)
     events = tuple(_event(event, possibly) for event in skillset.events)
     undecided = [(skill, one) for skill in skillset.skills for one in skill.invariants if not _at_once(one)]
     breakers = [Breaker(skill.name, one.name, Not(whatever_the_data(one.condition, unknown=False))) for skill, one in undecided]
     births = [Breaker(skill.name, one.name, _at_birth(skill, one, possibly)) for skill, one in undecided if not _patient(one)]
-    return Abstraction(replace(skillset, skills=skills, events=events), tuple(breakers), tuple(births))
+    resources = replace(skillset, skills=skills, events=events)
+    return Abstraction(resources, skillset, solver, tuple(breakers), tuple(births), outside)
 
 
 def _patient(invariant: Invariant) -> bool:

@@ -16,6 +16,7 @@ from dd import cudd
 
 from skill_language.prove.abstract import Abstraction, Breaker
 from skill_language.prove.diagrams import ENDED, Cluster, Encoded, Update, bits, broken_name, runs_name
+from skill_language.prove.limits import Deadline
 from skill_model.model import (
     Effect,
     Event,
@@ -28,16 +29,19 @@ from skill_model.model import (
 )
 
 
-def encode(abstraction: Abstraction, copies: int) -> Encoded:
-    """Return a skillset in diagrams."""
+def encode(abstraction: Abstraction, copies: int, deadline: Deadline) -> Encoded:
+    """Return a skillset in diagrams; raise OutOfTimeError."""
     model = _declared(abstraction.skillset, copies)
     for skill in model.skillset.skills:
+        deadline.check()
         _marks(model, skill)
     for resource in model.skillset.resources:
-        _extern_steps(model, resource)
+        _extern_steps(model, resource, deadline)
     for event in model.skillset.events:
+        deadline.check()
         _event_step(model, event)
     for skill in model.skillset.skills:
+        deadline.check()
         _starts(model, skill)
         _ends(model, skill)
     for breaker in abstraction.breakers:
@@ -50,10 +54,14 @@ def encode(abstraction: Abstraction, copies: int) -> Encoded:
     return model
 
 
-def _extern_steps(model: Encoded, resource: Resource) -> None:
+def _extern_steps(model: Encoded, resource: Resource, deadline: Deadline) -> None:
     """Add what the functional layer may do to a resource."""
-    for target in dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern):
-        origins = [a.source for a in resource.transitions if a.extern and a.target == target and a.source != target]
+    sources: dict[str, list[str]] = {}
+    for arrow in resource.transitions:
+        if arrow.extern and arrow.source != arrow.target:
+            sources.setdefault(arrow.target, []).append(arrow.source)
+    for target, origins in sources.items():
+        deadline.check()
         guard = model.any_of(model.is_state(resource.name, source) for source in origins)
         model.steps.append(Update(guard, model.values_of(resource.name, target), (resource.name,)))
 

@@ -25,6 +25,7 @@ class Graph:
     """The reachable situations; number 0 is the initial one. ``faults`` has for each fault the first step that shows it."""
 
     world: World
+    deadline: Deadline
     states: list[State] = field(default_factory=list)
     numbers: dict[State, int] = field(default_factory=dict)
     parents: list[Edge | None] = field(default_factory=list)
@@ -53,7 +54,7 @@ class Graph:
 
 def explore(world: World, deadline: Deadline, *, most: int) -> Graph:
     """Return the graph, not ``complete`` when there are more than ``most`` situations; raise OutOfTimeError."""
-    graph = Graph(world, started={skill.name: set() for skill in world.skillset.skills})
+    graph = Graph(world, deadline, started={skill.name: set() for skill in world.skillset.skills})
     todo = deque([_number(graph, world.initial(), None)])
     while todo:
         deadline.check()

@@ -6,23 +6,33 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from skill_language.errors import Diagnostic, Severity
+from skill_language.stories import NO_STORY, Story
 from skill_model.model import NOWHERE, Span
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One finding of the prover; ``counterexample`` has a line for each step of its story, or for what must come together."""
+    """One finding of the prover.
+
+    ``example`` has a line for each state and value that must come together, ``story`` is how it comes to that.
+    """
 
     code: str
     message: str
     span: Span = NOWHERE
     severity: Severity = Severity.ERROR
     hint: str = ""
-    counterexample: tuple[str, ...] = ()
+    example: tuple[str, ...] = ()
+    story: Story = NO_STORY
+
+    @property
+    def counterexample(self) -> tuple[str, ...]:
+        """The lines of example and story."""
+        return (*self.example, *self.story.lines)
 
     def diagnostic(self) -> Diagnostic:
         """Return the finding as the checker's own kind."""
-        return Diagnostic(self.code, self.message, self.span, self.severity, self.hint, counterexample=self.counterexample)
+        return Diagnostic(self.code, self.message, self.span, self.severity, self.hint, example=self.example, story=self.story)
 
 
 def strictly(findings: Iterable[Finding]) -> list[Finding]:

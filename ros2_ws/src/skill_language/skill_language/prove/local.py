@@ -8,10 +8,12 @@ something fails gives it as a ``Suspect``: the search through the reachable situ
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from skill_language.errors import Severity
+from skill_language.prove.abstract import whatever_the_data
 from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
@@ -19,6 +21,7 @@ from skill_model.model import (
     NO_EFFECT,
     NOWHERE,
     TRUE,
+    DataIs,
     Effect,
     Event,
     Expression,
@@ -126,7 +129,10 @@ class _Checks:
         if not self._solver.possible(*before, term):
             self._say(never, f"{where} can't succeed{given}", span, "no state fulfils it")
         elif _written(condition) and not self._solver.possible(*before, self._solver.negation(term)):
-            self._say(always, f"{where} can't fail{given}", span, "leave it out, or make it say something")
+            if self._solver.possible(*before, self._solver.negation(self._solver.term(whatever_the_data(condition, unknown=False)))):
+                self._warn(always, f"{where} can fail{given} only when there is no fresh value of its data", span)
+            else:
+                self._say(always, f"{where} can't fail{given}", span, "leave it out, or make it say something")
 
     def _violation(self, skill: Skill, invariant: Invariant, where: str) -> None:
         solver = self._solver
@@ -153,10 +159,16 @@ class _Checks:
             "ALU510",
             f"{where} can be false right after the start",
             invariant.span,
-            hint=f"add a precondition to `{skill.name}` that asks for it",
-            counterexample=solver.told(model, resources),
+            hint=self._birth_hint(skill, invariant, terms[: len(skill.preconditions) + 1], after),
+            example=solver.told(model, resources, _data_of(conditions)),
         )
         self.suspects.append(Suspect(finding, ("after start", skill.name, invariant.name)))
+
+    def _birth_hint(self, skill: Skill, invariant: Invariant, started: Sequence[Any], after: Mapping[str, str]) -> str:
+        """Say how to mend ALU510; where no start fulfils the invariant, a precondition does not help."""
+        if self._solver.possible(*started, self._solver.term(invariant.recovered, after)):
+            return f"add a precondition to `{skill.name}` that asks for it"
+        return f"no start of `{skill.name}` ever fulfils it: change the invariant, or the state that the start effect leads to"
 
     def _end(self, skill: Skill, where: str, effect: Effect, post: Expression, span: Span, code: str, key: tuple[str, ...]) -> None:
         """Check effect and postcondition of what ends a running execution: all its invariants are true."""
@@ -170,9 +182,9 @@ class _Checks:
         if model is not None:
             resources = self._resources_of([post, *asked], effect)
             following = f"ALU{int(code[3:]) + 1}"
-            told = solver.told(model, resources)
+            told = solver.told(model, resources, _data_of([post, *asked]))
             hint = "it is tested after the effect; an execution that does not fulfil it has FAILED"
-            finding = Finding(following, f"the postcondition of {where} can fail", span, hint=hint, counterexample=told)
+            finding = Finding(following, f"the postcondition of {where} can fail", span, hint=hint, example=told)
             self.suspects.append(Suspect(finding, ("post", *key)))
 
     def _suspect(
@@ -189,12 +201,16 @@ class _Checks:
             return
         model = self._solver.example(*terms)
         if model is not None:
-            told = self._solver.told(model, self._resources_of(asked, effect))
+            told = self._solver.told(model, self._resources_of(asked, effect), _data_of(asked))
             place = effect.span if effect.span.line else span
-            self.suspects.append(Suspect(Finding(code, message, place, hint=EFFECT_HINT, counterexample=told), ("effect", *key)))
+            self.suspects.append(Suspect(Finding(code, message, place, hint=EFFECT_HINT, example=told), ("effect", *key)))
 
     def _say(self, code: str, message: str, span: Span, hint: str) -> None:
         self.certain.append(Finding(code, message, span, hint=hint))
+
+    def _warn(self, code: str, message: str, span: Span) -> None:
+        hint = "compare with a value that the data can have, or say so with a comparison that is meant to be always true"
+        self.certain.append(Finding(code, message, span, Severity.WARNING, hint=hint))
 
     def _resources_of(self, conditions: Sequence[Expression], effect: Effect) -> list[str]:
         """Return the resources that conditions and effect are about, in the model's order."""
@@ -208,6 +224,11 @@ _KIND = {ResultKind.PLAIN: "result", ResultKind.SUCCESS: "success", ResultKind.F
 
 def _key(skill: Skill, result: Result) -> tuple[str, ...]:
     return ("result", skill.name, result.name)
+
+
+def _data_of(conditions: Sequence[Expression]) -> set[str]:
+    """Return the data that conditions ask."""
+    return {atom.data for condition in conditions for atom in atoms(condition) if isinstance(atom, DataIs)}
 
 
 def _written(condition: Expression) -> bool:

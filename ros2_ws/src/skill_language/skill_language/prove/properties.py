@@ -20,6 +20,7 @@ from skill_language.prove import story
 from skill_language.prove.explore import Edge, Graph
 from skill_language.prove.finding import Finding
 from skill_language.prove.steps import State, World
+from skill_language.stories import Story
 from skill_model.model import (
     And,
     Constant,
@@ -36,6 +37,7 @@ from skill_model.model import (
 
 def check_property(graph: Graph, wanted: Property) -> Finding | None:
     """Return why a property does not hold, or None when it does."""
+    graph.deadline.check()
     holds = [true_in(graph.world, wanted.condition, state) for state in graph.states]
     match wanted.kind:
         case PropertyKind.NEVER:
@@ -71,10 +73,10 @@ def true_in(world: World, condition: Expression, state: State) -> bool:
             raise ValueError(f"a property can't ask data: {condition}")
 
 
-def failed(wanted: Property, what: str, lines: tuple[str, ...]) -> Finding:
+def failed(wanted: Property, what: str, run: Story) -> Finding:
     """Return ALU531."""
     message = f"property `{wanted.name}` ({wanted.kind.value}{', assuming termination' if wanted.fair else ''}) does not hold: {what}"
-    return Finding("ALU531", message, wanted.span, Severity.ERROR, counterexample=lines)
+    return Finding("ALU531", message, wanted.span, Severity.ERROR, story=run)
 
 
 def _found(graph: Graph, wanted: Property, number: int | None) -> Finding | None:
@@ -94,7 +96,7 @@ def lasso(graph: Graph, wanted: Property, begins: list[int], goal: list[bool]) -
         if _goes_on(graph, component, goal) and (not wanted.fair or _fair(graph, component)):
             loop = _loop(graph, component, fair=wanted.fair)
             prefix = _way_to(graph, ways, loop[0].source if loop else component[0])
-            return failed(wanted, "a run never gets there", _told(graph, prefix, loop))
+            return failed(wanted, "a run never gets there", story.lasso(graph, prefix, loop))
     return None
 
 
@@ -103,6 +105,7 @@ def _ways(graph: Graph, begins: list[int], goal: list[bool]) -> dict[int, Edge |
     ways: dict[int, Edge | None] = dict.fromkeys(begins)
     todo = deque(begins)
     while todo:
+        graph.deadline.check()
         for edge in graph.edges[todo.popleft()]:
             if edge.target not in ways and not goal[edge.target]:
                 ways[edge.target] = edge
@@ -175,14 +178,6 @@ def _search(graph: Graph, inside: set[int], begin: int, wanted: Callable[[Edge],
     raise LookupError(begin)
 
 
-def _told(graph: Graph, prefix: list[Edge], loop: list[Edge]) -> tuple[str, ...]:
-    lines = story.story(graph, prefix)
-    if not loop:
-        return (*lines, "and nothing more can happen")
-    steps = [story.told(story.move_of(graph, edge)) for edge in loop]
-    return (*lines, "and then for ever:", *story.numbered(steps, len(lines) + 1))
-
-
 def _components(graph: Graph, numbers: list[int], goal: list[bool]) -> Iterator[list[int]]:
     """Yield the strongly connected components among these situations (Tarjan, without recursion)."""
     index: dict[int, int] = {}
@@ -196,6 +191,7 @@ def _components(graph: Graph, numbers: list[int], goal: list[bool]) -> Iterator[
         index[root] = low[root] = len(index)
         stack.append(root)
         waiting.add(root)
+        graph.deadline.check()
         while work:
             number, edges = work[-1]
             following = next((edge.target for edge in edges if not goal[edge.target]), None)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from skill_language.errors import Severity
-from skill_language.prove.abstract import without_data
+from skill_language.prove import explicit, symbolic
+from skill_language.prove.abstract import Arrow, without_data
 from skill_language.prove.finding import Finding, strictly
 from skill_language.prove.limits import Deadline, OutOfTimeError
 from skill_language.prove.local import Suspect, local_checks
+from skill_language.prove.outside import opened, untaken
 from skill_model.model import Skillset
 
 MOST_SITUATIONS = 2000
@@ -19,11 +21,18 @@ COPIES = 2
 
 
 def prove(
-    skillset: Skillset, *, strict: bool = False, timeout_s: float = 30.0, most: int = MOST_SITUATIONS, copies: int = COPIES
+    skillset: Skillset,
+    *,
+    strict: bool = False,
+    closed_world: bool = False,
+    timeout_s: float = 30.0,
+    most: int = MOST_SITUATIONS,
+    copies: int = COPIES,
 ) -> list[Finding]:
     """Return what is wrong with a skillset that the checker finds no error in, in the order of the source.
 
-    What could not be decided within ``timeout_s`` seconds is a finding as well (ALU540). ``strict`` makes errors of
+    An arrow that nothing in the model takes may be taken from outside (see ``outside``), unless ``closed_world``. What could not
+    be decided within ``timeout_s`` seconds is a finding as well (ALU540). ``strict`` makes errors of
     warnings. The skillset must be free of errors of ``skill_language.check``: every name in it leads somewhere. ``most``
     is how many situations are looked at one by one before they are taken as sets, ``copies`` how many executions of one
     skill at once.
@@ -33,7 +42,8 @@ def prove(
     suspects: list[Suspect] = []
     try:
         findings, suspects = local_checks(skillset, deadline)
-        findings += _search(skillset, suspects, deadline, most, copies)
+        search = _Search(skillset, suspects, deadline, most, copies)
+        findings += search.findings() if closed_world else search.open_findings()
     except OutOfTimeError:
         findings += [_unsure(suspect, deadline) for suspect in suspects]
         findings.append(_undecided(skillset, deadline))
@@ -42,24 +52,50 @@ def prove(
     return strictly(findings) if strict else findings
 
 
-def _search(skillset: Skillset, suspects: list[Suspect], deadline: Deadline, most: int, copies: int) -> list[Finding]:
-    # The runtime's semantics is needed from here on, and only from here on (see ``steps``).
-    from skill_language.prove import explicit, symbolic
+@dataclass(frozen=True)
+class _Search:
+    """The search through what can be reached."""
 
-    abstraction = without_data(skillset, deadline)
-    found = explicit.search(skillset, abstraction, suspects, deadline, most=most, copies=copies)
-    if found is None:
-        found = symbolic.search(skillset, abstraction, suspects, deadline, copies=copies)
-    return found
+    skillset: Skillset
+    suspects: list[Suspect]
+    deadline: Deadline
+    most: int
+    copies: int
+
+    def findings(self, outside: frozenset[Arrow] = frozenset()) -> list[Finding]:
+        """Return all global findings, where these arrows are taken from outside as well."""
+        skillset = opened(self.skillset, outside) if outside else self.skillset
+        abstraction = without_data(skillset, self.deadline, outside)
+        found = explicit.search(skillset, abstraction, self.suspects, self.deadline, most=self.most, copies=self.copies)
+        if found is None:
+            found = symbolic.search(skillset, abstraction, self.suspects, self.deadline, copies=self.copies)
+        return found
+
+    def open_findings(self) -> list[Finding]:
+        """Return the findings of the model alone, and the errors that arrows which nothing takes lead to."""
+        findings = self.findings()
+        arrows = untaken(self.skillset)
+        if not arrows:
+            return findings
+        known = {(f.code, f.span) for f in findings if f.severity is Severity.ERROR}
+        errors = [_from_outside(f) for f in self.findings(arrows) if f.severity is Severity.ERROR and (f.code, f.span) not in known]
+        shown = {(f.code, f.span) for f in errors}
+        return [f for f in findings if (f.code, f.span) not in shown] + errors
+
+
+def _from_outside(finding: Finding) -> Finding:
+    """Say of a finding that it needs arrows which nothing in the model takes."""
+    hint = "nothing in the model takes the arrow that comes from outside: make it `extern`, add who takes it, or use `--closed-world`"
+    return replace(finding, hint=f"{finding.hint}; {hint}" if finding.hint else hint)
 
 
 def _undecided(skillset: Skillset, deadline: Deadline) -> Finding:
     """Return ALU540: an error where the user wants something proved."""
     severity = Severity.ERROR if skillset.properties else Severity.WARNING
-    message = f"not proved within {deadline.given_s:g} s"
+    message = f"not proved within {deadline.given_s:.3g} s"
     return Finding("ALU540", message, skillset.span, severity, "allow more time, or model the skillset with fewer resources")
 
 
 def _unsure(suspect: Suspect, deadline: Deadline) -> Finding:
-    message = f"{suspect.finding.message}; whether it comes to that was not found out within {deadline.given_s:g} s"
+    message = f"{suspect.finding.message}; whether it comes to that was not found out within {deadline.given_s:.3g} s"
     return replace(suspect.finding, message=message)

@@ -11,33 +11,35 @@ from skill_language.prove.explore import Graph
 from skill_language.prove.finding import Finding
 from skill_language.prove.local import Suspect
 from skill_language.prove.steps import Key, State
-from skill_model.model import Resource, Skill, Skillset, Span
+from skill_language.stories import Story
+from skill_model.model import Skill, Skillset, Span
 
+MANY = 6
+"""More states of one resource than this are not listed one by one."""
 NEVER_SEEN = "no reachable situation shows it"
 
 
 def decide(skillset: Skillset, graph: Graph, suspects: Iterable[Suspect]) -> list[Finding]:
     """Return the suspects with what the search says of them: an error with its story, or a warning that it never comes to that."""
-    stories = {fault: story.to(graph, number, move) for fault, (number, move) in graph.faults.items()}
+    stories = {fault: story.to(graph, number, move, fault) for fault, (number, move) in graph.faults.items()}
     return judged(skillset, suspects, stories)
 
 
-def judged(skillset: Skillset, suspects: Iterable[Suspect], stories: Mapping[Key, tuple[str, ...]]) -> list[Finding]:
+def judged(skillset: Skillset, suspects: Iterable[Suspect], stories: Mapping[Key, Story]) -> list[Finding]:
     """Return the suspects and further faults; ``stories`` has those that are reached."""
     findings: list[Finding] = []
     told: set[Key] = set()
     for suspect in suspects:
         if suspect.key in stories:
             told.add(suspect.key)
-            example = (*suspect.finding.counterexample, *stories[suspect.key])
-            findings.append(replace(suspect.finding, counterexample=example))
+            findings.append(replace(suspect.finding, story=stories[suspect.key]))
         else:
             message = f"{suspect.finding.message}, but {NEVER_SEEN}"
             findings.append(replace(suspect.finding, message=message, severity=Severity.WARNING))
-    for fault, lines in stories.items():
+    for fault, run in stories.items():
         if fault not in told and fault[0] == "effect":
             message = f"the effect of {named(fault)} fails in a reachable situation"
-            findings.append(Finding("ALU525", message, _place(skillset, fault), counterexample=lines))
+            findings.append(Finding("ALU525", message, _place(skillset, fault), story=run))
     return findings
 
 
@@ -62,11 +64,13 @@ def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Finding
     """Return ALU521 for states that have a way of arrows to them, but no execution that takes it."""
     findings = []
     for resource, states in zip(skillset.resources, seen, strict=True):
-        for state in resource.states:
-            if state not in states and state in _by_arrows(resource):
-                message = f"`{resource.name}` never gets to `{state}`"
-                hint = "nothing that can happen takes the arrows that lead there"
-                findings.append(Finding("ALU521", message, resource.span, Severity.WARNING, hint))
+        by_arrows = resource.reachable()
+        missing = [state for state in resource.states if state not in states and state in by_arrows]
+        if missing:
+            more = f" and {len(missing) - MANY} more" if len(missing) > MANY else ""
+            names = ", ".join(f"`{state}`" for state in missing[:MANY])
+            hint = "nothing that can happen takes the arrows that lead there"
+            findings.append(Finding("ALU521", f"`{resource.name}` never gets to {names}{more}", resource.span, Severity.WARNING, hint))
     return findings
 
 
@@ -76,20 +80,20 @@ def dead_skill(skill: Skill) -> Finding:
     return Finding("ALU522", message, skill.span, Severity.WARNING)
 
 
-def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], lines: tuple[str, ...]) -> Finding:
+def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Story) -> Finding:
     """Return ALU523."""
     first, second = pair
     who = f"two executions of `{first}`" if first == second else f"`{first}` and `{second}`"
     message = f"{who} can hold `{resource}` at once: each has taken it to `{state}`"
     hint = f"let a precondition ask that `{resource}` is free, and an invariant that it is still taken"
-    return Finding("ALU523", message, skillset.skill(second).span, hint=hint, counterexample=lines)
+    return Finding("ALU523", message, skillset.skill(second).span, hint=hint, story=run)
 
 
-def lost(skillset: Skillset, names: list[str], lines: tuple[str, ...]) -> Finding:
+def lost(skillset: Skillset, names: list[str], run: Story) -> Finding:
     """Return ALU524."""
     several = ", ".join(f"`{name}`" for name in names)
     message = f"{several} can come to a situation from which {'it' if len(names) == 1 else 'they'} can never start again"
-    return Finding("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, counterexample=lines)
+    return Finding("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, story=run)
 
 
 def crowded(skillset: Skillset, names: set[str], copies: int) -> list[Finding]:
@@ -119,6 +123,7 @@ def _held_twice(skillset: Skillset, graph: Graph) -> list[Finding]:
     taken = {skill.name: takes(skill) for skill in skillset.skills}
     findings: dict[tuple[str, str, str], Finding] = {}
     for number, state in enumerate(graph.states):
+        graph.deadline.check()
         for resource, first, second in _pairs(skillset, state, taken):
             key = (resource, first, second)
             if key not in findings:
@@ -150,6 +155,7 @@ def _lost_skills(skillset: Skillset, graph: Graph) -> list[Finding]:
         starts = graph.started[skill.name]
         if not starts:
             continue
+        graph.deadline.check()
         hopeful = set(starts)
         todo = list(starts)
         while todo:
@@ -194,13 +200,3 @@ def _place(skillset: Skillset, fault: Key) -> Span:
             return skill.interrupt.span
         case _:
             return skill.span
-
-
-def _by_arrows(resource: Resource) -> set[str]:
-    seen, todo = {resource.initial}, [resource.initial]
-    while todo:
-        state = todo.pop()
-        following = {arrow.target for arrow in resource.transitions if arrow.source == state} - seen
-        seen |= following
-        todo += following
-    return seen

@@ -1,9 +1,9 @@
-"""The model's conditions in z3: resources are enumerations, numbers of data are reals that may have any value."""
+"""The model's conditions in z3: resources are enumerations, numbers of data are reals, or integers in the range of their type."""
 
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -25,6 +25,7 @@ from skill_model.model import (
     SkillRuns,
     Skillset,
 )
+from skill_model.ros_types import INTEGER_RANGES
 from skill_model.units import UNIT_IN_SI
 
 Assignment = Mapping[str, str]
@@ -42,6 +43,10 @@ class Solver:
         self._variables: dict[str, Any] = {}
         self._values: dict[str, dict[str, Any]] = {}
         self._texts: dict[str, int] = {}
+        self._types = {data.name: data.type for data in skillset.data}
+        self._numbers: dict[str, Any] = {}
+        self._ranges: list[Any] = []
+        """What is true of every number of an integer type."""
         for resource in skillset.resources:
             # An enumeration needs no bounds, so that a question costs what it asks and not what the skillset has.
             sort, values = z3.EnumSort(f"resource {resource.name}", [f"{resource.name} {s}" for s in resource.states], ctx=self._context)
@@ -56,7 +61,7 @@ class Solver:
         self._solver.set("timeout", max(1, int(self._deadline.left_s() * 1000)))
         self._solver.push()
         try:
-            self._solver.add(*terms)
+            self._solver.add(*self._ranges, *terms)
             answer = self._solver.check()
             if answer == z3.unknown:
                 raise OutOfTimeError
@@ -126,36 +131,65 @@ class Solver:
             return compare(z3.Int(f"{name} text", self._context), z3.IntVal(number, self._context))
         # By its decimals: 20 % is to be shown as 0.2 and not as the float next to it.
         value = Fraction(repr(float(atom.value))) * Fraction(repr(UNIT_IN_SI.get(atom.unit, 1.0)))
-        return compare(z3.Real(f"{name} number", self._context), z3.RealVal(str(value), self._context))
+        return compare(self._number(atom, name), z3.RealVal(str(value), self._context))
+
+    def _number(self, atom: DataIs, name: str) -> Any:
+        """Return the variable of a number: an integer in its range where the data itself is one, else a real."""
+        if name not in self._numbers:
+            bounds = None if atom.path else INTEGER_RANGES.get(self._types.get(atom.data, ""))
+            if bounds is None:
+                self._numbers[name] = z3.Real(f"{name} number", self._context)
+            else:
+                whole = z3.Int(f"{name} number", self._context)
+                self._ranges += [whole >= bounds[0], whole <= bounds[1]]
+                self._numbers[name] = z3.ToReal(whole)
+        return self._numbers[name]
 
     # --- answers --------------------------------------------------------------------------------------------------
 
-    def told(self, model: Any, resources: Sequence[str]) -> tuple[str, ...]:
-        """Return which state each of these resources is in, and what value each data has, in a model; a line each."""
+    def told(self, model: Any, resources: Sequence[str], data: Collection[str]) -> tuple[str, ...]:
+        """Return which state each of these resources is in, and what value each of these data has, in a model; a line each."""
         lines = [f"{name} == {self._state(model, name)}" for name in resources]
-        return (*lines, *self._told_data(model))
+        return (*lines, *self._told_data(model, data))
 
     def states(self, model: Any) -> dict[str, str]:
         """Return the state of every resource in a model."""
         return {name: self._state(model, name) for name in self._resources}
 
+    def data_values(self, model: Any) -> dict[tuple[str, ...], float | str | bool]:
+        """Return the value of each data, by its name and field, that the model gives one; numbers in SI units."""
+        texts = {number: text for text, number in self._texts.items()}
+        found: dict[tuple[str, ...], float | str | bool] = {}
+        for declared in model.decls():
+            words = declared.name().split(" ")
+            if not words[0].startswith("data."):
+                continue
+            path, value = tuple(words[0].split(".")[1:]), model[declared]
+            if words[-1] == "text":
+                found[path] = texts.get(value.as_long(), "another text")
+            elif words[-1] == "number":
+                found[path] = float(value.as_fraction() if hasattr(value, "as_fraction") else value.as_long())
+            else:
+                found[path] = bool(z3.is_true(value))
+        return found
+
     def _state(self, model: Any, name: str) -> str:
         value: str = model.eval(self._variables[name], model_completion=True).decl().name()
         return value.removeprefix(f"{name} ")
 
-    def _told_data(self, model: Any) -> Iterator[str]:
+    def _told_data(self, model: Any, data: Collection[str]) -> Iterator[str]:
         texts = {number: text for text, number in self._texts.items()}
         for declared in sorted(model.decls(), key=str):
             words = declared.name().split(" ")
-            if not words[0].startswith("data."):
+            name = words[0].removeprefix("data.")
+            if not words[0].startswith("data.") or name.split(".")[0] not in data:
                 continue
             value = model[declared]
-            name = words[0].removeprefix("data.")
             if words[-1] == "text":
                 text = texts.get(value.as_long())
                 yield f'{name} == "{text}"' if text is not None else f"{name} is another text"
             elif words[-1] == "number":
-                yield f"{name} == {value.as_decimal(6).rstrip('?')}"
+                yield f"{name} == {value.as_decimal(6).rstrip('?') if hasattr(value, 'as_decimal') else value.as_long()}"
             else:
                 yield f"{name} == {str(value).lower()}"
 

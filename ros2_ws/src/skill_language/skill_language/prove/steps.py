@@ -7,7 +7,7 @@ effect; skills whose violations change nothing are therefore kept sorted by name
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from skill_language.prove.abstract import Abstraction, Breaker
@@ -41,12 +41,15 @@ class Move:
     ended: tuple[str, ...] = ()
     faults: tuple[Key, ...] = ()
     step: Step | None = None
+    execution: str = ""
+    """The execution that starts, ends or breaks, as ``step`` calls it."""
 
 
 class World:
     """The steps of one skillset. ``copies`` is how many executions of one skill are looked at, at most."""
 
     def __init__(self, abstraction: Abstraction, *, copies: int = 2) -> None:
+        self.abstraction = abstraction
         self.skillset: Skillset = abstraction.skillset
         self.copies = copies
         self.crowded: set[str] = set()
@@ -65,9 +68,13 @@ class World:
 
     def state(self, situation: Situation) -> State:
         """Return the state of a situation."""
-        running = [execution.skill for execution in situation.running]
-        sortable = sorted(name for name in running if name not in self._ordered)
-        return State(tuple(situation.states[name] for name in self._names), (*sortable, *(n for n in running if n in self._ordered)))
+        running = tuple(execution.skill for execution in self.in_order(situation.running))
+        return State(tuple(situation.states[name] for name in self._names), running)
+
+    def in_order(self, running: Sequence[Running]) -> list[Running]:
+        """Return executions in the order in which a state has them."""
+        sortable = sorted((one for one in running if one.skill not in self._ordered), key=lambda one: one.skill)
+        return [*sortable, *(one for one in running if one.skill in self._ordered)]
 
     def situation(self, state: State) -> Situation:
         """Return a situation of this state; executions are numbered by their age."""
@@ -87,10 +94,10 @@ class World:
 
     def _extern(self, situation: Situation) -> Iterator[Move]:
         for resource in self.skillset.resources:
-            for target in dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern):
-                if not semantics.extern_refusal(self.skillset, situation, resource.name, target):
-                    step = semantics.transition(self.skillset, situation, resource.name, target)
-                    yield self._move("extern", (resource.name, target), step)
+            source = situation.states[resource.name]
+            for target in resource.targets(source, extern=True):
+                step = semantics.transition(self.skillset, situation, resource.name, target)
+                yield self._move(self._taker(resource.name, source, target), (resource.name, target), step)
 
     def _events(self, situation: Situation) -> Iterator[Move]:
         for event in self.skillset.events:
@@ -114,7 +121,8 @@ class World:
                 self.crowded |= {skill.name} - self.idle
                 continue
             step = semantics.start(self.skillset, situation, Running("new", skill.name))
-            yield self._move("start", (skill.name,), step, (*self._broken_at_birth(skill, step), *self._broken_by_data(skill, situation)))
+            faults = (*self._broken_at_birth(skill, step), *self._broken_by_data(skill, situation))
+            yield self._move("start", (skill.name,), step, faults, "new")
 
     def _ends(self, situation: Situation) -> Iterator[Move]:
         seen: set[tuple[State, tuple[str, ...]]] = set()
@@ -130,10 +138,11 @@ class World:
             key: Key = ("result", skill.name, result.name)
             step = semantics.terminate(self.skillset, situation, execution, result.name)
             faults = self._end_faults(skill, result.effect, key, situation, step, execution)
-            yield self._move("terminate", (skill.name, result.name), step, faults)
+            yield self._move("terminate", (skill.name, result.name), step, faults, execution.id)
         key = ("interrupt", skill.name)
         step = semantics.interrupt(self.skillset, situation, execution)
-        yield self._move("interrupt", (skill.name,), step, self._end_faults(skill, skill.interrupt.effect, key, situation, step, execution))
+        faults = self._end_faults(skill, skill.interrupt.effect, key, situation, step, execution)
+        yield self._move("interrupt", (skill.name,), step, faults, execution.id)
 
     def _breaks(self, situation: Situation) -> Iterator[Move]:
         seen: set[tuple[State, str, str]] = set()
@@ -141,7 +150,8 @@ class World:
             for execution in situation.running:
                 if execution.skill != breaker.skill or not holds(breaker.when, situation.states, {}):
                     continue
-                move = self._move("data", (breaker.skill, breaker.invariant), self._lost(situation, execution, breaker))
+                step = self._lost(situation, execution, breaker)
+                move = self._move("data", (breaker.skill, breaker.invariant), step, execution=execution.id)
                 if (move.target, *move.subject) not in seen:
                     seen.add((move.target, breaker.skill, breaker.invariant))
                     yield move
@@ -151,9 +161,12 @@ class World:
 
     # --- faults ---------------------------------------------------------------------------------------------------
 
-    def _move(self, kind: str, subject: tuple[str, ...], step: Step, faults: tuple[Key, ...] = ()) -> Move:
+    def _taker(self, resource: str, source: str, target: str) -> str:
+        return "outside" if (resource, source, target) in self.abstraction.outside else "extern"
+
+    def _move(self, kind: str, subject: tuple[str, ...], step: Step, faults: tuple[Key, ...] = (), execution: str = "") -> Move:
         ended = tuple(h.execution.skill for h in step.happenings if isinstance(h, Entered) and h.state is not ExecutionState.RUNNING)
-        return Move(kind, subject, self.state(step.situation), ended, (*faults, *self._violation_faults(step)), step)
+        return Move(kind, subject, self.state(step.situation), ended, (*faults, *self._violation_faults(step)), step, execution)
 
     def _fails(self, skill: Skill, effect: Effect, situation: Situation) -> bool:
         try:

@@ -18,6 +18,7 @@ from skill_language.prove.properties import failed, lasso, true_in
 from skill_language.prove.sets import Sets
 from skill_language.prove.steps import Key, World
 from skill_language.prove.walk import MOST_IN_A_LOOP, Walker
+from skill_language.stories import Story
 from skill_model.model import Constant, Property, PropertyKind, Skill, Skillset
 
 
@@ -31,7 +32,7 @@ class _Search:
         self.skillset = skillset
         self.copies = copies
         self.world = World(abstraction, copies=copies)
-        self.model: Encoded = encode(abstraction, copies)
+        self.model: Encoded = encode(abstraction, copies, deadline)
         self.sets = Sets(self.model, deadline)
         self.walker = Walker(self.world, self.sets)
 
@@ -50,15 +51,15 @@ class _Search:
 
     # --- faults ---------------------------------------------------------------------------------------------------
 
-    def _stories(self, suspected: set[Key]) -> dict[Key, tuple[str, ...]]:
+    def _stories(self, suspected: set[Key]) -> dict[Key, Story]:
         """Return the story of each fault that is reached: of effects, and of what else is suspected."""
-        stories: dict[Key, tuple[str, ...]] = {}
+        stories: dict[Key, Story] = {}
         for fault, goal in self._shown():
             if fault[0] != "effect" and fault not in suspected:
                 continue
             moves = self.walker.fault(fault, goal)
             if moves is not None:
-                stories[fault] = story.walked(self.world, self.world.initial(), moves)
+                stories[fault] = story.walked(self.world, self.world.initial(), moves, fault)
         return stories
 
     def _shown(self) -> Iterator[tuple[Key, Any]]:
@@ -98,15 +99,15 @@ class _Search:
                 both = here & (self.model.runs(first, 2) if first == second else self.model.runs(first) & self.model.runs(second))
                 moves = self.walker.to(both) if both != self.sets.bdd.false else None
                 if moves is not None:
-                    lines = story.walked(self.world, self.world.initial(), moves)
-                    findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), lines))
+                    run = story.walked(self.world, self.world.initial(), moves)
+                    findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), run))
         return findings
 
     def _lost(self) -> list[Finding]:
         """Return skills that can be lost; where all can go back to the beginning, what starts at all can start again."""
         if self.sets.can_come_to(self.sets.initial) == self.sets.reached:
             return []
-        groups: dict[tuple[str, ...], list[str]] = {}
+        groups: dict[Story, list[str]] = {}
         for skill in self.skillset.skills:
             starts = self.model.startable[skill.name] & self.sets.reached
             hopeless = self.sets.reached & ~self.sets.can_come_to(starts)
@@ -115,7 +116,7 @@ class _Search:
             moves = self.walker.to(hopeless)
             if moves is not None:
                 groups.setdefault(story.walked(self.world, self.world.initial(), moves), []).append(skill.name)
-        return [reachable.lost(self.skillset, names, lines) for lines, names in groups.items()]
+        return [reachable.lost(self.skillset, names, run) for run, names in groups.items()]
 
     # --- properties -----------------------------------------------------------------------------------------------
 
@@ -137,8 +138,8 @@ class _Search:
         moves = self.walker.to(bad)
         if moves is None:
             return _unsure(wanted)
-        lines = story.walked(self.world, self.world.initial(), moves)
-        return failed(wanted, story.situation(self.world, self.walker.end(moves)), lines)
+        run = story.walked(self.world, self.world.initial(), moves)
+        return failed(wanted, story.situation(self.world, self.walker.end(moves)), run)
 
     def _run(self, wanted: Property, begins: Any, goal: Any) -> Finding | None:
         """Look for a run that avoids the goal for ever; a set that allows one is walked before it is believed."""

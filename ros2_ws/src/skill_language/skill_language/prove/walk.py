@@ -67,7 +67,7 @@ class Walker:
 
         The last situation of the run is number ``len(moves)``.
         """
-        graph = Graph(self.world)
+        graph = Graph(self.world, self.sets.deadline)
         path = [self.world.initial(), *(move.target for move in moves)]
         for number, state in enumerate(path):
             edge = _edge(number - 1, number, moves[number - 1]) if number else None

@@ -275,7 +275,7 @@ class _EventReader:
 
 def _with_shared_types(document: Document) -> list[Skillset]:
     """Give the types that a file declares outside of its skillsets to those that use them; to an only skillset all of them."""
-    names = tuple(shared.name for shared in document.types)
+    names = tuple(dict.fromkeys(shared.name for shared in document.types))
     if len(document.skillsets) == 1:
         return [replace(skillset, types=names + skillset.types) for skillset in document.skillsets]
     return [with_known_types(skillset, names) for skillset in document.skillsets]

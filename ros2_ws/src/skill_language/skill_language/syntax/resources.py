@@ -14,6 +14,9 @@ from skill_model.model import Resource, Transition
 MAX_STATES = 250
 """`transition all` of so many states has 62,500 arrows; state machines of people have a dozen states."""
 
+MAX_ARROWS = 130_000
+"""In a file: two such resources."""
+
 _WORDS = frozenset({"initial", "transition", "state", "extern"})
 
 
@@ -62,10 +65,14 @@ class _ResourceReader:
         """Put the parts together."""
         arrows = tuple(self.transitions)
         states = tuple(self.states) if self.states is not None else occurring(self.initial, arrows)
-        if len(states) > MAX_STATES:
+        source = self.cursor.source
+        source.arrows += len(arrows) + (self.all + self.extern_all) * len(states) ** 2
+        if len(states) > MAX_STATES or source.arrows > MAX_ARROWS:
             message = f"resource `{name.text}` has {len(states)} states; there may be {MAX_STATES}"
+            if len(states) <= MAX_STATES:
+                message = f"with resource `{name.text}` the file has {source.arrows} arrows; there may be {MAX_ARROWS}"
             hint = "numbers are data, not states: let the functional layer publish them"
-            self.cursor.source.report("ALU109", message, self.cursor.span(name), hint=hint)
+            source.report("ALU109", message, self.cursor.span(name), hint=hint)
             return Resource(name.text, states[:MAX_STATES], self.initial, (), span=self.cursor.span(name))
         if self.extern_all:
             arrows += _missing(every_arrow(states, extern=True), arrows)

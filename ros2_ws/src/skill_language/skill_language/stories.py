@@ -1,0 +1,124 @@
+"""A counterexample as values: the steps of a run, each with what is done, what it changes, and what it ends.
+
+A step can be told (``text``), written as JSON, and played: whoever does the same to running managers sees the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+Value = float | str | bool
+Path = tuple[str, ...]
+"""The name of a data and, where its type has fields, of the field: ``("battery", "level")``."""
+
+
+class StepKind(Enum):
+    """What happens; the value is what the JSON form calls it."""
+
+    INITIALLY = "initially"
+    EXTERN = "extern"
+    OUTSIDE = "outside"
+    """An arrow that is not extern and that nothing in the model takes (see ``prove.outside``)."""
+    EVENT = "event"
+    START = "start"
+    RESULT = "result"
+    INTERRUPT = "interrupt"
+    DATA = "data"
+    TIME = "time"
+    BREAK = "break"
+    """Data or time break an invariant; no values were found that show how."""
+
+
+@dataclass(frozen=True)
+class StateChange:
+    """A resource went from one state to another."""
+
+    resource: str
+    source: str
+    target: str
+
+
+@dataclass(frozen=True)
+class Execution:
+    """An execution of a skill; ``number`` counts the starts of the skill in the story, from 1."""
+
+    skill: str
+    number: int
+
+
+@dataclass(frozen=True)
+class Ended:
+    """An execution ended. ``name`` is the result or the invariant, empty where there is none; ``state`` as in Figure 5."""
+
+    execution: Execution
+    state: str
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class StoryStep:
+    """One step. ``subject`` names what is done: resource and state, event, skill, result, data, or invariant.
+
+    ``data`` has the values that are received (None: no fresh value any more), ``time_s`` how much mission time passes before
+    the step, ``states`` and ``running`` what is the case after it. ``loop`` marks the steps that are repeated for ever.
+    """
+
+    kind: StepKind
+    text: str
+    subject: tuple[str, ...] = ()
+    execution: Execution | None = None
+    changes: tuple[StateChange, ...] = ()
+    ended: tuple[Ended, ...] = ()
+    refused: bool = False
+    data: tuple[tuple[Path, Value | None], ...] = ()
+    time_s: float = 0.0
+    states: tuple[tuple[str, str], ...] = ()
+    running: tuple[Execution, ...] = ()
+    loop: bool = False
+
+    def as_json(self) -> dict[str, object]:
+        """Return the step as plain values for tools."""
+        return {
+            "kind": self.kind.value,
+            "text": self.text,
+            "subject": list(self.subject),
+            "skill": self.execution.skill if self.execution else None,
+            "execution": self.execution.number if self.execution else None,
+            "result": self.subject[-1] if self.kind is StepKind.RESULT else None,
+            "refused": self.refused,
+            "changes": [{"resource": c.resource, "from": c.source, "to": c.target} for c in self.changes],
+            "ended": [{"skill": e.execution.skill, "execution": e.execution.number, "state": e.state, "name": e.name} for e in self.ended],
+            "data": {".".join(path): value for path, value in self.data},
+            "time_s": self.time_s,
+            "states": dict(self.states),
+            "running": [{"skill": e.skill, "execution": e.number} for e in self.running],
+            "loop": self.loop,
+        }
+
+
+@dataclass(frozen=True)
+class Story:
+    """The steps of a run; ``stops`` tells that nothing more can happen after the last."""
+
+    steps: tuple[StoryStep, ...] = ()
+    stops: bool = field(default=False)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Return a numbered line for each step, and what comes of the run where it goes on for ever."""
+        told = [f"{number}. {step.text}" for number, step in enumerate(self.steps, 1)]
+        loop = next((index for index, step in enumerate(self.steps) if step.loop), None)
+        if loop is not None:
+            told.insert(loop, "and then for ever:")
+        return (*told, *(["and nothing more can happen"] if self.stops else []))
+
+
+NO_STORY = Story()
+
+
+def enumerated(names: Sequence[str]) -> str:
+    """Return names in backquotes with `and` before the last one."""
+    quoted = [f"`{name}`" for name in names]
+    return " and ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
