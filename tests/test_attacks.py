@@ -71,9 +71,6 @@ def worlds(*names: str, **known: str) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("world", [*names, *failing])
 
 
-ORPHAN = "a goal that its client has given up runs on"
-
-
 @worlds("ros1", "ros2", "local")
 def test_each_of_100_transitions_at_once_is_answered(attack):
     assert attack("hundred_transitions") == {"unanswered": []}
@@ -97,12 +94,12 @@ def test_a_script_may_end_without_closing_its_client(attack):
     assert "Traceback" not in found["said"]
 
 
-@worlds("ros2", ros1=ORPHAN)
+@worlds("ros1", "ros2")
 def test_what_a_client_has_given_up_does_not_run_on_when_frozen_managers_come_back(attack):
     assert attack("freeze") == {"before": "FAILED", "meanwhile": "FAILED", "afterwards": ""}
 
 
-@worlds("ros2", ros1="the first managers are shut down")
+@worlds("ros1", "ros2")
 def test_second_managers_of_a_skillset_refuse_to_start(attack):
     found = attack("second_managers")
     assert found["code"] == 2, found

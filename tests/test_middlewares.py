@@ -80,6 +80,32 @@ def compare(players: dict[str, Player], script: Script) -> dict[str, Any]:
     return traces["none"]
 
 
+PUBLIC_API = """
+import inspect, json, sys
+from {module} import {client} as client
+names = [name for name in dir(client) if not name.startswith("_")]
+found = {{name: str(inspect.signature(m)) if callable(m := inspect.getattr_static(client, name)) else "property" for name in names}}
+json.dump(found, sys.stdout)
+"""
+CLIENTS = {
+    "ros1": ("skillset_ros1", "SkillsetClient"),
+    "ros2": ("skill_runtime.ros2", "SkillsetClient"),
+    "none": ("skill_runtime.local", "LocalClient"),
+}
+
+
+def test_clients_have_the_same_public_interface_in_all_worlds():
+    found = {}
+    for world, (module, client) in CLIENTS.items():
+        command = [str(ALULA_ROOT / "setup" / f"in_{'ros1' if world == 'ros1' else 'ros2'}"), "python", "-c"]
+        program = PUBLIC_API.format(module=module, client=client)
+        done = subprocess.run([*command, program], capture_output=True, text=True, check=False, timeout=ANSWER_S)
+        assert done.returncode == 0, done.stderr
+        found[world] = json.loads(done.stdout)
+    assert found["ros1"] == found["ros2"] == found["none"]
+    assert {"start", "trigger", "read_data", "input_types", "interrupt_all", "on_event"} <= set(found["none"])
+
+
 TAKEOFF = {"height": 3, "speed": 1}
 STRAIGHT = {"target": [1, 2.5, 3], "speed": 1}
 READY = (

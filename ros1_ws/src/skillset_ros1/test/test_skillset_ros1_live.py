@@ -132,7 +132,7 @@ def test_a_cancellation_that_overtakes_its_goal(navigation):
     cancels = rospy.Publisher(f"{place}/cancel", GoalID, queue_size=1)
     listening = rospy.Subscriber(f"{place}/result", TakeoffActionResult, results.append)
     until(lambda: goals.get_num_connections() and cancels.get_num_connections() and listening.get_num_connections(), "connected")
-    server = navigation.managers._skills["takeoff"]._server
+    server = navigation.managers.skills["takeoff"].server.server
     cancels.publish(GoalID(id="early"))
     until(lambda: any(status.status.goal_id.id == "early" for status in server.status_list), "the cancellation is there")
     goals.publish(TakeoffActionGoal(goal_id=GoalID(id="early"), goal=TakeoffGoal(height=3, speed=1)))

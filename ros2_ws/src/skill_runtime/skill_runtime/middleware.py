@@ -192,7 +192,7 @@ class ActionLink(Protocol):
         ...
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:
-        """Cancel the goals of all clients; ``on_count`` gets how many there were."""
+        """Cancel the goals of all clients; ``on_count`` gets how many there were, None where the middleware does not tell."""
         ...
 
     def ask_ending(self, goal_id: str) -> None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from types import FrameType, ModuleType
 
+import rosgraph
 import rospy
 
 from skill_model.model import Skillset
-from skillset_ros1.data_manager import DataBindings
-from skillset_ros1.managers import HooksFactory, SkillsetManagers
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.managers import DataBindings
+from skillset_ros1.managers import HooksFactory, SkillsetManagers, check_alone
 
 CHECK_S = 0.5
+REFUSED = 2
 
 
 def run_skillset(
@@ -20,6 +24,7 @@ def run_skillset(
 ) -> None:
     """Serve a skillset until SIGINT, SIGTERM or the node's end; then stop what runs, tell its callers, and return.
 
+    Exits with 2 when managers of the skillset are there already.
     The command line is rospy's: ``__ns:=/robot1 __name:=...`` and remappings.
     """
     stop = threading.Event()
@@ -27,6 +32,12 @@ def run_skillset(
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
         stop.set()
 
+    # Before this node is one: a node of the same name would end the other.
+    try:
+        check_alone(f"{rosgraph.names.get_ros_namespace(argv=sys.argv)}{skillset.name}")
+    except SkillRuntimeError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(REFUSED)
     # Our own handlers: rospy's would close the connections before the callers were told.
     rospy.init_node(skillset.name, disable_signals=True)
     for number in (signal.SIGINT, signal.SIGTERM):

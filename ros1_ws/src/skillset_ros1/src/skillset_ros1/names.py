@@ -11,10 +11,8 @@ import rospy
 
 from skill_model.ros_types import camel
 
-HISTORY = 1000
-"""So many events are kept for who subscribes late, as in the ROS 2 world."""
-QUEUE = 2 * HISTORY
-"""Messages that wait for a slow subscriber; more than the history, which is sent in one go."""
+QUEUE = 2000
+"""Messages that wait for a slow subscriber; more than the history of the events, which is sent in one go."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +57,3 @@ def now_ns() -> int:
     """Return the mission clock, nanoseconds."""
     stamp: int = rospy.get_rostime().to_nsec()
     return stamp
-
-
-def stamp_of(stamp_ns: int) -> Any:
-    """Return a time of the mission clock as a message has it."""
-    return rospy.Time(stamp_ns // 1_000_000_000, stamp_ns % 1_000_000_000)

@@ -151,7 +151,9 @@ class Client:
         """Ask for the end of all executions of a skill, whoever asked for them; the answer is how many there were."""
         self._check_skill(skill)
         pending = self.moment()
-        self._connection.links[skill].cancel_all(pending.resolve, pending.fail)
+        known = self._news.skills.get(skill, SkillRecord())
+        counted = lambda count: pending.resolve(len(known.open) if count is None else count)  # noqa: E731
+        self._connection.links[skill].cancel_all(counted, pending.fail)
         return pending
 
     def set_paused(self, execution_id: str, paused: bool) -> Pending[str]:  # noqa: FBT001 - as the service has it

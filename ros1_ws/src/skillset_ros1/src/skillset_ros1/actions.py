@@ -1,0 +1,218 @@
+"""Skills as actionlib actions that take any number of goals at a time.
+
+A goal's id is the execution's. It is PENDING until the skill runs, so a refusal is a REJECTED goal and an interruption before the start
+a RECALLED one; every end carries a result that says why.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from actionlib import ActionServer, ServerGoalHandle
+from actionlib_msgs.msg import GoalID, GoalStatus
+from std_msgs.msg import Header
+
+from skill_model.execution_state import ExecutionState
+from skill_runtime.core.events import ExecutionEvent
+from skill_runtime.middleware import Ending, Goal, GoalListener, OnError, OnValue
+from skillset_ros1.convert import fields_of, fill, values_of
+from skillset_ros1.names import QUEUE, ActionTypes
+
+if TYPE_CHECKING:
+    from skillset_ros1.middleware import RospyMiddleware
+
+OnGoal = Callable[[ServerGoalHandle], None]
+RECALLED_EARLY = "interrupted before it arrived"
+RESULTS_KEPT = 10
+_WAITING = {GoalStatus.PENDING, GoalStatus.RECALLING}
+_FEEDBACK_FIELDS = ("progress", "state")
+_RESULT_FIELDS = ("outcome", "result", "message")
+
+
+class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # neither actionlib nor rospy has types
+    """An action server whose results reach everybody and are never empty.
+
+    A subscriber of ROS 1 takes itself for connected a moment before the publisher knows of it, so an action client can lose the
+    result of its first goal: who subscribes is sent the last results. And actionlib itself recalls a goal whose cancellation came
+    first, without a word.
+    """
+
+    def __init__(self, name: str, spec: Any, on_goal: OnGoal, on_cancel: OnGoal) -> None:
+        self._results: deque[Any] = deque(maxlen=RESULTS_KEPT)
+        super().__init__(name, spec, on_goal, on_cancel, auto_start=False)
+
+    def initialize(self) -> None:
+        """Make the topics."""
+        super().initialize()
+        self.result_pub.impl.add_subscriber_listener(self)
+
+    def publish_result(self, status: Any, result: Any) -> None:
+        """Publish a result."""
+        if not result.outcome:
+            result.outcome, result.message = ExecutionState.INTERRUPTED.value, RECALLED_EARLY
+        with self.lock:
+            self._results.append(self.ActionResult(Header(stamp=rospy.get_rostime()), status, result))
+            super().publish_result(status, result)
+
+    def peer_subscribe(self, topic_name: str, topic_publish: OnValue, peer_publish: OnValue) -> None:  # noqa: ARG002
+        """Send the last results to somebody who has just subscribed."""
+        with self.lock:
+            for result in self._results:
+                peer_publish(result)
+
+
+class RospyGoal:
+    """A goal at its server."""
+
+    def __init__(self, server: RospyServer, handle: ServerGoalHandle) -> None:
+        self.id: str = handle.get_goal_id().id
+        self.inputs: Mapping[str, object] = values_of(handle.get_goal())
+        self._server = server
+        self._handle = handle
+
+    def report(self, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
+        """Send feedback; the goal is active from the first on."""
+        if self._handle.get_goal_status().status in _WAITING:
+            self._handle.set_accepted()
+        feedback = self._server.types.feedback(progress=progress, state=state.value)
+        self._server.fill_outputs(feedback, outputs)
+        self._handle.publish_feedback(feedback)
+
+    def finish(self, event: ExecutionEvent) -> None:
+        """Set the goal's terminal state and send its result."""
+        result = self._server.types.result(outcome=event.state.value, result=event.result, message=event.message)
+        wrong = self._server.fill_outputs(result, event.outputs)
+        if wrong:
+            result.message = f"{result.message} ({wrong})".strip()
+        waiting = self._handle.get_goal_status().status in _WAITING
+        if event.state is ExecutionState.TERMINATED:
+            self._handle.set_succeeded(result, event.message)
+        elif event.state is ExecutionState.INTERRUPTED:
+            self._handle.set_canceled(result, event.message)
+        elif waiting:
+            self._handle.set_rejected(result, event.message)
+        else:
+            self._handle.set_aborted(result, event.message)
+
+
+class RospyServer:
+    """A skill's action at its manager."""
+
+    def __init__(
+        self, middleware: RospyMiddleware, types: ActionTypes, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]
+    ) -> None:
+        self.types = types
+        self._middleware = middleware
+        self._skill = skill
+        # On the loop: actionlib's threads hold its lock, and a cancellation comes after its goal.
+        took: OnGoal = lambda handle: middleware.submit(lambda: on_goal(RospyGoal(self, handle)))  # noqa: E731
+        cancelled: OnGoal = lambda handle: middleware.submit(lambda: on_cancel(handle.get_goal_id().id))  # noqa: E731
+        self.server = _Server(middleware.name(f"skill/{skill}"), types.spec, took, cancelled)
+        self.server.start()
+
+    def inputs_of(self, plain: Mapping[str, object]) -> dict[str, object]:
+        """Return inputs as a goal carries them."""
+        return values_of(fill(self.types.goal(), plain, f"inputs of {self._skill}"))
+
+    def fill_outputs(self, message: Any, outputs: Mapping[str, object]) -> str:
+        """Set the outputs of a message; return what is wrong with them, or ""."""
+        try:
+            fill(message, outputs, f"outputs of {self._skill}")
+        except ValueError as error:
+            self._middleware.log(str(error))
+            return str(error)
+        return ""
+
+    def unregister(self) -> None:
+        """Take no more goals, and take the topics away."""
+        self.server.stop()
+
+
+class RospyLink:
+    """A skill's action at a client.
+
+    Not actionlib's client: that invents the goals' ids, and logs an error for every status that overtakes another.
+    """
+
+    def __init__(self, middleware: RospyMiddleware, types: ActionTypes, skill: str, listener: GoalListener) -> None:
+        self._types = types
+        self._middleware = middleware
+        self._skill = skill
+        self._listener = listener
+        place = middleware.name(f"skill/{skill}")
+        self._goals = rospy.Publisher(f"{place}/goal", types.action_goal, queue_size=QUEUE)
+        self._cancels = rospy.Publisher(f"{place}/cancel", GoalID, queue_size=QUEUE)
+        self._listening = [
+            middleware.listen(f"{place}/feedback", types.action_feedback, self._on_feedback),
+            middleware.listen(f"{place}/result", types.action_result, self._on_result),
+        ]
+
+    @property
+    def connected(self) -> bool:
+        """Tell whether there are connections in both directions to the managers' node."""
+        server = self._middleware.server
+        sending = all(publisher.impl.has_connection(server) for publisher in (self._goals, self._cancels) if publisher.impl)
+        return sending and all(is_connected(subscriber, server) for subscriber in self._listening)
+
+    @property
+    def input_types(self) -> dict[str, str]:
+        """The inputs with their types."""
+        return fields_of(self._types.goal)
+
+    def fit(self, inputs: Mapping[str, object], place: str) -> Any:
+        """Return the goal's message."""
+        return fill(self._types.goal(), inputs, place)
+
+    def outputs_of(self, plain: Mapping[str, object]) -> dict[str, Any]:
+        """Return outputs as a result carries them."""
+        return _outputs(fill(self._types.result(), plain, f"outputs of {self._skill}"), _RESULT_FIELDS)
+
+    def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:  # noqa: ARG002 - events answer it
+        """Send a goal."""
+        message = self._types.action_goal(goal=goal, goal_id=GoalID(id=goal_id, stamp=rospy.get_rostime()))
+        message.header.stamp = message.goal_id.stamp
+        self._goals.publish(message)
+
+    def cancel(self, goal_id: str) -> None:
+        """Cancel a goal."""
+        self._cancels.publish(GoalID(id=goal_id))
+
+    def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:  # noqa: ARG002 - nothing is answered
+        """Cancel all goals: that is what an id and a stamp of nothing mean. ROS 1 tells nobody how many there were."""
+        self._cancels.publish(GoalID())
+        self._middleware.submit(lambda: on_count(None))
+
+    def ask_ending(self, goal_id: str) -> None:
+        """Ask nothing: results are sent to everybody, and arrive over their connections."""
+
+    def release(self, goal_id: str) -> None:
+        """Follow a goal no more."""
+
+    def unregister(self) -> None:
+        """Take the topics away."""
+        for topic in (self._goals, self._cancels, *self._listening):
+            topic.unregister()
+
+    def _on_feedback(self, message: Any) -> None:
+        feedback = message.feedback
+        self._listener.on_feedback(message.status.goal_id.id, feedback.progress, _outputs(feedback, _FEEDBACK_FIELDS))
+
+    def _on_result(self, message: Any) -> None:
+        result = message.result
+        ending = Ending(ExecutionState(result.outcome), result.result, result.message, _outputs(result, _RESULT_FIELDS))
+        self._listener.on_ending(message.status.goal_id.id, ending)
+
+
+def is_connected(subscriber: Any, server: str = "") -> bool:
+    """Tell whether a subscriber has a live connection from this node, or from any; rospy keeps broken ones to mend them later."""
+    if subscriber.impl is None:
+        return False
+    connections = list(subscriber.impl.connections)
+    return any(c.socket is not None and server in {"", c.callerid_pub} for c in connections)
+
+
+def _outputs(message: Any, others: tuple[str, ...]) -> dict[str, Any]:
+    return {name: getattr(message, name) for name in fields_of(message) if name not in others}

@@ -1,0 +1,311 @@
+"""The middleware port over rospy: this process's node, and a thread of its own that is the loop."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import queue
+import threading
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable, Mapping
+from types import ModuleType
+from typing import Any
+
+import rospy
+from roslib.message import get_message_class
+from std_msgs.msg import Header
+
+from skill_runtime.codecs import SERVICES, TOPICS, set_stamp
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnValue, Serve, Topic
+from skill_runtime.plain import message_class
+from skill_runtime.views import Sample
+from skill_runtime.waiting import Host
+from skill_runtime.workers import Workers
+from skillset_ros1.actions import RospyLink, RospyServer, is_connected
+from skillset_ros1.calls import call
+from skillset_ros1.loop import Alarm, Loop
+from skillset_ros1.names import QUEUE, action_types, now_ns
+
+ALIVE_PERIOD_S = 0.5
+"""Managers give a sign of life so often (wall clock), whatever their hooks do: ROS 1 itself tells nobody of a node that died."""
+LEASE_S = 2.0
+"""Without a sign of life for so long (wall clock), managers are doubted, as in the ROS 2 world."""
+BROKEN_LEASE_S = 1.5 * ALIVE_PERIOD_S
+"""The same where also the connection over which the signs come is broken."""
+LOOK_S = 0.02
+"""How often (wall clock) connections are looked at while they are being made."""
+WATCH_S = 0.25
+ANSWER_S = 60.0
+"""An answer to a service that has not come for so long will not come; the managers themselves give their hooks less."""
+SOURCE_QUEUE = 10
+FLUSH_STEP_S = 0.02
+QUIET_S = 0.1
+ID_DIGITS = 12
+
+
+class RospyMiddleware:
+    """One side of one skillset's interface.
+
+    Args:
+        skillset: its name.
+        place: what its names begin with, absolute.
+        interfaces: the generated package ``<skillset>_interfaces``, or its module ``msg``; imported by name by default.
+    """
+
+    def __init__(self, skillset: str, place: str, interfaces: ModuleType | None = None) -> None:
+        self.loop = Loop(f"the client of {skillset}" if interfaces is None else f"the managers of {skillset}", self._raised)
+        self.host: Host = self.loop
+        self.server = ""
+        """The node of the managers, as a client has heard of it."""
+        self._skillset = skillset
+        self._place = place
+        self._interfaces = interfaces
+        self._workers = Workers(f"{skillset}_hooks", self.log)
+        self._over = threading.Event()
+        self._parts: list[Callable[[], object]] = []
+
+    # --- the loop ----------------------------------------------------------------------------------------------------
+
+    def now_ns(self) -> int:
+        """Return the mission clock."""
+        return now_ns()
+
+    def at(self, when_ns: int, job: Job) -> Alarm:
+        """Have a job done at a moment of the mission clock."""
+        return self.loop.at(when_ns, job)
+
+    def later(self, delay_s: float, job: Job) -> Alarm:
+        """Have a job done after a delay of wall clock."""
+        return self.loop.after(delay_s, job)
+
+    def submit(self, job: Job) -> None:
+        """Have a job done on the loop."""
+        self.loop.submit(job)
+
+    def defer(self, job: Job) -> None:
+        """Have a job done on a thread of its own."""
+        self._workers.submit(job)
+
+    def when(self, condition: Callable[[], bool], job: Job) -> None:
+        """Have a job done once a condition holds."""
+        if condition():
+            self.submit(job)
+        else:
+            self.later(LOOK_S, lambda: self.when(condition, job))
+
+    def log(self, error: str) -> None:
+        """Log an error."""
+        rospy.logerr("%s", error)
+
+    def new_id(self) -> str:
+        """Return a random id."""
+        return uuid.uuid4().hex[:ID_DIGITS]
+
+    def _raised(self, error: Exception) -> None:
+        self.log(f"{self._skillset}: {type(error).__name__}: {error}")
+
+    # --- topics ------------------------------------------------------------------------------------------------------
+
+    def name(self, relative: str) -> str:
+        """Return a name of the skillset's."""
+        return f"{self._place}/{relative}"
+
+    def advertise(self, topic: Topic) -> RospyPublisher:
+        """Open a topic for publishing."""
+        if topic.name in TOPICS:
+            codec = TOPICS[topic.name]
+            kind, encode = codec.kind, functools.partial(codec.encode, self._skillset)
+        else:
+            kind = message_class(topic.type_name)
+            encode = functools.partial(_wrap if topic.wrapped else _value, kind)
+        publisher = RospyPublisher(self.name(topic.name), kind, encode, topic.keep)
+        self._parts.append(publisher.unregister)
+        return publisher
+
+    def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
+        """Follow a topic; the type of a data comes with each message."""
+        if topic.name in TOPICS:
+            codec = TOPICS[topic.name]
+            subscriber = self.listen(self.name(topic.name), codec.kind, lambda message: callback(codec.decode(message)))
+            return lambda: is_connected(subscriber, self.server)
+        if topic.outside:
+            take: OnValue = lambda message: callback(Sample(message.data if topic.wrapped else message, None))  # noqa: E731
+            self.listen(topic.name, message_class(topic.type_name), take, queue_size=SOURCE_QUEUE)
+        else:
+            self.listen(self.name(topic.name), rospy.AnyMsg, lambda raw: self._take_raw(topic, raw, callback))
+        return lambda: True
+
+    def listen(self, name: str, kind: Any, callback: OnValue, *, queue_size: int | None = None) -> Any:
+        """Subscribe; the callback comes on the loop."""
+        hand_over = lambda message: self.submit(lambda: callback(message))  # noqa: E731
+        subscriber = rospy.Subscriber(name, kind, hand_over, queue_size=queue_size, tcp_nodelay=True)
+        self._parts.append(subscriber.unregister)
+        return subscriber
+
+    def _take_raw(self, topic: Topic, raw: Any, callback: OnValue) -> None:
+        type_name = raw._connection_header["type"]  # noqa: SLF001 - rospy's way to tell
+        kind = get_message_class(type_name)
+        if kind is None:
+            rospy.logwarn_once(f"{topic.name}: no Python package has the type {type_name}; its values can't be followed here")
+            return
+        message = kind().deserialize(raw._buff)  # noqa: SLF001 - the bytes of an AnyMsg
+        callback(Sample(message.data if topic.wrapped else message, None))
+
+    # --- services ----------------------------------------------------------------------------------------------------
+
+    def serve(self, service: str, handler: Serve) -> None:
+        """Serve a service; each call has a thread of rospy's, which waits for its answer."""
+        codec = SERVICES[service]
+
+        def answer(request: Any) -> Any:
+            replies: queue.SimpleQueue[Any] = queue.SimpleQueue()
+            fields = {name: getattr(request, name) for name in codec.fields}
+            self.submit(lambda: handler(fields, replies.put))
+            try:
+                value = replies.get(timeout=ANSWER_S)
+            except queue.Empty:
+                raise rospy.ServiceException(f"{service} was not answered within {ANSWER_S:g} s") from None
+            response = codec.kind._response_class()  # noqa: SLF001 - genpy's way to tell
+            codec.encode(value, response)
+            return response
+
+        self._parts.append(rospy.Service(self.name(service), codec.kind, answer).shutdown)
+
+    def call(
+        self,
+        service: str,
+        request: Mapping[str, object],
+        on_reply: OnReply,
+        on_error: OnError,
+        *,
+        timeout_s: float = CALL_S,
+        once: bool = False,  # noqa: ARG002 - no answer gets lost that its caller could ask for again
+    ) -> None:
+        """Call a service."""
+        codec = SERVICES[service]
+        reply: OnValue = lambda response: self.submit(lambda: on_reply(codec.decode(response), 1))  # noqa: E731
+        error: OnError = lambda reason: self.submit(lambda: on_error(reason))  # noqa: E731
+        message = codec.kind._request_class(**request)  # noqa: SLF001 - genpy's way to tell
+        call(self.name(service), codec.kind, message, reply, error, timeout_s=timeout_s)
+
+    # --- actions -----------------------------------------------------------------------------------------------------
+
+    def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> RospyServer:
+        """Serve a skill."""
+        server = RospyServer(self, action_types(self._messages, skill), skill, on_goal, on_cancel)
+        self._parts.append(server.unregister)
+        return server
+
+    def action(self, skill: str, listener: GoalListener) -> RospyLink:
+        """Connect to a skill."""
+        link = RospyLink(self, action_types(self._messages, skill), skill, listener)
+        self._parts.append(link.unregister)
+        return link
+
+    @property
+    def _messages(self) -> ModuleType:
+        if self._interfaces is None:
+            self._interfaces = importlib.import_module(f"{self._skillset}_interfaces.msg")
+        return self._interfaces
+
+    # --- life --------------------------------------------------------------------------------------------------------
+
+    def announce(self, life: str, on_rival: OnError) -> None:  # noqa: ARG002 - the master tells of rivals before
+        """Give signs of life from a thread of their own: simulated time may stand still, and hooks be slow."""
+        publisher = rospy.Publisher(self.name("alive"), Header, latch=True, queue_size=1)
+        self._parts.append(publisher.unregister)
+
+        def beat() -> None:
+            while not self._over.is_set() and not rospy.is_shutdown():
+                sign = Header(frame_id=life)
+                set_stamp(sign.stamp, now_ns())
+                publisher.publish(sign)
+                self._over.wait(ALIVE_PERIOD_S)
+
+        threading.Thread(target=beat, name=f"{self._place}_alive", daemon=True).start()
+
+    def watch(self, on_sign: OnValue, on_doubt: Job) -> None:
+        """Be told of the life of managers, and of their silence, once in a lease."""
+        heard_s: list[float] = []
+
+        def hear(sign: Any) -> None:
+            self.server = sign._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell who sent it
+            heard_s[:] = [time.monotonic()]
+            on_sign(sign.frame_id)
+
+        signs = self.listen(self.name("alive"), Header, hear)
+
+        def look() -> None:
+            lease_s = LEASE_S if is_connected(signs) else BROKEN_LEASE_S
+            if heard_s and time.monotonic() - heard_s[0] > lease_s:
+                heard_s[:] = [time.monotonic()]
+                on_doubt()
+            self.later(WATCH_S, look)
+
+        self.later(WATCH_S, look)
+
+    def close_hooks(self, timeout_s: float) -> bool:
+        """Wait for all deferred jobs."""
+        return self._workers.close(timeout_s)
+
+    def close(self) -> None:
+        """Take all topics and services away, and end the loop."""
+        self._over.set()
+        self.loop.close()
+        for unregister in self._parts:
+            unregister()
+
+
+class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy has no types
+    """A topic's writing end, with a history for who subscribes late.
+
+    A latched topic of ROS 1 keeps one message. Where more are to be kept, every new subscriber is sent what the others have had, as
+    a transient local topic of ROS 2 would; a message that is published in that very moment may come before, and once more within it.
+    """
+
+    def __init__(self, name: str, kind: Any, encode: Callable[[Any], Any], keep: int) -> None:
+        super().__init__()
+        self._encode = encode
+        self._lock = threading.Lock()
+        self._history: deque[Any] = deque(maxlen=keep)
+        options = {"latch": True} if keep == 1 else {"subscriber_listener": self}
+        self._publisher: Any = rospy.Publisher(name, kind, queue_size=QUEUE, **options)
+
+    def publish(self, value: Any) -> None:
+        """Send a value."""
+        message = self._encode(value)
+        with self._lock:
+            self._history.append(message)
+            self._publisher.publish(message)
+
+    def peer_subscribe(self, topic_name: str, topic_publish: OnValue, peer_publish: OnValue) -> None:  # noqa: ARG002
+        """Send the history to somebody who has just subscribed."""
+        with self._lock:
+            for message in self._history:
+                peer_publish(message)
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait (wall clock) until all was handed to the network.
+
+        rospy doesn't tell when its sending threads have done their work: nothing was left to send for a while.
+        """
+        end = time.monotonic() + timeout_s
+        quiet_since = time.monotonic()
+        while (now := time.monotonic()) < end and now - quiet_since < QUIET_S and self._publisher.get_num_connections():
+            if any(getattr(connection, "_queue", None) for connection in self._publisher.impl.connections):
+                quiet_since = now
+            time.sleep(FLUSH_STEP_S)
+
+    def unregister(self) -> None:
+        """Take the topic away."""
+        self._publisher.unregister()
+
+
+def _value(kind: Any, sample: Sample) -> Any:  # noqa: ARG001 - as where it is wrapped
+    return sample.value
+
+
+def _wrap(kind: Any, sample: Sample) -> Any:
+    return kind(data=sample.value)
