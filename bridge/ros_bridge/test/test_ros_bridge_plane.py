@@ -19,6 +19,7 @@ topics:
   - {name: /bp/up_latched, direction: ros1_to_ros2, type: std_msgs/String, latched: true, depth: 1}
   - {name: /bp/down_latched, direction: ros2_to_ros1, type: std_msgs/String, latched: true, depth: 1}
   - {name: /bp/flood, direction: ros1_to_ros2, type: std_msgs/String, depth: 10}
+  - {name: /bp/burst, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {name: /bp/fake, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {ros1_name: /bp/fake, ros2_name: /bp/fake_too, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
 """
@@ -180,6 +181,28 @@ def test_lost_publisher_is_found_again_within_two_seconds(ros2, master, bridge):
     wait_until(lambda: "again" in received, "it is tried again", LIMIT_S)
     assert time.monotonic() - start < 10.0  # 0.1 s, 0.2 s, 0.4 s of waiting, and a loaded machine
     fake.close()
+
+
+def test_burst_goes_out_as_fast_as_subscribers_keep_up_and_none_of_it_is_lost(ros2, master, bridge):
+    """900 messages at once: a subscriber with ROS 2's usual queue of 10 would lose most of them if they came at once.
+
+    How fast they went out is read from DDS's time stamps, so it does not matter when this process is scheduled.
+    """
+    received: list[tuple[str, int]] = []
+    ros2.listen("/bp/burst", String, lambda message, info: received.append((message.data, info["source_timestamp"])), 2000)
+    hello = greeting("/bp/burst")
+    probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/burst")
+    wait_until(lambda: received, "a probe arrives: the ends in ROS 2 know each other", LIMIT_S)
+    probe.close()
+    sent = [f"{number:03}" for number in range(900)]
+    fake = FakePublisher(master, [hello + b"".join(frame(text) for text in sent), hello], "/bp/burst")
+    wait_until(lambda: received[-1][0] == sent[-1], "the last one arrives", LIMIT_S)
+    fake.close()
+    burst = [(text, stamp_ns) for text, stamp_ns in received if text != "(probe)"]
+    assert [text for text, _ in burst] == sent
+    stamps_ms = [(stamp_ns - burst[0][1]) / 1e6 for _, stamp_ns in burst]
+    early_ms = [stamp_ms for stamp_ms in stamps_ms if stamp_ms < 90]  # one that lasts for 100 ms goes out faster
+    assert max(sum(begin <= stamp < begin + 5 for stamp in stamps_ms) for begin in early_ms) <= 5 * 5 + 5 + 1
 
 
 def test_flood_crosses_in_order_and_what_has_to_go_is_counted(ros2, master, bridge):

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "counters.hpp"
 #include "layout.hpp"
@@ -16,7 +17,8 @@ namespace plane {
 namespace {
 
 constexpr size_t kReadBytes = kLargeBytes + sizeof(uint32_t);
-constexpr int kMostReads = 64;  // of one connection in a row
+constexpr size_t kMostRoomBytes = size_t{1} << 20;  // for small messages that wait
+constexpr int kMostReads = 64;                      // of one connection in a row
 
 }  // namespace
 
@@ -77,18 +79,21 @@ bool InConnection::receive() {
     room = large_bytes_ - large_->size();
   } else {
     received_.reserve(kReadBytes);
-    if (received_.size() == received_.capacity() && !skip_oldest()) return false;
+    if (received_.size() == received_.capacity()) make_room();
+    if (received_.size() == received_.capacity()) return false;
     to = received_.data() + received_.size();
     room = received_.capacity() - received_.size();
   }
   const ssize_t number = recv(fd_, to, room, MSG_DONTWAIT);
   if (number < 0 && (errno == EAGAIN || errno == EINTR)) return false;
-  if (number <= 0 && rests_) {
-    ends_ = true;  // what the publisher has sent before it went does not wait
-    take_messages();
-  }
   if (number <= 0) {
-    shut(number == 0 ? "the publisher has closed the connection" : std::strerror(errno));
+    const char * reason = number == 0 ? "the publisher has closed the connection" : std::strerror(errno);
+    if (!rests_) {
+      shut(reason);
+    } else {  // what it has sent before crosses first
+      end_ = reason;
+      loop_.remove(std::exchange(key_, 0), fd_);
+    }
     return false;
   }
   if (large_) {
@@ -102,19 +107,33 @@ bool InConnection::receive() {
   return static_cast<size_t>(number) == room;
 }
 
-// Make room among what waits. Returns false if that is a message that is not here as a whole.
-bool InConnection::skip_oldest() {
-  size_t done = 0, number = 0;
-  while (received_.size() - done > received_.size() / 2) {
-    const size_t rest = received_.size() - done;
-    if (rest < sizeof(uint32_t) || rest - sizeof(uint32_t) < length_at(received_.data() + done)) break;
-    done += sizeof(uint32_t) + length_at(received_.data() + done);
-    ++number;
-  }
+void InConnection::make_room() {
+  if (received_.capacity() < kMostRoomBytes) return received_.reserve(std::min(2 * received_.capacity(), kMostRoomBytes));
+  skip_oldest(waiting() / 2);
+}
+
+// Count the messages that are here as a whole.
+size_t InConnection::waiting() const {
+  size_t number = 0;
+  for (size_t at = 0; (at = behind_message(at)) != 0;) ++number;
+  return number;
+}
+
+// Return where the message ends that begins there, or 0 if it is not here as a whole.
+size_t InConnection::behind_message(size_t at) const {
+  if (received_.size() - at < sizeof(uint32_t)) return 0;
+  const size_t length = length_at(received_.data() + at);
+  return received_.size() - at - sizeof(uint32_t) < length ? 0 : at + sizeof(uint32_t) + length;
+}
+
+void InConnection::skip_oldest(size_t kept) {
+  const size_t all = waiting();
+  if (all <= kept) return;
+  size_t done = 0;
+  for (size_t i = kept; i < all; ++i) done = behind_message(done);
   std::memmove(received_.data(), received_.data() + done, received_.size() - done);
   received_.set_size(received_.size() - done);
-  inbox_.on_skipped(number);
-  return number > 0;
+  inbox_.on_skipped(all - kept);
 }
 
 void InConnection::take_header() {
@@ -165,7 +184,7 @@ void InConnection::take_messages() {
       continue;
     }
     if (received_.size() - done < sizeof(uint32_t) + length) break;
-    if (!ends_ && !inbox_.ready()) {
+    if (!inbox_.ready()) {
       rests_ = true;
       loop_.rest(shared_from_this());
       loop_.change(key_, fd_, 0);  // a flood is read once a rest, not once a message: its receivers need the processor
@@ -180,11 +199,14 @@ void InConnection::take_messages() {
 }
 
 void InConnection::on_rested() {
-  for (int i = 0; i < kMostReads && state_ == State::kOpen && receive(); ++i) {}
-  rests_ = false;
   if (state_ != State::kOpen) return;
+  for (int i = 0; i < kMostReads && end_.empty() && receive(); ++i) {}
+  rests_ = false;
+  skip_oldest(inbox_.room());
   take_messages();
-  if (!rests_ && state_ == State::kOpen) loop_.change(key_, fd_, EPOLLIN);
+  if (rests_ || state_ != State::kOpen) return;
+  if (end_.empty()) loop_.change(key_, fd_, EPOLLIN);
+  else shut(end_);
 }
 
 // The received bytes begin with a large message: move it to a buffer of its own. Returns whether it was there as a whole.

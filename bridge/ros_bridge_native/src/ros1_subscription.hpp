@@ -24,6 +24,8 @@ class Inbox {
   virtual bool on_open(InConnection & connection) = 0;
   // Return whether another small message may come now; if not, the connection rests for a millisecond.
   virtual bool ready() = 0;
+  // How many small messages may wait while the connection rests.
+  virtual size_t room() const = 0;
   // That many messages had to go while the connection rested.
   virtual void on_skipped(size_t number) = 0;
   virtual void on_small(InConnection & connection, const uint8_t * message, size_t size) = 0;
@@ -60,7 +62,10 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   bool receive();
   void take_messages();
   void take_header();
-  bool skip_oldest();
+  void make_room();
+  size_t waiting() const;
+  size_t behind_message(size_t at) const;
+  void skip_oldest(size_t kept);
   bool begin_large();
   void end_large();
 
@@ -70,7 +75,7 @@ class InConnection : public Handler, public std::enable_shared_from_this<InConne
   const std::string greeting_;
   const TopicIdentity & identity_;
   State state_ = State::kConnecting;
-  bool ends_ = false;
+  std::string end_;     // why there is nothing more to receive
   bool rests_ = false;  // what comes waits in received_, of which the oldest goes when it is full
   int fd_ = -1;
   Key key_ = 0;

@@ -7,6 +7,7 @@ namespace plane {
 namespace {
 
 constexpr size_t kMostWaitingBytes = 64u << 20;
+constexpr size_t kRoom = 1000, kRoomPerDepth = 10;  // small messages of a backlog
 constexpr size_t kMostWriters = 64;
 constexpr size_t kMostSendersFollowed = 256;
 
@@ -18,7 +19,7 @@ void Route::count_bad(Events & events, uint64_t token, const std::string & from)
 }
 
 Ros1ToRos2Route::Ros1ToRos2Route(Context & context, Specification specification)
-: context_(context), specification_(std::move(specification)), tokens_(static_cast<double>(specification_.quality.depth)) {
+: context_(context), specification_(std::move(specification)), pace_(specification_.quality.depth) {
   if (specification_.node != nullptr) writers_.push_back({make_writer(), "", false});
 }
 
@@ -83,17 +84,7 @@ size_t Ros1ToRos2Route::target_peers() {
   return writers_.empty() ? 0 : writers_.front().publisher->peers();
 }
 
-// At most `depth` messages a millisecond go out. A burst, such as what has piled up while this process had no processor, would push older
-// messages out of the queues of ROS 2's subscribers, which are mostly as deep, before they are scheduled to take them.
-bool Ros1ToRos2Route::ready() {
-  const auto most = static_cast<double>(specification_.quality.depth);
-  const int64_t now = now_ns();
-  tokens_ = std::min(most, tokens_ + static_cast<double>(now - tokens_at_ns_) * 1e-6 * most);
-  tokens_at_ns_ = now;
-  if (tokens_ < 1.0) return false;
-  tokens_ -= 1.0;
-  return true;
-}
+size_t Ros1ToRos2Route::room() const { return std::max(kRoom, kRoomPerDepth * specification_.quality.depth); }
 
 void Ros1ToRos2Route::on_small(InConnection & connection, const uint8_t * message, size_t size) {
   if (!through_python() && under_way_.load(std::memory_order_acquire) == 0) return publish(connection.writer, message, size, now_ns());

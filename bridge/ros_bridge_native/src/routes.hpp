@@ -11,6 +11,7 @@
 #include "counters.hpp"
 #include "events.hpp"
 #include "loop.hpp"
+#include "pace.hpp"
 #include "python_queue.hpp"
 #include "ros1_publisher.hpp"
 #include "ros1_server.hpp"
@@ -86,7 +87,8 @@ class Ros1ToRos2Route : public Route, public Inbox, public Job {
   };
 
   bool on_open(InConnection & connection) override;
-  bool ready() override;
+  bool ready() override { return pace_.take(now_ns()); }
+  size_t room() const override;
   void on_skipped(size_t number) override { counters.dropped_overrun.fetch_add(number); }
   void on_small(InConnection & connection, const uint8_t * message, size_t size) override;
   Frame buffer() override { return pool_->get(); }
@@ -102,8 +104,7 @@ class Ros1ToRos2Route : public Route, public Inbox, public Job {
   Context & context_;
   const Specification specification_;
   std::map<uint64_t, std::shared_ptr<InConnection>> connections_;  // the loop's thread only
-  double tokens_;                                                  // the loop's thread only
-  int64_t tokens_at_ns_ = 0;
+  Pace pace_;                                                      // the loop's thread only
   std::mutex writers_mutex_;
   std::vector<Writer> writers_;
   std::shared_ptr<Pool> pool_ = std::make_shared<Pool>();
