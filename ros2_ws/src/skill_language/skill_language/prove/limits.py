@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+DEFAULT_TIME_S = 30.0
+"""How long the proofs of a file may take."""
+
 
 class OutOfTimeError(Exception):
     """The time given is over."""
