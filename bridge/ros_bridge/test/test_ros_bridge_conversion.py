@@ -94,6 +94,8 @@ def test_cdr_is_what_the_layout_says(types):
         + struct.pack("<?", True)  # ok
         + struct.pack("<I", 0)  # reason, empty
         + struct.pack("<dd", 10.0, 0.25)  # rate_hz, age_s
+        + struct.pack("<B", 2)  # verdict
+        + struct.pack("<I4s", 4, b"blur")  # fault
     )
     # ... and as CDR: no seq, strings end with a zero, each field aligned to its size from behind the encapsulation
     cdr = (
@@ -105,6 +107,8 @@ def test_cdr_is_what_the_layout_says(types):
         + struct.pack("<I1s", 1, b"\0")
         + bytes(7)  # to 8 bytes
         + struct.pack("<dd", 10.0, 0.25)
+        + struct.pack("<B3x", 2)
+        + struct.pack("<I5s", 5, b"blur\0")
     )
     health = types.message("uav_msgs/SensorHealth")
     assert health.to_ros2(ros1).hex() == cdr.hex()

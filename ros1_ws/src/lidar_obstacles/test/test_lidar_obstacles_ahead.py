@@ -1,4 +1,4 @@
-"""From a sweep to the obstacle ahead of the motion, and the judging of clouds."""
+"""From a sweep to the obstacle ahead of the motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from lidar_obstacles import CloudJudge, LidarSettings, obstacle_ahead
+from lidar_obstacles import LidarAhead, LidarSettings
 from perception_core import NS, Motion, PoseBuffer, Sweep
 from perception_core.testing import box_cloud
 
@@ -27,8 +27,12 @@ def crab(yaw=0.0, position=(0.0, 0.0, 3.0), velocity=(0.0, 0.0, 0.0)) -> PoseBuf
     return poses
 
 
+def ahead(cloud, poses, motion, **settings):
+    return LidarAhead(LidarSettings(**settings).ahead).look(cloud, T_base_lidar=T_BASE_LIDAR, poses=poses, motion=motion)
+
+
 def look(cloud, poses, motion):
-    return obstacle_ahead(cloud, T_base_lidar=T_BASE_LIDAR, poses=poses, motion=motion, settings=LidarSettings().ahead)
+    return ahead(cloud, poses, motion).nearest
 
 
 @given(st.floats(-3.1, 3.1), st.floats(2.5, 10.0), st.integers(0, 1000))
@@ -62,13 +66,21 @@ def test_a_sweep_in_motion_is_measured_from_its_end() -> None:
     assert found.distance_m == pytest.approx(5.8, abs=0.01)
 
 
-def test_empty_and_frozen_clouds_are_complained_about() -> None:
-    judge = CloudJudge(min_returns=20, self_m=1.2)
-    first, second = box_cloud((5.0, 0.0, 0.0), seed=1), box_cloud((5.0, 0.0, 0.0), seed=2)
-    assert judge.complaint(first.tobytes(), sweep(first)) == ""
-    assert judge.complaint(second.tobytes(), sweep(second)) == ""
-    assert judge.complaint(second.tobytes(), sweep(second)) == "cloud is frozen"
-    own = first[-50:]
-    assert judge.complaint(own.tobytes(), sweep(own)) == "cloud is empty: 0 returns"
-    nothing = np.full((100, 3), np.nan, np.float32)
-    assert judge.complaint(nothing.tobytes(), sweep(nothing)) == "cloud is empty: 0 returns"
+def test_where_the_lidar_does_not_look_is_unknown_and_not_free() -> None:
+    rng = np.random.default_rng(5)
+    # The scan plane is across the nose: nothing but the two sides, a floor of 30 degrees' width below, and no return from ahead.
+    sides = np.column_stack([rng.choice([-6.0, 6.0], 500), rng.uniform(-2, 2, 500), rng.uniform(-1.5, 1.5, 500)])
+    forward = ahead(sweep(sides), crab(), Motion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
+    assert forward.nearest is None
+    assert forward.unknown == "the LiDAR does not look where the vehicle goes: 0 returns from there"
+    assert ahead(sweep(sides), crab(), Motion(velocity_enu_m_s=(1.0, 0.0, 0.0)), min_ahead=0).unknown == ""
+    assert ahead(sweep(sides), crab(), Motion(velocity_enu_m_s=(0.0, 1.0, 0.0))).nearest is not None
+
+
+@pytest.mark.parametrize("distance_m", [1.15, 1.5, 3.0])
+def test_what_is_just_outside_of_the_vehicle_is_an_obstacle(distance_m) -> None:
+    rng = np.random.default_rng(6)
+    pole = np.column_stack([distance_m + rng.normal(0, 0.01, 60), rng.uniform(-0.4, 0.4, 60), rng.normal(0, 0.02, 60)])
+    found = look(sweep(pole), crab(), Motion(target_enu_m=(0.0, 20.0, 3.0)))
+    assert found is not None
+    assert found.distance_m == pytest.approx(distance_m, abs=0.05)

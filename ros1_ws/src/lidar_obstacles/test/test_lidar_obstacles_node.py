@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
+from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.msg import Config
+from dynamic_reconfigure.srv import Reconfigure
 from std_srvs.srv import SetBool
-from uav_msgs.msg import Obstacle
+from uav_msgs.msg import Obstacle, SensorHealth
 
 from alula_testing.ros1 import wait_until
 from perception_core import NS
@@ -18,7 +22,7 @@ NODE = str(Path(__file__).parents[1] / "scripts" / "lidar_obstacles_node")
 
 
 class Scanner:
-    """What the faked LiDAR sends: ``good``, ``dead``, ``empty`` or ``frozen``; a box at a place in its frame."""
+    """What the faked LiDAR sends: ``good`` or broken in a way; a box at a place in its frame."""
 
     def __init__(self, flight: FakeFlight, place) -> None:
         self.flight, self.place, self.mode = flight, place, "good"
@@ -26,12 +30,26 @@ class Scanner:
         flight.at_10_hz = self
 
     def __call__(self, stamp_ns: int) -> None:
-        if self.mode == "dead":
-            return
         if self.mode == "good":
             self.last_good_ns = stamp_ns
         points = box_cloud(self.place, seed=self.last_good_ns // 1000 % 2**31)
-        self.flight.publish_cloud(stamp_ns, points[:0] if self.mode == "empty" else points)
+        fresh = box_cloud(self.place, seed=stamp_ns // 1000 % 2**31)
+        flickering = points.copy()
+        flickering[3, 2] += stamp_ns % 7
+        broken = {
+            "good": (points, 0.0),
+            "empty": (points[:0], 0.0),
+            "frozen": (flickering, 0.0),
+            "blind": (fresh[fresh[:, 0] < np.abs(fresh[:, 1])], 0.0),
+            "millimetres": (fresh * 1000, 0.0),
+            "future": (fresh, 10.0),
+            "late": (fresh, -1.0),
+        }
+        if self.mode == "cut short":
+            self.flight.publish_cut_cloud(stamp_ns, fresh)
+        elif self.mode != "dead":
+            cloud, ahead_s = broken[self.mode]
+            self.flight.publish_cloud(stamp_ns + int(ahead_s * NS), cloud)
 
 
 @pytest.fixture
@@ -51,38 +69,87 @@ def obstacles():
     subscriber.unregister()
 
 
+def enable() -> None:
+    assert rospy.ServiceProxy("/lidar_obstacles/enable", SetBool)(True).success
+
+
 def test_sideways_towards_a_box_and_away_from_it(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
     Scanner(flight, (0.0, 6.0, 0.0))  # to the left of the nose
     flight.target = (0.0, 30.0, 2.0)
     assert flight.run(3.0, until=lambda: bool(flight.reports))
     assert (flight.reports[0].resource, flight.reports[0].to) == ("lidar_status", "OK")
     assert not obstacles
-    assert rospy.ServiceProxy("/lidar_obstacles/enable", SetBool)(True).success
+    enable()
     enabled_ns = flight.now_ns
     assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
     assert obstacles[0].header.stamp.to_nsec() - enabled_ns <= 0.2 * NS
     assert (obstacles[-1].source, obstacles[-1].header.frame_id, obstacles[-1].detected) == ("lidar", "map", True)
     assert abs(obstacles[-1].distance_m - 5.75) < 0.15
     assert abs(obstacles[-1].nearest_enu_m.y - 5.75) < 0.15
+    assert abs(obstacles[-1].size_m.y - 0.6) < 0.15
     flight.target = (30.0, 0.0, 2.0)
     obstacles.clear()
     assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
     assert not obstacles[-1].detected
+    assert not obstacles[-1].unknown
     assert np.isinf(obstacles[-1].distance_m)
 
 
-@pytest.mark.parametrize("mode", ["dead", "empty", "frozen"])
-def test_broken_within_0_45_s_and_ok_again_after_1_s(flight: FakeFlight, mode: str) -> None:
+FAULTS = {
+    "dead": ("silent", "no measurement for 0.35 s"),
+    "empty": ("returns", "0 returns"),
+    "frozen": ("frozen", "the sweep is the same"),
+    "blind": ("sector", "no returns any more from -30 to 30 degrees"),
+    "millimetres": ("range", "are the coordinates in millimetres?"),
+    "future": ("stamp", "the stamp is 10."),
+    "late": ("stamp", "old when it arrives"),
+    "cut short": ("format", "can't be decoded"),
+}
+
+
+def test_each_fault_is_broken_within_0_45_s_never_free_and_mended_after_1_s(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
     scanner = Scanner(flight, (0.0, 6.0, 0.0))
+    flight.target = (30.0, 0.0, 2.0)  # where there is nothing
+    enable()
     assert flight.run(3.0, until=lambda: bool(flight.reports))
-    flight.run(0.5)
-    scanner.mode = mode
-    assert flight.run(2.0, until=lambda: len(flight.reports) > 1)
-    assert flight.reports[1].to == "BROKEN"
-    assert 0.35 * NS <= flight.reports[1].at_ns - scanner.last_good_ns <= 0.45 * NS
-    flight.run(0.5)
-    mended_ns = flight.now_ns
-    scanner.mode = "good"
-    assert flight.run(3.0, until=lambda: len(flight.reports) > 2)
-    assert flight.reports[2].to == "OK"
-    assert 1.0 * NS <= flight.reports[2].at_ns - mended_ns <= 1.3 * NS
+    for mode, (fault, sentence) in FAULTS.items():
+        flight.run(0.5)
+        flight.reports.clear()
+        scanner.mode = mode
+        assert flight.run(2.0, until=lambda: bool(flight.reports)), mode
+        assert flight.reports[0].to == "BROKEN", mode
+        assert 0.35 * NS <= flight.reports[0].at_ns - scanner.last_good_ns <= 0.45 * NS, mode
+        obstacles.clear()
+        flight.run(0.5)
+        health = flight.health[-1]
+        assert (health.verdict, health.fault) == (SensorHealth.BROKEN, fault), mode
+        assert sentence in health.reason, mode
+        assert all(obstacle.unknown for obstacle in obstacles), mode
+        assert bool(obstacles) == (mode != "dead"), mode
+        mended_ns = flight.now_ns
+        scanner.mode = "good"
+        assert flight.run(4.0, until=lambda: len(flight.reports) > 1), mode
+        assert flight.reports[1].to == "OK", mode
+        assert 1.0 * NS <= flight.reports[1].at_ns - mended_ns <= 1.3 * NS, mode
+
+
+def test_parameters_are_changed_in_flight_and_refused_out_of_range(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
+    Scanner(flight, (0.0, 6.0, 0.0))
+    flight.target = (0.0, 30.0, 2.0)
+    updates: list[Config] = []
+    subscriber = rospy.Subscriber("/lidar_obstacles/parameter_updates", Config, updates.append)
+    client = Client("/lidar_obstacles", timeout=10.0)
+    assert flight.run(3.0, until=lambda: bool(flight.reports))
+    enable()
+    assert client.update_configuration({"length_m": 4.0})["length_m"] == 4.0
+    assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
+    assert not obstacles[-1].detected  # the box is at 5.75 m
+    wait_until(
+        lambda: any(p.value == 4.0 for u in updates for p in u.doubles if p.name == "length_m"), timeout_s=5.0, what="the change is told"
+    )
+    change = rospy.ServiceProxy("/lidar_obstacles/set_parameters", Reconfigure)
+    with pytest.raises(rospy.ServiceException, match=r"~length_m is 0\.5, expected 1 to 50"):
+        change(encode_config({"length_m": 0.5, "half_width_m": 2.0}))
+    assert rospy.get_param("/lidar_obstacles/half_width_m") == 1.25
+    client.close()
+    subscriber.unregister()

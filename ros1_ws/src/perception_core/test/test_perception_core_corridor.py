@@ -33,6 +33,14 @@ def test_a_blob_anywhere_in_the_corridor_is_found_at_its_distance(ahead, left, u
     assert np.linalg.norm(np.array(found.point_enu_m) - ORIGIN - [ahead, left, up]) < 0.1
 
 
+def test_the_size_is_of_the_connected_thing_and_not_of_what_stands_apart() -> None:
+    rng = np.random.default_rng(4)
+    plank = ORIGIN + np.array([4.0, 0.0, 0.0]) + rng.uniform([-0.05, -0.8, -0.1], [0.05, 0.8, 0.1], (800, 3))
+    found = look(np.vstack([plank, blob(6.5)]))
+    assert found is not None
+    assert found.size_m == pytest.approx((0.1, 1.6, 0.2), abs=0.08)
+
+
 @pytest.mark.parametrize(
     ("ahead", "left", "up"), [(4, 1.4, 0), (4, -1.4, 0), (4, 0, 0.75), (4, 0, -0.75), (8.2, 0, 0), (-2, 0, 0), (0.1, 0, 0)]
 )

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception_core import NS, HealthLimits, HealthWatch, Verdict
+from perception_core import FINE, NS, Fault, HealthLimits, HealthWatch, StampJudge, StampLimits, Verdict, broken, unsure
 
 TICK = NS // 50
 
 
 class Run:
-    """Drive a watch at 50 Hz; ``source(t_s)`` is asked at 10 Hz: True good, None silent, a text bad."""
+    """Drive a watch at 50 Hz; ``source(t_s)`` is asked at 10 Hz: True good, None silent, a text bad, with a question mark not judged."""
 
     def __init__(self, source) -> None:
         self.watch, self.source, self.now = HealthWatch(HealthLimits()), source, 100 * NS
@@ -23,10 +24,9 @@ class Run:
             self.now += TICK
             if self.now % (NS // 10) == 0:
                 said = self.source((self.now - self.start) / NS)
-                if said is True:
-                    self.watch.good(self.now)
-                elif said is not None:
-                    self.watch.bad(said)
+                if said is not None:
+                    judge = unsure if said is not True and said.endswith("?") else broken
+                    self.watch.take(FINE if said is True else judge(Fault.VIEW, said), self.now)
             before = self.watch.verdict
             if self.watch.tick(self.now) is not before:
                 self.changes.append(((self.now - self.start) / NS, self.watch.verdict))
@@ -65,7 +65,7 @@ def test_a_late_tick_waits_for_what_is_still_in_the_socket() -> None:
     run = Run(lambda _t: True).go(1)
     late = run.now + NS
     assert run.watch.tick(late) is Verdict.OK
-    run.watch.good(late - NS // 20)
+    run.watch.take(FINE, late)
     assert run.watch.tick(late + TICK) is Verdict.OK
     run.now = late + TICK
     run.source = lambda _t: None
@@ -75,7 +75,7 @@ def test_a_late_tick_waits_for_what_is_still_in_the_socket() -> None:
 def test_a_clock_that_jumps_back_starts_anew() -> None:
     run = Run(lambda _t: True).go(1)
     assert run.watch.tick(5 * NS) is Verdict.UNKNOWN
-    run.watch.good(5 * NS + TICK)
+    run.watch.take(FINE, 5 * NS + TICK)
     assert run.watch.tick(5 * NS + 2 * TICK) is Verdict.OK
 
 
@@ -84,11 +84,76 @@ def test_reasons_rate_and_age() -> None:
     assert run.watch.reason == ""
     assert run.watch.rate_hz(run.now) == pytest.approx(10.0, abs=0.1)
     run.go(1.0)
-    assert run.watch.reason == "cloud is empty: 0 returns"
+    assert (run.watch.reason, run.watch.fault) == ("cloud is empty: 0 returns", Fault.VIEW)
     assert run.watch.age_s(run.now) == pytest.approx(1.0, abs=0.05)
 
 
-@given(st.lists(st.sampled_from([True, None, "bad"]), min_size=1, max_size=80))
+def test_what_can_not_be_judged_is_unknown_and_silence_after_it_is_broken() -> None:
+    run = Run(lambda t: True if t < 1 else "no texture?" if t < 3 else None).go(5)
+    assert [verdict for _, verdict in run.changes] == [Verdict.OK, Verdict.UNKNOWN, Verdict.BROKEN]
+    assert (run.watch.fault, run.watch.reason) == (Fault.SILENT, "no measurement for 0.35 s")
+    again = Run(lambda t: True if t < 1 or t > 4 else "no texture?").go(6)
+    assert [verdict for _, verdict in again.changes] == [Verdict.OK, Verdict.UNKNOWN, Verdict.OK]
+    assert 5.0 <= again.changes[2][0] <= 5.2
+
+
+def test_from_the_start_not_to_be_judged_stays_unknown() -> None:
+    assert Run(lambda _t: "no texture?").go(8).changes == []
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "limits", "sentence"),
+    [
+        (0.1, StampLimits(), ""),
+        (-0.05, StampLimits(), ""),
+        (-10.0, StampLimits(), "the stamp is 10.00 s in the future"),
+        (0.5, StampLimits(), "the measurement is 0.50 s old when it arrives"),
+        (1.7e9, StampLimits(), "the measurement is 1700000000.00 s old when it arrives"),
+        (0.5, StampLimits(latency_s=0.4), ""),
+        (0.0, StampLimits(latency_s=0.4), ""),
+        (0.9, StampLimits(latency_s=0.4), "the measurement is 0.90 s old when it arrives, 0.4 s of which are its known latency"),
+    ],
+)
+def test_stamps_against_their_arrival(delay_s, limits, sentence) -> None:
+    now = 2_000_000_000 * NS
+    finding = StampJudge(limits).finding(now - round(delay_s * NS), now)
+    assert (finding.reason, finding.fault) == (sentence, Fault.STAMP if sentence else Fault.NONE)
+
+
+def test_a_stamp_that_does_not_advance() -> None:
+    judge = StampJudge(StampLimits())
+    assert judge.finding(NS, NS).ok
+    assert judge.finding(NS, NS + NS // 10).reason == "the stamp does not advance"
+
+
+@given(st.floats(0.0, 0.6), st.floats(0.0, 0.03), st.integers(0, 1000))
+@settings(max_examples=40, deadline=None)
+def test_a_steady_latency_never_flaps(latency_s, jitter_s, seed) -> None:
+    noise = np.random.default_rng(seed)
+    judge, watch = StampJudge(StampLimits()), HealthWatch(HealthLimits())
+    changes = []
+    for k in range(1500):
+        now = 100 * NS + k * TICK
+        if k % 5 == 0:
+            watch.take(judge.finding(now - round((latency_s + noise.uniform(-jitter_s, jitter_s)) * NS), now), now)
+        before = watch.verdict
+        if watch.tick(now) is not before:
+            changes.append(watch.verdict)
+    assert len(changes) <= 2
+
+
+def test_future_stamps_then_silence_is_noticed_at_once() -> None:
+    judge = StampJudge(StampLimits())
+    run = Run(lambda _t: True).go(1)
+    for k in range(1, 60):
+        now = run.now + k * TICK
+        if k <= 10 and k % 5 == 0:
+            run.watch.take(judge.finding(now + 10 * NS, now), now)
+        run.watch.tick(now)
+    assert run.watch.verdict is Verdict.BROKEN
+
+
+@given(st.lists(st.sampled_from([True, None, "bad", "unsure?"]), min_size=1, max_size=80))
 @settings(max_examples=60, deadline=None)
 def test_never_ok_on_old_and_never_broken_on_fresh_measurements(said) -> None:
     run = Run(lambda t: said[min(round(t * 10) - 1, len(said) - 1)])
@@ -98,5 +163,7 @@ def test_never_ok_on_old_and_never_broken_on_fresh_measurements(said) -> None:
         age_s = run.watch.age_s(run.now)
         if run.watch.verdict is Verdict.OK:
             assert age_s <= 0.35
+        if run.watch.verdict is not Verdict.OK and before is Verdict.OK:
+            assert age_s > 0.35
         if run.watch.verdict is Verdict.BROKEN and before is not Verdict.BROKEN:
             assert age_s > 0.35

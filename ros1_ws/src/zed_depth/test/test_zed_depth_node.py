@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
+from sensor_msgs.msg import Image, PointCloud2
 from std_srvs.srv import SetBool
-from uav_msgs.msg import Obstacle
+from uav_msgs.msg import Obstacle, SensorHealth
 
 from alula_testing.ros1 import wait_until
 from perception_core import NS
+from perception_core.clouds import sweep_of_cloud
 from perception_core.testing import FakeFlight, wall_pair
 
 NODE = str(Path(__file__).parents[1] / "scripts" / "zed_depth_node")
@@ -20,10 +22,10 @@ CAMERA_X_M = 0.3
 
 
 class Camera:
-    """What the faked camera shows: ``good``, ``dead``, ``black`` or ``frozen``; a wall at a disparity."""
+    """What the faked camera shows: ``good`` or broken in a way; a wall at a disparity."""
 
     def __init__(self, flight: FakeFlight, disparity_px: float = 8.0) -> None:
-        self.flight, self.disparity_px, self.mode = flight, disparity_px, "good"
+        self.flight, self.disparity_px, self.mode, self.encoding = flight, disparity_px, "good", "mono8"
         self.last_good_ns = 0
         flight.at_10_hz = self
 
@@ -32,9 +34,15 @@ class Camera:
             return
         if self.mode == "good":
             self.last_good_ns = stamp_ns
-        pair = wall_pair(self.disparity_px, seed=self.last_good_ns // 1000 % 2**31)
-        for side, image in zip(("left", "right"), pair, strict=True):
-            self.flight.publish_image(side, stamp_ns, np.zeros_like(image) if self.mode == "black" else image)
+        left, right = wall_pair(self.disparity_px, seed=stamp_ns // 1000 % 2**31)
+        frozen = wall_pair(self.disparity_px, seed=self.last_good_ns // 1000 % 2**31)
+        pairs = {"black": (left * 0, right * 0), "frozen": frozen, "shifted": (left, np.roll(right, 3, axis=0)), "swapped": (right, left)}
+        scale = 2 if self.mode == "wrong info" else 1
+        for side, image in zip(("left", "right"), pairs.get(self.mode, (left, right)), strict=True):
+            pixels = np.dstack([image] * 3) if self.encoding == "bgr8" else image
+            late_ns = {"future": -10 * NS, "late": NS}.get(self.mode, 0)
+            encoding = "jpeg" if self.mode == "encoding" else self.encoding
+            self.flight.publish_image(side, stamp_ns - late_ns, pixels, encoding=encoding, info_scale=scale)
 
 
 @pytest.fixture
@@ -77,7 +85,12 @@ def test_distance_of_a_wall_while_enabled_and_silence_otherwise(flight: FakeFlig
     obstacles.clear()
     assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
     assert not obstacles[-1].detected
+    assert not obstacles[-1].unknown
     assert math.isinf(obstacles[-1].distance_m)
+    flight.target = (0.0, 30.0, 2.0)  # to the left, where the camera does not look
+    obstacles.clear()
+    assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
+    assert (obstacles[-1].unknown, obstacles[-1].reason) == (True, "the camera does not look where the vehicle goes")
     enable(on=False)
     flight.run(0.3)
     obstacles.clear()
@@ -85,25 +98,60 @@ def test_distance_of_a_wall_while_enabled_and_silence_otherwise(flight: FakeFlig
     assert not obstacles
 
 
-@pytest.mark.parametrize("mode", ["dead", "black", "frozen"])
-def test_broken_within_0_45_s_and_ok_again_after_1_s(flight: FakeFlight, mode: str) -> None:
-    camera = Camera(flight)
+def test_colour_images_become_depth_confidence_and_points(flight: FakeFlight) -> None:
+    Camera(flight, disparity_px=8.0).encoding = "bgr8"
+    seen: dict[str, list[object]] = {"depth": [], "confidence": [], "points": []}
+    kinds = {"depth": Image, "confidence": Image, "points": PointCloud2}
+    subscribers = [rospy.Subscriber(f"/zed_depth/{name}", kinds[name], seen[name].append) for name in seen]
+    enable(on=True)
+    assert flight.run(8.0, until=lambda: all(seen.values()))
+    depth, confidence = (np.frombuffer(seen[name][-1].data, "<f4") for name in ("depth", "confidence"))
+    assert np.nanmedian(depth) == pytest.approx(3.6, abs=0.05)
+    assert np.median(confidence) > 0.3
+    cloud = seen["points"][-1]
+    assert [field.name for field in cloud.fields] == ["x", "y", "z", "confidence"]
+    assert np.median(sweep_of_cloud(cloud).points[:, 2]) == pytest.approx(3.6, abs=0.05)
+    for subscriber in subscribers:
+        subscriber.unregister()
+
+
+FAULTS = {
+    "dead": ("silent", "no measurement for 0.35 s", 0.45),
+    "black": ("exposure", "left image is dark", 0.45),
+    "frozen": ("frozen", "left image is frozen", 0.45),
+    "shifted": ("calibration", "px off the left one's rows", 1.0),
+    "swapped": ("calibration", "left and right are swapped", 1.0),
+    "wrong info": ("info", "camera_info is for 960x540 images, the left image is 480x270", 0.45),
+    "future": ("stamp", "in the future", 0.45),
+    "late": ("stamp", "old when it arrives", 0.45),
+    "encoding": ("format", "image: encoding 'jpeg'; known are", 0.45),
+}
+
+
+def test_each_fault_is_broken_within_its_time_never_free_and_mended_after_1_s(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
+    camera = Camera(flight, disparity_px=2.5)  # nothing within the range
     assert flight.run(3.0, until=lambda: bool(flight.reports))
     assert (flight.reports[0].resource, flight.reports[0].to) == ("zed_status", "OK")
-    flight.run(0.5)
-    camera.mode = mode
-    assert flight.run(2.0, until=lambda: len(flight.reports) > 1)
-    broken = flight.reports[1]
-    assert broken.to == "BROKEN"
-    assert 0.35 * NS <= broken.at_ns - camera.last_good_ns <= 0.45 * NS
-    assert flight.run(1.0, until=lambda: not flight.health[-1].ok)
-    assert flight.health[-1].reason
-    flight.run(0.5)
-    mended_ns = flight.now_ns
-    camera.mode = "good"
-    assert flight.run(3.0, until=lambda: len(flight.reports) > 2)
-    assert flight.reports[2].to == "OK"
-    assert 1.0 * NS <= flight.reports[2].at_ns - mended_ns <= 1.3 * NS
+    enable(on=True)
+    for mode, (fault, sentence, within_s) in FAULTS.items():
+        flight.run(0.5)
+        flight.reports.clear()
+        camera.mode = mode
+        assert flight.run(2.0, until=lambda: bool(flight.reports)), mode
+        assert flight.reports[0].to == "BROKEN", mode
+        assert 0.35 * NS <= flight.reports[0].at_ns - camera.last_good_ns <= within_s * NS, mode
+        obstacles.clear()
+        flight.run(0.5)
+        health = flight.health[-1]
+        assert (health.verdict, health.fault) == (SensorHealth.BROKEN, fault), mode
+        assert sentence in health.reason, mode
+        assert all(obstacle.unknown for obstacle in obstacles), mode
+        assert bool(obstacles) == (mode != "dead"), mode
+        mended_ns = flight.now_ns
+        camera.mode = "good"
+        assert flight.run(4.0, until=lambda: len(flight.reports) > 1), mode
+        assert flight.reports[1].to == "OK", mode
+        assert 1.0 * NS <= flight.reports[1].at_ns - mended_ns <= 1.5 * NS, mode
 
 
 def test_nothing_at_the_start_is_unknown_then_broken(flight: FakeFlight) -> None:

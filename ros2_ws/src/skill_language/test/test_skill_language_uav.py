@@ -57,7 +57,7 @@ def test_listings_1_and_2(navigation):
     }
 
 
-STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "BROKEN"), ("BROKEN", "OK")]
+STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "BROKEN"), ("BROKEN", "OK"), ("BROKEN", "UNKNOWN")]
 
 
 @pytest.mark.parametrize(

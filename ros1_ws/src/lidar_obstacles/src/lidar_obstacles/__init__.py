@@ -1,6 +1,8 @@
-"""The nearest obstacle ahead of the motion from the LiDAR's sweeps. The node is in ``lidar_obstacles.node``."""
+"""The LiDAR's health, and the nearest obstacle ahead of the motion from its sweeps. The node is in ``lidar_obstacles.node``."""
 
-from lidar_obstacles.ahead import AheadSettings, CloudJudge, obstacle_ahead
+from lidar_obstacles.ahead import Ahead, AheadSettings, Body, LidarAhead
+from lidar_obstacles.cloud_health import CloudJudge, CloudLimits
+from lidar_obstacles.ground import GroundModel, GroundSettings
 from lidar_obstacles.settings import LidarSettings
 
-__all__ = ["AheadSettings", "CloudJudge", "LidarSettings", "obstacle_ahead"]
+__all__ = ["Ahead", "AheadSettings", "Body", "CloudJudge", "CloudLimits", "GroundModel", "GroundSettings", "LidarAhead", "LidarSettings"]

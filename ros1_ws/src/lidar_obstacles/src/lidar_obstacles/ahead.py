@@ -1,58 +1,98 @@
-"""From a sweep to the nearest obstacle ahead of the motion, and whether a cloud is fit to be used."""
+"""From a sweep to the nearest obstacle ahead of the motion."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from lidar_obstacles.ground import ASIDE_M, BEHIND_M, GroundModel, GroundSettings
 from perception_core import Corridor, Motion, Nearest, PoseBuffer, Support, Sweep, deskew, direction_of_motion, nearest_obstacle
+from perception_core.corridor import corridor_coordinates
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+Floats = NDArray[np.float64]
+BLUR_M = 1.0  # by as much at most a point is moved when its sweep is straightened, within the region that is looked at
+VIEW_DEG = 25.0  # the sensor sees the way ahead if it has returns within this angle of it, seen from above ...
+STEEP_DEG = 60.0  # ... that are not below or above the vehicle
+
+
+@dataclass(frozen=True)
+class Body:
+    """The vehicle: a cylinder around base_link's z axis. Returns from inside it are its own."""
+
+    radius_m: float = 1.0
+    half_height_m: float = 0.6
 
 
 @dataclass(frozen=True)
 class AheadSettings:
-    """Where to look, and what to believe; returns nearer than ``self_m`` to the sensor are the vehicle's own."""
+    """Where to look, what to believe, what is the vehicle itself and what is ground.
+
+    With fewer than ``min_ahead`` returns from the direction of the motion, near or far, nobody knows what is there.
+    """
 
     corridor: Corridor
     support: Support
-    self_m: float = 1.2
+    body: Body
+    ground: GroundSettings
+    min_ahead: int = 3
 
 
-def obstacle_ahead(
-    sweep: Sweep,
-    *,
-    T_base_lidar: NDArray[np.float64],  # noqa: N803 -- T_target_source
-    poses: PoseBuffer,
-    motion: Motion,
-    settings: AheadSettings,
-) -> Nearest | None:
-    """Return the nearest obstacle in the corridor, in the map, or None; raise PoseUnavailableError.
+@dataclass(frozen=True)
+class Ahead:
+    """What is ahead: the nearest obstacle, or None; then ``unknown`` says why the corridor can't be called free, or nothing."""
 
-    Distances are from where the vehicle was at the end of the sweep, the newest moment that the cloud speaks of.
-    """
-    reach_m = settings.corridor.length_m + 2.0 * settings.corridor.half_width_m
-    near = sweep.within(settings.self_m, reach_m)
-    in_map = deskew(near, poses, T_base_lidar)
-    pose = poses.at([sweep.end_ns]).matrix()
-    direction = direction_of_motion(pose[:3, 3], pose[:3, 0], motion)
-    return nearest_obstacle(in_map, pose[:3, 3], direction, settings.corridor, settings.support)
+    nearest: Nearest | None
+    unknown: str = ""
 
 
-class CloudJudge:
-    """Find what is wrong with a cloud; not thread-safe. A working LiDAR always sees the ground, and never twice the same."""
+class LidarAhead:
+    """Look ahead by sweeps in their order; not thread-safe."""
 
-    def __init__(self, *, min_returns: int, self_m: float) -> None:
-        self._min_returns = min_returns
-        self._self_m = self_m
-        self._previous: bytes = b""
+    def __init__(self, settings: AheadSettings) -> None:
+        self._settings = settings
+        self._ground = GroundModel(settings.ground)
 
-    def complaint(self, data: bytes, sweep: Sweep) -> str:
-        """Return why the cloud (its raw bytes and its sweep) is of no use, or an empty text; call it once for each cloud, in order."""
-        previous, self._previous = self._previous, data
-        returns = len(sweep.within(self._self_m, float("inf")).points)
-        if returns < self._min_returns:
-            return f"cloud is empty: {returns} returns"
-        return "cloud is frozen" if data == previous else ""
+    def look(
+        self,
+        sweep: Sweep,
+        *,
+        T_base_lidar: Floats,  # noqa: N803 -- T_target_source
+        poses: PoseBuffer,
+        motion: Motion,
+    ) -> Ahead:
+        """Return what is ahead of where the vehicle was at the end of the sweep; raise PoseUnavailableError."""
+        settings = self._settings
+        pose = poses.at([sweep.end_ns]).matrix()
+        position = pose[:3, 3]
+        direction = direction_of_motion(position, pose[:3, 0], motion)
+        around = self._around(sweep, pose, T_base_lidar, direction)
+        points = deskew(around.near, poses, T_base_lidar)
+        seen = corridor_coordinates(points, position, direction)
+        heights = self._ground.heights(seen, points, position, direction)
+        nearest = nearest_obstacle(points, position, direction, settings.corridor, settings.support, heights_m=heights)
+        if nearest is None and around.ahead < settings.min_ahead:
+            return Ahead(None, f"the LiDAR does not look where the vehicle goes: {around.ahead} returns from there")
+        return Ahead(nearest)
+
+    def _around(self, sweep: Sweep, pose: Floats, T_base_lidar: Floats, direction: Floats) -> _Around:  # noqa: N803 -- T_target_source
+        """Select the returns around the way ahead, by one pose for all; the vehicle's own are left out."""
+        body = self._settings.body
+        usable = sweep.within(0.05, float("inf"))
+        R, t = (T_base_lidar[:3, :3].astype(np.float32), T_base_lidar[:3, 3].astype(np.float32))  # noqa: N806 -- matrix
+        in_base = usable.points @ R.T + t
+        own = (np.hypot(in_base[:, 0], in_base[:, 1]) <= body.radius_m) & (np.abs(in_base[:, 2]) <= body.half_height_m)
+        axes = np.array([direction, [-direction[1], direction[0], 0.0], [0.0, 0.0, 1.0]]) @ pose[:3, :3]
+        ahead, left, up = (in_base @ axes.T.astype(np.float32)).T
+        flat = np.hypot(ahead, left)
+        towards = (ahead >= np.cos(np.radians(VIEW_DEG)) * flat) & (np.abs(up) <= np.tan(np.radians(STEEP_DEG)) * flat) & ~own
+        length_m = self._settings.corridor.length_m
+        near = (ahead >= -BEHIND_M - BLUR_M) & (ahead <= length_m + BLUR_M) & (np.abs(left) <= ASIDE_M + BLUR_M) & ~own
+        return _Around(near=usable.select(near), ahead=int(np.count_nonzero(towards)))
+
+
+@dataclass(frozen=True)
+class _Around:
+    near: Sweep
+    ahead: int

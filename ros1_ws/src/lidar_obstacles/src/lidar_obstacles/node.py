@@ -6,18 +6,21 @@ import rospy
 from sensor_msgs.msg import PointCloud2
 from uav_msgs.msg import Obstacle
 
-from lidar_obstacles.ahead import CloudJudge, obstacle_ahead
+from lidar_obstacles.ahead import Ahead, LidarAhead
+from lidar_obstacles.cloud_health import CloudJudge
 from lidar_obstacles.settings import LidarSettings
-from perception_core import Sweep
+from perception_core import Finding, Sweep, first_trouble
+from perception_core.clouds import sweep_of_cloud, time_field
 from perception_core.ros import (
     DoneReporter,
     EnableSwitch,
     HealthReporter,
     NewestWorker,
+    RawSubscriber,
+    TunableSettings,
     Vehicle,
     obstacle_message,
     read_settings,
-    sweep_of_cloud,
 )
 
 CLOUD_BYTES = 1 << 23
@@ -28,55 +31,65 @@ class LidarObstaclesNode:
 
     def __init__(self, settings: LidarSettings) -> None:
         self._settings = settings
-        self._judge = CloudJudge(min_returns=settings.min_returns, self_m=settings.self_m)
+        self._judge = CloudJudge(settings.cloud)
+        self._ahead = LidarAhead(settings.ahead)
         self._obstacle = rospy.Publisher("~obstacle", Obstacle, queue_size=1, tcp_nodelay=True)
         self._done = DoneReporter()
         self._vehicle = Vehicle()
-        self._health = HealthReporter("lidar", resource="lidar_status", limits=settings.health)
+        self._health = HealthReporter("lidar", resource="lidar_status", limits=settings.health, stamps=settings.stamps)
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled)
-        self._subscriber = rospy.Subscriber(
-            "/lidar/points", PointCloud2, self._on_cloud, queue_size=1, buff_size=CLOUD_BYTES, tcp_nodelay=True
-        )
+        self._tuning = TunableSettings(settings, self._tune)
+        self._subscriber = RawSubscriber("/lidar/points", PointCloud2, self._on_cloud, self._on_garbage, buffer_bytes=CLOUD_BYTES)
+
+    def _tune(self, settings: LidarSettings) -> None:
+        self._health.tune(settings.health, settings.stamps)
+        self._settings, self._judge, self._ahead = settings, CloudJudge(settings.cloud), LidarAhead(settings.ahead)
+
+    def _on_garbage(self, reason: str) -> None:
+        self._health.garbage(reason)
+        self._tell(rospy.Time.now().to_nsec(), Ahead(None, reason))
 
     def _on_cloud(self, message: PointCloud2) -> None:
-        if not self._judged_good(message):
-            self._done.done(message.header.stamp.to_nsec())
-
-    def _judged_good(self, message: PointCloud2) -> bool:
-        """Judge the cloud; return whether the worker has it now."""
+        stamp_ns = message.header.stamp.to_nsec()
         try:
             sweep = sweep_of_cloud(message)
         except ValueError as error:
-            self._health.bad(str(error))
-            return False
-        complaint = self._judge.complaint(message.data, sweep)
-        if complaint:
-            self._health.bad(complaint)
-            return False
-        # The moment of the last return: a sweep stamped at its beginning is not a tenth of a second old when it comes.
-        self._health.good(sweep.end_ns)
-        if self._switch.enabled:
+            self._on_garbage(str(error))
+            self._done.done(stamp_ns)
+            return
+        if not time_field(message.fields):
+            rospy.logwarn_once("the LiDAR's points have no times: sweeps can't be straightened")
+        finding = self._judged(sweep)
+        self._health.take(finding)
+        if finding.ok and self._switch.enabled:
             self._worker.offer((message.header.frame_id, sweep))
-            return True
-        return False
+            return
+        if not finding.ok:
+            self._tell(stamp_ns, Ahead(None, finding.reason))
+        self._done.done(stamp_ns)
+
+    def _judged(self, sweep: Sweep) -> Finding:
+        # The moment of the last return: a sweep stamped at its beginning is not a tenth of a second old when it comes.
+        stamp = self._health.stamp(sweep.end_ns)
+        return first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m))
 
     def _process(self, item: tuple[str, Sweep]) -> None:
+        frame, sweep = item
         try:
-            self._look_ahead(*item)
+            poses = self._vehicle.poses_at(sweep.end_ns)
+            ahead = self._ahead.look(sweep, T_base_lidar=self._vehicle.mount(frame), poses=poses, motion=self._vehicle.motion)
+            self._tell(sweep.stamp_ns, ahead)
+        except LookupError as error:
+            self._tell(sweep.stamp_ns, Ahead(None, str(error)))
+            raise
         finally:
-            self._done.done(item[1].stamp_ns)
+            self._done.done(sweep.stamp_ns)
 
-    def _look_ahead(self, frame: str, sweep: Sweep) -> None:
-        nearest = obstacle_ahead(
-            sweep,
-            T_base_lidar=self._vehicle.mount(frame),
-            poses=self._vehicle.poses_at(sweep.end_ns),
-            motion=self._vehicle.motion,
-            settings=self._settings.ahead,
-        )
+    def _tell(self, stamp_ns: int, ahead: Ahead) -> None:
         if self._switch.enabled:
-            self._obstacle.publish(obstacle_message(sweep.stamp_ns, "lidar", nearest))
+            unknown = ahead.unknown if self._health.ok else ahead.unknown or f"the LiDAR is not believed: {self._health.reason}"
+            self._obstacle.publish(obstacle_message(stamp_ns, "lidar", ahead.nearest, unknown))
 
 
 def main() -> None:

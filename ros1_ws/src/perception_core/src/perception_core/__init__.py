@@ -1,13 +1,18 @@
 """What the perception nodes share: poses at a time, straightened sweeps, the corridor ahead, health watches. ROS only in ``ros``."""
 
 from perception_core.corridor import Corridor, Motion, Nearest, Support, corridor_coordinates, direction_of_motion, nearest_obstacle
-from perception_core.health import HealthLimits, HealthWatch, Verdict
+from perception_core.health import FINE, Fault, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
 from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
+from perception_core.stamps import StampJudge, StampLimits
 from perception_core.sweep import Sweep, deskew
+from perception_core.tunable import SettingsError, tunable
 
 __all__ = [
+    "FINE",
     "NS",
     "Corridor",
+    "Fault",
+    "Finding",
     "HealthLimits",
     "HealthWatch",
     "Motion",
@@ -15,11 +20,18 @@ __all__ = [
     "PoseBuffer",
     "PoseUnavailableError",
     "Poses",
+    "SettingsError",
+    "StampJudge",
+    "StampLimits",
     "Support",
     "Sweep",
     "Verdict",
+    "broken",
     "corridor_coordinates",
     "deskew",
     "direction_of_motion",
+    "first_trouble",
     "nearest_obstacle",
+    "tunable",
+    "unsure",
 ]

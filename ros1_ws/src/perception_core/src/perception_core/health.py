@@ -1,4 +1,4 @@
-"""Is a sensor alive? A watch that is told of every measurement and asked for its verdict; no ROS, time is given in nanoseconds."""
+"""Is a sensor to be believed? A watch that is told of every measurement and asked for its verdict; no ROS, times in nanoseconds."""
 
 from __future__ import annotations
 
@@ -20,6 +20,60 @@ class Verdict(Enum):
     BROKEN = "BROKEN"
 
 
+class Fault(Enum):
+    """What kind of trouble a sensor has; the values are those of ``SensorHealth.fault``."""
+
+    NONE = ""
+    SILENT = "silent"  # nothing comes
+    STAMP = "stamp"  # of the future, too old, or not advancing
+    FORMAT = "format"  # can't be decoded: encoding, fields, sizes, cut short
+    EXPOSURE = "exposure"  # dark, blank, overexposed
+    BLUR = "blur"
+    FROZEN = "frozen"
+    VIEW = "view"  # both cameras don't see the same scene, or see too little of it
+    CALIBRATION = "calibration"  # the cameras see the same scene, but not as a rectified pair does
+    INFO = "info"  # camera_info contradicts itself or the images
+    RETURNS = "returns"
+    SECTOR = "sector"
+    RANGE = "range"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one measurement tells of its sensor: OK, BROKEN or can't be judged (UNKNOWN), with a sentence where it is not OK."""
+
+    verdict: Verdict = Verdict.OK
+    fault: Fault = Fault.NONE
+    reason: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the measurement can be used."""
+        return self.verdict is Verdict.OK
+
+
+FINE = Finding()
+
+
+def broken(fault: Fault, reason: str) -> Finding:
+    """Return the finding of a broken sensor."""
+    return Finding(Verdict.BROKEN, fault, reason)
+
+
+def unsure(fault: Fault, reason: str) -> Finding:
+    """Return the finding of a sensor that can't be judged by this measurement."""
+    return Finding(Verdict.UNKNOWN, fault, reason)
+
+
+def first_trouble(*findings: Finding) -> Finding:
+    """Return the first finding that tells of a broken sensor, else the first that can't be judged, else that all is fine."""
+    for verdict in (Verdict.BROKEN, Verdict.UNKNOWN):
+        for finding in findings:
+            if finding.verdict is verdict:
+                return finding
+    return FINE
+
+
 @dataclass(frozen=True)
 class HealthLimits:
     """Seconds of mission clock: without a good measurement until broken, of good ones until mended, of nothing at first until broken."""
@@ -30,41 +84,47 @@ class HealthLimits:
 
 
 class HealthWatch:
-    """Judge a stream of measurements by the age of the last good one.
+    """Judge a stream of measurements by when the last good one arrived.
 
     A bad measurement (black, frozen, empty) never breaks the sensor by itself: it does not count as good, so that one glitch passes and a
-    lasting fault shows within ``timeout_s`` of the last good measurement. Not thread-safe: the caller serialises.
+    lasting fault shows within ``timeout_s`` of the last good measurement. When that time is over, the verdict is that of what came
+    meanwhile: UNKNOWN if it only could not be judged, else BROKEN. Not thread-safe: the caller serialises.
     """
 
     def __init__(self, limits: HealthLimits) -> None:
-        self._limits = limits
+        self.limits = limits
         self._restart()
 
     def _restart(self) -> None:
         self.verdict = Verdict.UNKNOWN
+        self.fault = Fault.SILENT
         self.reason = "nothing received yet"
+        self._judged = False  # whether there was another verdict than UNKNOWN
         self._started_ns: int | None = None
         self._last_tick_ns: int | None = None
         self._last_good_ns: int | None = None
         self._good_since_ns: int | None = None
-        self._complaint = ""
+        self._trouble: Finding | None = None
+        self._trouble_ns = 0
         self._good_ns: deque[int] = deque()
 
-    def good(self, stamp_ns: int) -> None:
-        """Tell of a good measurement made at ``stamp_ns``."""
-        last = self._last_good_ns
-        if self._good_since_ns is None or last is None or stamp_ns - last > self._limits.timeout_s * NS:
-            self._good_since_ns = stamp_ns
-        self._last_good_ns = stamp_ns
-        self._complaint = ""
-        self._good_ns.append(stamp_ns)
-        while self._good_ns[0] < stamp_ns - RATE_OVER_S * NS:
-            self._good_ns.popleft()
+    def take(self, finding: Finding, arrived_ns: int) -> None:
+        """Tell of a measurement that arrived at this moment."""
+        if finding.ok:
+            self._good(arrived_ns)
+        else:
+            self._trouble, self._trouble_ns = finding, arrived_ns
+            self._good_since_ns = None
 
-    def bad(self, reason: str) -> None:
-        """Tell of a measurement that can't be used, and why."""
-        self._complaint = reason
-        self._good_since_ns = None
+    def _good(self, arrived_ns: int) -> None:
+        last = self._last_good_ns
+        if self._good_since_ns is None or last is None or arrived_ns - last > self.limits.timeout_s * NS:
+            self._good_since_ns = arrived_ns
+        self._last_good_ns = arrived_ns
+        self._trouble = None
+        self._good_ns.append(arrived_ns)
+        while self._good_ns[0] < arrived_ns - RATE_OVER_S * NS:
+            self._good_ns.popleft()
 
     def tick(self, now_ns: int) -> Verdict:
         """Return the verdict at this moment; call at 20 Hz or faster. A clock that jumps back by a second starts the watch anew."""
@@ -74,16 +134,17 @@ class HealthWatch:
         late = self._last_tick_ns is not None and now_ns - self._last_tick_ns > LATE_TICK_S * NS
         self._last_tick_ns = now_ns
         self._started_ns = self._started_ns if self._started_ns is not None else now_ns
-        overdue = self._overdue(now_ns)
-        if overdue and self.verdict is not Verdict.BROKEN and not late:
-            self.verdict = Verdict.BROKEN
-        elif not overdue and self._is_good():
+        if self._overdue(now_ns):
+            if not late:
+                self.verdict = self._verdict_without_good(now_ns)
+        elif self._is_good():
             self.verdict = Verdict.OK
-        self.reason = self._explain(now_ns)
+        self._judged |= self.verdict is not Verdict.UNKNOWN
+        self.fault, self.reason = self._explain(now_ns)
         return self.verdict
 
     def age_s(self, now_ns: int) -> float:
-        """Return the age of the last good measurement; infinite before the first."""
+        """Return the time since the arrival of the last good measurement; infinite before the first."""
         return float("inf") if self._last_good_ns is None else (now_ns - self._last_good_ns) / NS
 
     def rate_hz(self, now_ns: int) -> float:
@@ -91,26 +152,36 @@ class HealthWatch:
         recent = [stamp for stamp in self._good_ns if stamp > now_ns - RATE_OVER_S * NS]
         return (len(recent) - 1) * NS / (recent[-1] - recent[0]) if len(recent) > 1 else 0.0
 
+    def _verdict_without_good(self, now_ns: int) -> Verdict:
+        trouble = self._fresh_trouble(now_ns)
+        return Verdict.BROKEN if trouble is None else trouble.verdict
+
+    def _fresh_trouble(self, now_ns: int) -> Finding | None:
+        """Return what the last measurement complained about; None when none came within the time-out: then the sensor is silent."""
+        fresh = self._trouble is not None and now_ns - self._trouble_ns <= self.limits.timeout_s * NS
+        return self._trouble if fresh else None
+
     def _overdue(self, now_ns: int) -> bool:
         if self._last_good_ns is not None:
-            return now_ns - self._last_good_ns > self._limits.timeout_s * NS
-        return self._started_ns is not None and now_ns - self._started_ns > self._limits.start_s * NS
+            return now_ns - self._last_good_ns > self.limits.timeout_s * NS
+        return self._started_ns is not None and now_ns - self._started_ns > self.limits.start_s * NS
 
     def _is_good(self) -> bool:
         if self._last_good_ns is None:
             return False
-        if self.verdict is not Verdict.BROKEN:
+        if self.verdict is Verdict.OK or (self.verdict is Verdict.UNKNOWN and not self._judged):
             return True
         since = self._good_since_ns
-        return since is not None and self._last_good_ns - since >= self._limits.recover_s * NS
+        return since is not None and self._last_good_ns - since >= self.limits.recover_s * NS
 
-    def _explain(self, now_ns: int) -> str:
+    def _explain(self, now_ns: int) -> tuple[Fault, str]:
         if self.verdict is Verdict.OK:
-            return ""
-        if self._complaint:
-            return self._complaint
+            return Fault.NONE, ""
+        trouble = self._fresh_trouble(now_ns)
+        if trouble is not None:
+            return trouble.fault, trouble.reason
         if self._last_good_ns is None:
-            return "nothing received yet"
+            return Fault.SILENT, "nothing received yet"
         if self._overdue(now_ns):
-            return f"no good measurement for {self._limits.timeout_s:g} s"
-        return "recovering"
+            return Fault.SILENT, f"no measurement for {self.limits.timeout_s:g} s"
+        return self.fault, "recovering"

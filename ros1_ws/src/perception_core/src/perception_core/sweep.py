@@ -28,16 +28,17 @@ class Sweep:
     @property
     def end_ns(self) -> int:
         """The moment of the last measurement."""
-        return self.stamp_ns + (int(float(self.times_s.max()) * NS) if len(self.times_s) else 0)
+        known = self.times_s[np.isfinite(self.times_s)]
+        return self.stamp_ns + (int(float(known.max()) * NS) if len(known) else 0)
 
     def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> Sweep:
         """Return the sweep with only these points."""
         return Sweep(stamp_ns=self.stamp_ns, points=self.points[mask], times_s=self.times_s[mask])
 
     def within(self, min_range_m: float, max_range_m: float) -> Sweep:
-        """Return the sweep without points nearer (the vehicle itself), farther, or not finite; their times go with them."""
+        """Return the sweep without points nearer, farther, or not finite; their times go with them, and points without a time go, too."""
         squared = np.einsum("ij,ij->i", self.points, self.points)
-        return self.select((squared >= min_range_m**2) & (squared <= max_range_m**2))
+        return self.select((squared >= min_range_m**2) & (squared <= max_range_m**2) & np.isfinite(self.times_s))
 
 
 def deskew(sweep: Sweep, poses: PoseBuffer, T_base_sensor: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: N803 -- T_target_source

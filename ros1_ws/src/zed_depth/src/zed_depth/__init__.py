@@ -1,21 +1,35 @@
 """Depth from the ZED's stereo pair, and the nearest obstacle ahead. The node is in ``zed_depth.node``."""
 
-from zed_depth.ahead import AheadSettings, obstacle_ahead
-from zed_depth.pairing import ImageLimits, Pairing, PairJudge, StereoPair
+from zed_depth.ahead import Ahead, AheadSettings, look_ahead
+from zed_depth.calibration import CalibrationError, StereoCalibration, StereoGeometry
+from zed_depth.confidence import confidence_of
+from zed_depth.image_health import ImageJudge, ImageLimits
+from zed_depth.pairing import Pairing, StereoPair
+from zed_depth.rig import Depth, StereoRig
 from zed_depth.settings import ZedSettings
-from zed_depth.stereo import MatcherSettings, StereoGeometry, StereoMatcher, depth_of, points_of
+from zed_depth.stereo import DisparityRange, MatcherSettings, StereoMatcher, depth_of, points_of
+from zed_depth.view_health import ViewLimits, view_finding
 
 __all__ = [
+    "Ahead",
     "AheadSettings",
+    "CalibrationError",
+    "Depth",
+    "DisparityRange",
+    "ImageJudge",
     "ImageLimits",
     "MatcherSettings",
-    "PairJudge",
     "Pairing",
+    "StereoCalibration",
     "StereoGeometry",
     "StereoMatcher",
     "StereoPair",
+    "StereoRig",
+    "ViewLimits",
     "ZedSettings",
+    "confidence_of",
     "depth_of",
-    "obstacle_ahead",
+    "look_ahead",
     "points_of",
+    "view_finding",
 ]

@@ -1,16 +1,20 @@
-"""From a pair to the nearest obstacle ahead: the ZED's depth skill as one function."""
+"""From a depth image to the nearest obstacle ahead: the ZED's depth skill as one function."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from perception_core import Corridor, Motion, Nearest, PoseBuffer, Support, direction_of_motion, nearest_obstacle
-from zed_depth.stereo import StereoGeometry, points_of
+from zed_depth.calibration import StereoGeometry
+from zed_depth.stereo import points_of
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+Floats = NDArray[np.float64]
+VIEW_M = 3.0  # how far ahead the corridor's cross-section must be in view: farther than the vehicle needs to stop
+VIEW_SHARE = 0.5  # of the cross-section
+GRID = (9, 5)
 
 
 @dataclass(frozen=True)
@@ -18,29 +22,71 @@ class AheadSettings:
     """Where to look, and what to believe.
 
     The range ends where a disparity error of one pixel makes the depth useless: with fx 240 px and 0.12 m between the cameras one pixel is
-    0.6 m at 4 m, 2.2 m at 8 m.
+    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of the corridor's view nobody knows what is there.
     """
 
     corridor: Corridor
     support: Support
     max_range_m: float = 8.0
     stride_px: int = 2
+    min_known: float = 0.05
 
 
-def obstacle_ahead(
+@dataclass(frozen=True)
+class Ahead:
+    """What is ahead: the nearest obstacle, or None; then ``unknown`` says why the corridor can't be called free, or nothing."""
+
+    nearest: Nearest | None
+    unknown: str = ""
+
+
+def look_ahead(
     depth_m: NDArray[np.float32],
     stamp_ns: int,
     *,
     geometry: StereoGeometry,
-    T_base_camera: NDArray[np.float64],  # noqa: N803 -- T_target_source
+    T_base_camera: Floats,  # noqa: N803 -- T_target_source
     poses: PoseBuffer,
     motion: Motion,
     settings: AheadSettings,
-) -> Nearest | None:
-    """Return the nearest obstacle in the corridor, in the map, or None; raise PoseUnavailableError."""
+) -> Ahead:
+    """Return what is in the corridor, in the map; raise PoseUnavailableError."""
     pose = poses.at([stamp_ns]).matrix()
     T_map_camera = pose @ T_base_camera  # noqa: N806 -- T_target_source
     points, areas = points_of(depth_m, geometry, max_range_m=settings.max_range_m, stride_px=settings.stride_px)
     in_map = points @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
     direction = direction_of_motion(pose[:3, 3], pose[:3, 0], motion)
-    return nearest_obstacle(in_map, pose[:3, 3], direction, settings.corridor, settings.support, areas)
+    nearest = nearest_obstacle(in_map, pose[:3, 3], direction, settings.corridor, settings.support, areas)
+    if nearest is not None:
+        return Ahead(nearest)
+    T_camera_map = np.asarray(np.linalg.inv(T_map_camera), dtype=np.float64)  # noqa: N806 -- T_target_source
+    return Ahead(None, _unknown(depth_m, geometry, T_camera_map, pose[:3, 3], direction, settings))
+
+
+def _unknown(
+    depth_m: NDArray[np.float32],
+    geometry: StereoGeometry,
+    T_camera_map: Floats,  # noqa: N803 -- T_target_source
+    origin: Floats,
+    direction: Floats,
+    settings: AheadSettings,
+) -> str:
+    """Return why nothing can be said of the corridor though no obstacle is seen, or an empty text."""
+    corridor = settings.corridor
+    across, up = np.meshgrid(
+        np.linspace(-corridor.half_width_m, corridor.half_width_m, GRID[0]),
+        np.linspace(-corridor.half_height_m, corridor.half_height_m, GRID[1]),
+    )
+    left = np.array([-direction[1], direction[0], 0.0])
+    section = origin + VIEW_M * direction + across.reshape(-1, 1) * left + up.reshape(-1, 1) * np.array([0.0, 0.0, 1.0])
+    x, y, z = (section @ T_camera_map[:3, :3].T + T_camera_map[:3, 3]).T
+    height, width = depth_m.shape
+    ahead = np.maximum(z, 1e-6)
+    columns, rows = geometry.fx * x / ahead + geometry.cx, geometry.fy * y / ahead + geometry.cy
+    visible = (z > 0.1) & (columns >= 0) & (columns <= width - 1) & (rows >= 0) & (rows <= height - 1)
+    if np.mean(visible) < VIEW_SHARE:
+        return "the camera does not look where the vehicle goes"
+    low_row, low_column = int(rows[visible].min()), int(columns[visible].min())
+    window = depth_m[low_row : int(rows[visible].max()) + 1, low_column : int(columns[visible].max()) + 1]
+    known = float(np.mean(np.isfinite(window)))
+    return "" if known >= settings.min_known else f"only {known:.0%} of the view ahead has a depth"

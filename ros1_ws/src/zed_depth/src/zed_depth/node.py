@@ -1,34 +1,44 @@
-"""The node /zed_depth: health always, depth image and obstacle while enabled."""
+"""The node /zed_depth: health always; depth image, points and obstacle while enabled."""
 
 from __future__ import annotations
 
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import rospy
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 from uav_msgs.msg import Obstacle
 
-from perception_core import NS
+from perception_core import NS, Fault, Finding, broken, first_trouble
+from perception_core.images import GrayConverter
 from perception_core.ros import (
     DoneReporter,
     EnableSwitch,
     HealthReporter,
     NewestWorker,
+    RawSubscriber,
+    TunableSettings,
     Vehicle,
+    cloud_message,
     depth_message,
-    image_to_array,
     obstacle_message,
     read_settings,
 )
-from zed_depth.ahead import obstacle_ahead
-from zed_depth.pairing import Pairing, PairJudge, StereoPair
+from zed_depth.ahead import Ahead, look_ahead
+from zed_depth.pairing import Pairing, StereoPair
+from zed_depth.rig import Depth, StereoRig
 from zed_depth.settings import ZedSettings
-from zed_depth.stereo import StereoGeometry, StereoMatcher, depth_of
+from zed_depth.stereo import points_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 IMAGE_BYTES = 1 << 22
+INFO_BYTES = 1 << 16
+SIDES = ("left", "right")
 
 
 class ZedDepthNode:
@@ -36,79 +46,117 @@ class ZedDepthNode:
 
     def __init__(self, settings: ZedSettings) -> None:
         self._settings = settings
-        self._matcher = StereoMatcher(settings.matcher)
+        self._gray = {side: GrayConverter() for side in SIDES}
+        self._infos: dict[str, CameraInfo] = {}
         self._pairing = Pairing(tolerance_s=settings.sync_tolerance_s)
-        self._judge = PairJudge(settings.images)
+        self._rig = StereoRig(settings)
         self._lock = Lock()
-        self._projections: dict[str, np.ndarray[tuple[int, int], np.dtype[np.float64]]] = {}
         self._frame = ""
         self._depth = rospy.Publisher("~depth", Image, queue_size=1)
+        self._confidence = rospy.Publisher("~confidence", Image, queue_size=1)
+        self._points = rospy.Publisher("~points", PointCloud2, queue_size=1)
         self._obstacle = rospy.Publisher("~obstacle", Obstacle, queue_size=1, tcp_nodelay=True)
         self._done = DoneReporter()
         self._vehicle = Vehicle()
-        self._health = HealthReporter("zed", resource="zed_status", limits=settings.health)
+        self._health = HealthReporter("zed", resource="zed_status", limits=settings.health, stamps=settings.stamps)
         self._worker = NewestWorker[StereoPair](self._process)
-        self._switch = EnableSwitch(enabled=settings.enabled)
-        self._subscribers = [self._subscribe(side) for side in ("left", "right")]
+        self._switch = EnableSwitch(enabled=settings.enabled, on_change=lambda _enabled: self._rig.rest())
+        self._tuning = TunableSettings(settings, self._tune)
+        self._subscribers = [self._subscribe(side) for side in SIDES]
 
-    def _subscribe(self, side: str) -> tuple[rospy.Subscriber, rospy.Subscriber]:
+    def _subscribe(self, side: str) -> tuple[RawSubscriber[CameraInfo], RawSubscriber[Image]]:
+        garbage = self._garbage_of(side)
         return (
-            rospy.Subscriber(f"/zed/{side}/camera_info", CameraInfo, self._on_info, side, queue_size=1),
-            rospy.Subscriber(f"/zed/{side}/image_raw", Image, self._on_image, side, queue_size=1, buff_size=IMAGE_BYTES, tcp_nodelay=True),
+            RawSubscriber(f"/zed/{side}/camera_info", CameraInfo, lambda m: self._on_info(m, side), garbage, buffer_bytes=INFO_BYTES),
+            RawSubscriber(f"/zed/{side}/image_raw", Image, lambda m: self._on_image(m, side), garbage, buffer_bytes=IMAGE_BYTES),
         )
 
+    def _garbage_of(self, side: str) -> Callable[[str], None]:
+        return lambda reason: self._trouble(broken(Fault.FORMAT, f"{side}: {reason}"), rospy.Time.now().to_nsec())
+
+    def _tune(self, settings: ZedSettings) -> None:
+        self._health.tune(settings.health, settings.stamps)
+        with self._lock:
+            self._settings, self._rig = settings, StereoRig(settings)
+            self._pairing = Pairing(tolerance_s=settings.sync_tolerance_s)
+            for side, info in self._infos.items():
+                self._rig.take_info(side, info)
+
     def _on_info(self, message: CameraInfo, side: str) -> None:
-        self._projections[side] = np.array(message.P, dtype=np.float64).reshape(3, 4)
+        with self._lock:
+            self._infos[side] = message
+            self._rig.take_info(side, message)
 
     def _on_image(self, message: Image, side: str) -> None:
+        stamp_ns = message.header.stamp.to_nsec()
         try:
-            image = image_to_array(message)
+            image = self._gray[side].gray(message)
         except ValueError as error:
-            self._health.bad(f"{side} image: {error}")
+            self._trouble(broken(Fault.FORMAT, f"{side} image: {error}"), stamp_ns)
+            self._done.done(stamp_ns)
             return
         with self._lock:
             self._frame = message.header.frame_id if side == "left" else self._frame
-            pair = self._pairing.add(side, message.header.stamp.to_nsec(), image)
+            pair = self._pairing.add(side, stamp_ns, image)
             apart_s = self._pairing.apart_s()
-            complaint = self._judge.complaint(pair) if pair is not None else ""
-        if pair is not None and not complaint:
-            self._health.good(pair.stamp_ns)
+            finding = self._judged(pair) if pair is not None else None
+        if pair is None or finding is None:
+            if apart_s > self._settings.sync_tolerance_s:
+                self._trouble(broken(Fault.STAMP, f"left and right images are {apart_s:.2f} s apart"), stamp_ns)
+        elif not finding.ok:
+            self._trouble(finding, pair.stamp_ns)
+            self._done.done(pair.stamp_ns)
+        else:
+            self._health.take(finding)
             if self._switch.enabled:
                 self._worker.offer(pair)
-                return
-        elif complaint:
-            self._health.bad(complaint)
-        elif apart_s > self._settings.sync_tolerance_s:
-            self._health.bad(f"left and right images are {apart_s:.2f} s apart")
-        if pair is not None:
-            self._done.done(pair.stamp_ns)
+            else:
+                self._done.done(pair.stamp_ns)
+
+    def _judged(self, pair: StereoPair) -> Finding:
+        stamp = self._health.stamp(pair.stamp_ns)
+        return first_trouble(stamp, self._rig.finding(pair))
+
+    def _trouble(self, finding: Finding, stamp_ns: int) -> None:
+        self._health.take(finding)
+        self._tell(stamp_ns, Ahead(None, finding.reason))
 
     def _process(self, pair: StereoPair) -> None:
         try:
-            self._look_ahead(pair)
+            depth = self._rig.depth(pair)
+            self._publish_depth(depth, pair.stamp_ns)
+            ahead = look_ahead(
+                depth.metres,
+                pair.stamp_ns,
+                geometry=depth.geometry,
+                T_base_camera=self._vehicle.mount(self._frame),
+                poses=self._vehicle.poses_at(pair.stamp_ns),
+                motion=self._vehicle.motion,
+                settings=self._settings.ahead,
+            )
+            self._tell(pair.stamp_ns, ahead)
+        except (LookupError, ValueError) as error:
+            self._tell(pair.stamp_ns, Ahead(None, str(error)))
+            raise
         finally:
             self._done.done(pair.stamp_ns)
 
-    def _look_ahead(self, pair: StereoPair) -> None:
-        if len(self._projections) < 2:
-            rospy.logwarn_throttle(5.0, "images, but no camera_info of both sides yet")
-            return
-        geometry = StereoGeometry.from_projections(self._projections["left"], self._projections["right"])
-        depth = depth_of(self._matcher.disparity(pair.left, pair.right), geometry)
-        stamp = rospy.Time(pair.stamp_ns // NS, pair.stamp_ns % NS)
+    def _publish_depth(self, depth: Depth, stamp_ns: int) -> None:
+        header = Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id=self._frame)
         if self._depth.get_num_connections():
-            self._depth.publish(depth_message(Header(stamp=stamp, frame_id=self._frame), depth))
-        nearest = obstacle_ahead(
-            depth,
-            pair.stamp_ns,
-            geometry=geometry,
-            T_base_camera=self._vehicle.mount(self._frame),
-            poses=self._vehicle.poses_at(pair.stamp_ns),
-            motion=self._vehicle.motion,
-            settings=self._settings.ahead,
-        )
+            self._depth.publish(depth_message(header, depth.metres))
+        if self._confidence.get_num_connections():
+            self._confidence.publish(depth_message(header, depth.confidence()))
+        if self._points.get_num_connections():
+            stride = self._settings.stride_px
+            points, _ = points_of(depth.metres, depth.geometry, max_range_m=self._settings.max_range_m, stride_px=stride)
+            confidence = depth.confidence()[::stride, ::stride][depth.metres[::stride, ::stride] <= self._settings.max_range_m]
+            self._points.publish(cloud_message(header, points.astype(np.float32), confidence))
+
+    def _tell(self, stamp_ns: int, ahead: Ahead) -> None:
         if self._switch.enabled:
-            self._obstacle.publish(obstacle_message(pair.stamp_ns, "zed", nearest))
+            unknown = ahead.unknown if self._health.ok else ahead.unknown or f"the camera is not believed: {self._health.reason}"
+            self._obstacle.publish(obstacle_message(stamp_ns, "zed", ahead.nearest, unknown))
 
 
 def main() -> None:

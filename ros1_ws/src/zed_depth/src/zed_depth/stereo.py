@@ -11,48 +11,29 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from zed_depth.calibration import StereoGeometry
+
     Gray = NDArray[np.uint8]
 
 
 MEDIAN_PX = 5
 TEXTURE_PX = 21
 NOISE_KERNEL = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-
-
-@dataclass(frozen=True)
-class StereoGeometry:
-    """Pinhole of the left rectified camera, in pixels, and the distance between the cameras in metres."""
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    baseline_m: float
-
-    @classmethod
-    def from_projections(cls, left: NDArray[np.float64], right: NDArray[np.float64]) -> StereoGeometry:
-        """Read the 3x4 projection matrices of both CameraInfos; raise ValueError when they are no rectified pair."""
-        fx, baseline_m = float(left[0, 0]), -float(right[0, 3]) / float(right[0, 0] or np.nan)
-        if not (fx > 0.0 and baseline_m > 0.0):
-            raise ValueError(f"no rectified stereo pair: fx {fx:g} px, baseline {baseline_m:g} m (the right P[3] must be -fx * baseline)")
-        return cls(fx=fx, fy=float(left[1, 1]), cx=float(left[0, 2]), cy=float(left[1, 2]), baseline_m=baseline_m)
-
-    def depth_error_m(self, depth_m: float, disparity_error_px: float) -> float:
-        """Return the error of a depth for an error of the disparity: it grows with the square of the depth."""
-        return depth_m**2 / (self.fx * self.baseline_m) * disparity_error_px
+MOST_DISPARITIES = 256
+COARSE = 4  # the search for what is too near is done in images of a quarter of the size ...
+COARSE_SHARE = 0.5  # ... and up to half of their width
+SURELY_PX = 4.0  # by which a coarse disparity must be beyond the range: its own error
 
 
 @dataclass(frozen=True)
 class MatcherSettings:
     """Parameters of the matching.
 
-    With fx 240 px and 0.12 m between the cameras, 64 disparities reach from 0.45 m, half the vehicle's radius. The image is widened by as
-    many columns at the left, or its left ``disparities`` columns would have no depth at all. Where the mean gradient along the row is below
-    ``texture_per_noise`` times the image's noise there is nothing to match: sky and blank walls would else be matched by chance. A gradient
-    of ``enough_texture`` grey levels a pixel is texture whatever the noise seems to be.
+    The image is widened by as many columns at the left as there are disparities, or these would have no depth at all. Where the mean
+    gradient along the row is below ``texture_per_noise`` times the image's noise there is nothing to match: sky and blank walls would else
+    be matched by chance. A gradient of ``enough_texture`` grey levels a pixel is texture whatever the noise seems to be.
     """
 
-    disparities: int = 64
     block_px: int = 5
     uniqueness_percent: int = 10
     speckle_px: int = 120
@@ -62,46 +43,106 @@ class MatcherSettings:
     enough_texture: float = 2.5
 
 
+@dataclass(frozen=True)
+class DisparityRange:
+    """The disparities that are searched, in pixels: from ``first`` on, ``count`` of them."""
+
+    first: int = 0
+    count: int = 64
+
+    @classmethod
+    def to_see(cls, geometry: StereoGeometry, near_m: float) -> DisparityRange:
+        """Return the range from infinity to ``near_m``, or as near as `MOST_DISPARITIES` reach."""
+        first = int(np.floor(geometry.offset_px))
+        wanted = geometry.disparity_of(near_m) - first + 1
+        return cls(first=first, count=min(MOST_DISPARITIES, 16 * int(np.ceil(wanted / 16))))
+
+    @property
+    def last(self) -> int:
+        """The greatest disparity."""
+        return self.first + self.count - 1
+
+
 class StereoMatcher:
     """Match pairs of one size; not thread-safe."""
 
-    def __init__(self, settings: MatcherSettings) -> None:
+    def __init__(self, settings: MatcherSettings, search: DisparityRange) -> None:
         self._settings = settings
+        self.search = search
+        self._sgbm = self._matcher(search.first, search.count, settings.speckle_px)
+        self._coarse = self._coarse_for(0)
+
+    def _matcher(self, first: int, count: int, speckle_px: int) -> cv2.StereoSGBM:
+        settings = self._settings
         smoothness = settings.block_px**2
-        self._sgbm = cv2.StereoSGBM_create(
-            minDisparity=0,
-            numDisparities=settings.disparities,
+        return cv2.StereoSGBM_create(
+            minDisparity=first,
+            numDisparities=count,
             blockSize=settings.block_px,
             P1=8 * smoothness,
             P2=32 * smoothness,
             disp12MaxDiff=settings.left_right_px,
             preFilterCap=31,
             uniquenessRatio=settings.uniqueness_percent,
-            speckleWindowSize=settings.speckle_px,
+            speckleWindowSize=speckle_px,
             speckleRange=settings.speckle_range_px,
             mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
         )
 
+    def _coarse_for(self, width: int) -> tuple[int, int, cv2.StereoSGBM]:
+        count = max(16, 16 * int(width / COARSE * COARSE_SHARE / 16))
+        return width, count, self._matcher(0, count, self._settings.speckle_px // COARSE**2)
+
     def disparity(self, left: Gray, right: Gray) -> NDArray[np.float32]:
-        """Return the disparity of the left image in pixels, NaN where there is none; raise ValueError when the sizes differ."""
+        """Return the disparity (h, w) of the left image in pixels; raise ValueError when the sizes differ.
+
+        NaN where nothing is known. What is nearer than the range is at its end: at the near limit.
+        """
         if left.shape != right.shape or left.ndim != 2:
             raise ValueError(f"left image {left.shape} and right image {right.shape}: expected two grey images of one size")
-        pad = self._settings.disparities
-        wide = [cv2.copyMakeBorder(image, 0, 0, pad, 0, cv2.BORDER_REPLICATE) for image in (left, right)]
-        sixteenths = np.asarray(self._sgbm.compute(*wide)[:, pad:])
+        first = self.search.first
+        sixteenths = _padded(self._sgbm, self.search.last, left, right)
         # Without the one or two rows above an upper edge, where blocks see the edge but nothing tells how far along the row they match.
-        sixteenths = cv2.medianBlur(np.maximum(sixteenths, 0).astype(np.uint16), MEDIAN_PX)
-        disparity: NDArray[np.float32] = sixteenths.astype(np.float32) / np.float32(16.0)
-        disparity[(sixteenths == 0) | self._without_texture(left)] = np.nan
-        return disparity
+        sixteenths = cv2.medianBlur(np.maximum(sixteenths - 16 * (first - 1), 0).astype(np.uint16), MEDIAN_PX)
+        texture = self._texture(left)
+        pixels: NDArray[np.float32] = sixteenths.astype(np.float32) / np.float32(16.0) + np.float32(first - 1)
+        pixels[(sixteenths < 16) | (texture < 1.0)] = np.nan
+        self._put_near(pixels, texture, left, right)
+        return pixels
 
-    def _without_texture(self, image: Gray) -> NDArray[np.bool_]:
+    def _put_near(self, pixels: NDArray[np.float32], texture: NDArray[np.float32], left: Gray, right: Gray) -> None:
+        """Put what is nearer than the range to its end: in the range it would match something by chance, and that is farther away."""
+        if self._coarse[0] != left.shape[1]:
+            self._coarse = self._coarse_for(left.shape[1])
+        _, count, matcher = self._coarse
+        size = (left.shape[1] // COARSE, left.shape[0] // COARSE)
+        if COARSE * count <= self.search.last or min(size) < 2 * self._settings.block_px:
+            return
+        small = [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in (left, right)]
+        coarse = _padded(matcher, count, *small).astype(np.float32) * np.float32(COARSE / 16.0)
+        textured = cv2.resize(texture, size, interpolation=cv2.INTER_AREA) >= 1.0
+        near = (coarse > self.search.last + SURELY_PX) & textured
+        # What the right camera can't see can't have been matched.
+        near &= COARSE * np.arange(size[0], dtype=np.float32) >= coarse
+        if near.any():
+            whole = np.repeat(np.repeat(near, COARSE, axis=0), COARSE, axis=1)
+            pixels[: whole.shape[0], : whole.shape[1]][whole] = self.search.last
+
+    def _texture(self, image: Gray) -> NDArray[np.float32]:
+        """Return the texture around each pixel in units of the least that can be matched."""
         least = min(self._settings.texture_per_noise * noise_level(image), self._settings.enough_texture)
         gradient = np.abs(cv2.Sobel(image, cv2.CV_16S, 1, 0, ksize=1))
         mean = cv2.boxFilter(gradient, cv2.CV_32F, (TEXTURE_PX, 1))
         # The Sobel kernel [-1 0 1] spans two pixels.
-        flat: NDArray[np.bool_] = np.asarray(mean) < 2.0 * least
-        return flat
+        texture: NDArray[np.float32] = np.asarray(mean) * np.float32(0.5 / max(least, 0.1))
+        return texture
+
+
+def _padded(matcher: cv2.StereoSGBM, columns: int, left: Gray, right: Gray) -> NDArray[np.int16]:
+    """Match images that are widened at the left, and return the disparities of the original ones, in sixteenths of a pixel."""
+    pad = max(0, columns)
+    wide = [cv2.copyMakeBorder(image, 0, 0, pad, 0, cv2.BORDER_REPLICATE) for image in (left, right)]
+    return np.asarray(matcher.compute(*wide)[:, pad:])
 
 
 def noise_level(image: Gray) -> float:
@@ -112,8 +153,10 @@ def noise_level(image: Gray) -> float:
 
 
 def depth_of(disparity_px: NDArray[np.float32], geometry: StereoGeometry) -> NDArray[np.float32]:
-    """Return the depth in metres along the optical axis, NaN where the disparity is NaN."""
-    return np.float32(geometry.fx * geometry.baseline_m) / disparity_px
+    """Return the depth in metres along the optical axis, NaN where the disparity is, infinite where it is that of infinity or less."""
+    parallax = disparity_px - np.float32(geometry.offset_px)
+    depth: NDArray[np.float32] = np.float32(geometry.fx * geometry.baseline_m) / np.maximum(parallax, np.float32(1e-6))
+    return depth
 
 
 def points_of(

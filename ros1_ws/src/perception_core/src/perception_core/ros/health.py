@@ -7,21 +7,24 @@ from threading import Lock
 import rospy
 from uav_msgs.msg import SensorHealth
 
-from perception_core.health import HealthLimits, HealthWatch, Verdict
+from perception_core.health import Fault, Finding, HealthLimits, HealthWatch, Verdict, broken
 from perception_core.poses import NS
+from perception_core.stamps import StampJudge, StampLimits
 from resource_reporter import ResourceReporter
 
 TICK_S = 0.02
 PUBLISH_S = 0.1
+VERDICTS = {Verdict.UNKNOWN: SensorHealth.UNKNOWN, Verdict.OK: SensorHealth.OK, Verdict.BROKEN: SensorHealth.BROKEN}
 
 
 class HealthReporter:
     """A health watch driven by a 50 Hz timer on the ROS clock; its methods may be called from any thread."""
 
-    def __init__(self, sensor: str, *, resource: str, limits: HealthLimits) -> None:
+    def __init__(self, sensor: str, *, resource: str, limits: HealthLimits, stamps: StampLimits) -> None:
         self._sensor = sensor
         self._resource = resource
         self._watch = HealthWatch(limits)
+        self._stamps = StampJudge(stamps)
         self._lock = Lock()
         self._told = Verdict.UNKNOWN
         self._published_ns = 0
@@ -30,15 +33,37 @@ class HealthReporter:
         # reset: a clock that jumps back (a bag played again) must not end the timer's thread.
         self._timer = rospy.Timer(rospy.Duration.from_sec(TICK_S), self._tick, reset=True)
 
-    def good(self, stamp_ns: int) -> None:
-        """Tell of a good measurement."""
+    def stamp(self, stamp_ns: int) -> Finding:
+        """Return what the stamp of a measurement tells that has just arrived; call it once for each, in order."""
         with self._lock:
-            self._watch.good(stamp_ns)
+            return self._stamps.finding(stamp_ns, rospy.Time.now().to_nsec())
 
-    def bad(self, reason: str) -> None:
-        """Tell of a measurement that can't be used, and why."""
+    def take(self, finding: Finding) -> None:
+        """Tell what was found of a measurement that has just arrived."""
         with self._lock:
-            self._watch.bad(reason)
+            self._watch.take(finding, rospy.Time.now().to_nsec())
+
+    def tune(self, limits: HealthLimits, stamps: StampLimits) -> None:
+        """Go on with other limits."""
+        with self._lock:
+            self._watch.limits = limits
+            self._stamps.limits = stamps
+
+    def garbage(self, reason: str) -> None:
+        """Tell of something that is no measurement at all."""
+        self.take(broken(Fault.FORMAT, reason))
+
+    @property
+    def ok(self) -> bool:
+        """Whether the sensor is to be believed now."""
+        with self._lock:
+            return self._watch.verdict is Verdict.OK
+
+    @property
+    def reason(self) -> str:
+        """Why it is not to be believed."""
+        with self._lock:
+            return self._watch.reason
 
     def _tick(self, _event: object) -> None:
         now_ns = rospy.Time.now().to_nsec()
@@ -47,7 +72,7 @@ class HealthReporter:
             message = self._message(now_ns)
         changed = verdict is not self._told
         self._told = verdict
-        if changed and verdict is not Verdict.UNKNOWN:
+        if changed:
             rospy.loginfo(f"{self._sensor} is {verdict.value} {message.reason}")
             self._reporter.report(self._resource, verdict.value)
         # Half a tick of tolerance, or the clock's grain would turn 10 Hz into 8.
@@ -56,8 +81,10 @@ class HealthReporter:
             self._publisher.publish(message)
 
     def _message(self, now_ns: int) -> SensorHealth:
-        message = SensorHealth(sensor=self._sensor, ok=self._watch.verdict is Verdict.OK, reason=self._watch.reason)
+        watch = self._watch
+        message = SensorHealth(sensor=self._sensor, ok=watch.verdict is Verdict.OK, reason=watch.reason)
+        message.verdict, message.fault = VERDICTS[watch.verdict], watch.fault.value
         message.header.stamp = rospy.Time(now_ns // NS, now_ns % NS)
-        message.rate_hz = self._watch.rate_hz(now_ns)
-        message.age_s = self._watch.age_s(now_ns)
+        message.rate_hz = watch.rate_hz(now_ns)
+        message.age_s = watch.age_s(now_ns)
         return message

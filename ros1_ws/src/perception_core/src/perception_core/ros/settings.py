@@ -1,4 +1,4 @@
-"""A node's private parameters as a frozen dataclass: defaults in code, types checked, unknown names refused."""
+"""A node's private parameters as a frozen dataclass: defaults in code, types and ranges checked, unknown names refused."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, TypeVar
 
 import rospy
 
+from perception_core.tunable import SettingsError, check_ranges
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
     Settings = TypeVar("Settings", bound=DataclassInstance)
-
-
-class SettingsError(ValueError):
-    """A parameter is unknown or of the wrong type."""
 
 
 def read_settings(defaults: Settings) -> Settings:
@@ -29,7 +27,9 @@ def override(defaults: Settings, given: dict[str, object]) -> Settings:
     if unknown:
         raise SettingsError(f"unknown parameter ~{unknown[0]}; known: {', '.join(sorted(known))}")
     checked = {name: _checked(name, value, known[name]) for name, value in given.items()}
-    return replace(defaults, **checked)
+    changed = replace(defaults, **checked)
+    check_ranges(changed)
+    return changed
 
 
 def _checked(name: str, value: object, default: object) -> object:

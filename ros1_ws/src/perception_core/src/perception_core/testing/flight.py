@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 import threading
 from dataclasses import dataclass
+from io import BytesIO
 from typing import TYPE_CHECKING, Self
 
 import rospy
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 STEP_NS = 20_000_000
 STEP_WALL_S = 0.004
 SENSOR_STEPS = 5
+LONGEST_WORK_WALL_S = 0.5  # of a node on one measurement; longer only if it has nothing to do
 FX, BASELINE_M, CX, CY = 240.0, 0.12, 240.0, 135.0
 # Rotation from the optical frame (z forward, x right) to base_link (x forward, y left).
 OPTICAL = Quaternion(-0.5, 0.5, -0.5, 0.5)
@@ -61,6 +64,8 @@ class FakeFlight:
         self.health: list[SensorHealth] = []
         self._states = {"zed_status": "UNKNOWN", "lidar_status": "UNKNOWN"}
         self._steps = 0
+        self._done = threading.Event()
+        self._measured = False
 
     def __enter__(self) -> Self:
         """Go on simulated time and advertise everything."""
@@ -76,6 +81,7 @@ class FakeFlight:
         self._resources = rospy.Publisher("/perception/resource_states", ResourceStates, queue_size=10, latch=True)
         self._transition = rospy.Service("/perception/transition", Transition, self._on_transition)
         self._listener = rospy.Subscriber(f"/{self.node}/health", SensorHealth, self.health.append)
+        self._done_listener = rospy.Subscriber(f"/{self.node}/done", Header, lambda _header: self._done.set())
         self._static.publish(_mounts())
         self._publish_resources()
         return self
@@ -84,6 +90,7 @@ class FakeFlight:
         """Take everything back, the node's parameters too."""
         self._transition.shutdown("the test is over")
         self._listener.unregister()
+        self._done_listener.unregister()
         for publisher in (
             *(self._clock, self._pose, self._state, self._static, self._cloud, self._resources),
             *(*self._images.values(), *self._infos.values()),
@@ -107,7 +114,8 @@ class FakeFlight:
     def run(self, seconds: float, *, until: Callable[[], bool] = lambda: False) -> bool:
         """Let simulated time pass, at most so much, and return whether the condition came true.
 
-        Time goes at most five times as fast as the wall clock, that the node can follow.
+        Time goes at most five times as fast as the wall clock, and waits for the node to be done with each measurement: a slow machine
+        makes a test longer, not different.
         """
         end_ns = self.now_ns + int(seconds * NS)
         pace = threading.Event()
@@ -131,21 +139,34 @@ class FakeFlight:
             state.reference, state.target_enu_m = "position", Point(*self.target)
         self._state.publish(state)
         if self._steps % SENSOR_STEPS == 0:
+            self._done.clear()
+            self._measured = False
             self.at_10_hz(self.now_ns)
+            if self._measured:
+                self._done.wait(LONGEST_WORK_WALL_S)
 
-    def publish_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8]) -> None:
-        """Publish one image and its camera_info."""
+    def publish_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8], *, encoding: str = "mono8", info_scale: int = 1) -> None:
+        """Publish one image and its camera_info; ``info_scale`` makes that the one of a larger image."""
         header = Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id=f"zed_{side}")
-        height, width = image.shape
-        shift = -FX * BASELINE_M if side == "right" else 0.0
-        self._infos[side].publish(
-            CameraInfo(header=header, height=height, width=width, P=[FX, 0.0, CX, shift, 0.0, FX, CY, 0.0, 0.0, 0.0, 1.0, 0.0])
-        )
-        self._images[side].publish(Image(header=header, height=height, width=width, encoding="mono8", step=width, data=image.tobytes()))
+        height, width = image.shape[:2]
+        fx, cx, cy = FX * info_scale, CX * info_scale, CY * info_scale
+        shift = -fx * BASELINE_M if side == "right" else 0.0
+        info = CameraInfo(header=header, height=height * info_scale, width=width * info_scale)
+        info.P = [fx, 0.0, cx, shift, 0.0, fx, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+        self._infos[side].publish(info)
+        step, self._measured = image.strides[0], True
+        self._images[side].publish(Image(header=header, height=height, width=width, encoding=encoding, step=step, data=image.tobytes()))
 
     def publish_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
         """Publish one cloud of the LiDAR, whose frame is base_link's moved up by 0.1 m."""
+        self._measured = True
         self._cloud.publish(cloud_message(Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="lidar"), points))
+
+    def publish_cut_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
+        """Send a cloud whose last bytes are missing, as a message of its own that is complete as far as its length says."""
+        buffer = BytesIO()
+        cloud_message(Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="lidar"), points).serialize(buffer)
+        send_raw(self._cloud, framed(buffer.getvalue()[:-100]))
 
     def _on_transition(self, request: TransitionRequest) -> TransitionResponse:
         self.reports.append(Report(self.now_ns, request.resource, request.to))
@@ -156,6 +177,17 @@ class FakeFlight:
     def _publish_resources(self) -> None:
         resources = [ResourceState(name=name, state=state) for name, state in self._states.items()]
         self._resources.publish(ResourceStates(skillset="perception", resources=resources))
+
+
+def framed(data: bytes) -> bytes:
+    """Return the bytes as TCPROS sends a message: behind their length."""
+    return struct.pack("<I", len(data)) + data
+
+
+def send_raw(publisher: rospy.Publisher, data: bytes) -> None:
+    """Write bytes into each of a publisher's connections, whatever they are."""
+    for connection in publisher.impl.connections:
+        connection.write_data(data)
 
 
 def _mounts() -> TFMessage:

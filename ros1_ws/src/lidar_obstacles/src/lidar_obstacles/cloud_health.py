@@ -1,0 +1,107 @@
+"""What a LiDAR's sweeps tell of its health: returns, where they come from, how far they are, whether they change."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from perception_core import FINE, Fault, Finding, Sweep, broken
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+SECTORS = 12
+SAMPLE = 20_000  # points are enough to judge a sweep
+RECENT = 3  # sweeps: a sensor loses a sector from one to the next, a moving one gradually
+SECTOR_RETURNS = 20  # of the sample; a sector with fewer can't be missed
+FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
+
+
+@dataclass(frozen=True)
+class CloudLimits:
+    """When a sweep is not believed.
+
+    Fewer than ``min_returns`` are nothing; fewer than ``thin_share`` of what came just before is a broken sensor; more than ``far_share``
+    of the returns beyond ``max_range_m`` are coordinates in another unit. A sector is lost with less than ``sector_share`` of what it had.
+    """
+
+    min_returns: int = 300
+    thin_share: float = 0.1
+    max_range_m: float = 250.0
+    far_share: float = 0.05
+    sector_share: float = 0.1
+
+
+class CloudJudge:
+    """Judge sweeps in their order; not thread-safe."""
+
+    def __init__(self, limits: CloudLimits) -> None:
+        self._limits = limits
+        self._previous: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
+        self._recent: deque[NDArray[np.float64]] = deque(maxlen=RECENT)
+        self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
+
+    def finding(self, sweep: Sweep, *, self_m: float) -> Finding:
+        """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own."""
+        stride = max(1, len(sweep.points) // SAMPLE)
+        sample = sweep.points[::stride]
+        previous, self._previous = self._previous, sample
+        ranges = np.sqrt(np.einsum("ij,ij->i", sample, sample))
+        returns = sample[np.isfinite(ranges) & (ranges > self_m)]
+        if len(returns) * stride < self._limits.min_returns:
+            return broken(Fault.RETURNS, f"{'only ' if len(returns) else ''}{len(returns) * stride} returns")
+        far = self._far(ranges[np.isfinite(ranges) & (ranges > self_m)])
+        if far:
+            return broken(Fault.RANGE, far)
+        if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
+            return broken(Fault.FROZEN, "the sweep is the same as the one before")
+        return self._against_the_past(returns, stride)
+
+    def _far(self, ranges: NDArray[np.float32]) -> str:
+        share = float(np.mean(ranges > self._limits.max_range_m))
+        if share <= self._limits.far_share:
+            return ""
+        middle = float(np.median(ranges))
+        unit = ": are the coordinates in millimetres?" if middle > self._limits.max_range_m else ""
+        return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {middle:.0f} m{unit}"
+
+    def _against_the_past(self, returns: NDArray[np.float32], stride: int) -> Finding:
+        azimuth = np.arctan2(returns[:, 1], returns[:, 0])
+        sector = ((azimuth + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
+        counts = np.bincount(sector, minlength=SECTORS).astype(np.float64) * stride
+        if not self._recent:
+            self._recent.append(counts)
+            return FINE
+        before = np.min(self._recent, axis=0)
+        if counts.sum() < self._limits.thin_share * before.sum():
+            return broken(Fault.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
+        gone = (before >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * before)
+        self._lost = (self._lost & gone) | (gone & (np.roll(gone, 1) | np.roll(gone, -1)))
+        if self._lost.any():
+            return broken(Fault.SECTOR, f"no returns any more from {_angles(self._lost)} around the sensor's z axis")
+        self._recent.append(counts)
+        return FINE
+
+
+def _frozen(now: NDArray[np.float32], previous: NDArray[np.float32], sample: NDArray[np.float32], returned: NDArray[np.bool_]) -> bool:
+    """Return whether nearly all returns are where they were, whatever else of the message changes."""
+    if previous.shape != sample.shape or not len(now):
+        return False
+    same = np.all(now == previous[returned], axis=1)
+    return bool(np.mean(same) > FROZEN_SHARE)
+
+
+def _angles(lost: NDArray[np.bool_]) -> str:
+    """Return the lost sectors in words: one range of degrees where they touch, else each."""
+    width = 360 // SECTORS
+    starts = [k for k in np.flatnonzero(lost) if not lost[k - 1]]
+    if not starts:
+        return "all directions"
+    texts = []
+    for start in starts:
+        length = next(n for n in range(1, SECTORS + 1) if not lost[(start + n) % SECTORS])
+        texts.append(f"{start * width - 180} to {start * width - 180 + length * width} degrees")
+    return " and ".join(texts)

@@ -1,0 +1,92 @@
+"""What sweeps tell of the LiDAR: each way to be broken without being silent, and no false alarm in flight."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lidar_obstacles import CloudJudge, LidarSettings
+from perception_core import NS, Fault, Sweep, Verdict
+
+ROOT = Path(__file__).resolve().parents[4]
+DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
+
+
+def room(seed=0, *, yaw=0.0, x=0.0, count=30_000, noise_m=0.02) -> np.ndarray:
+    """Return a sweep of 16 beams from within a hall of 40 x 16 x 8 m, the vehicle turned by ``yaw`` and moved to ``x``."""
+    azimuth = np.tile(np.linspace(-np.pi, np.pi, count // 16, endpoint=False), 16)
+    elevation = np.repeat(np.radians(np.linspace(-15, 15, 16)), count // 16)
+    ray = np.column_stack([np.cos(elevation) * np.cos(azimuth + yaw), np.cos(elevation) * np.sin(azimuth + yaw), np.sin(elevation)])
+    with np.errstate(divide="ignore"):
+        to_walls = np.where(ray > 0, np.array([20.0 - x, 8.0, 6.0]), np.array([-20.0 - x, -8.0, -2.0])) / ray
+    ranges = to_walls.min(axis=1) + np.random.default_rng(seed).normal(0, noise_m, len(ray))
+    local = np.column_stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    return (local * ranges[:, None]).astype(np.float32)
+
+
+def judge_all(sweeps, **settings):
+    judge = CloudJudge(LidarSettings(**settings).cloud)
+    return [judge.finding(Sweep(NS, points, np.zeros(len(points), np.float32)), self_m=1.0) for points in sweeps]
+
+
+def blind(points, low_deg, high_deg) -> np.ndarray:
+    azimuth = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
+    return points[(azimuth < low_deg) | (azimuth > high_deg)]
+
+
+def frozen(points, _before) -> np.ndarray:
+    again = room(4).copy()
+    again[7] += 0.001 * len(points)  # one flickering value
+    return again
+
+
+BREAKS = {
+    "dead beams": (lambda points, _: points[:0], Fault.RETURNS, "0 returns"),
+    "nothing but itself": (lambda points, _: points / 100, Fault.RETURNS, "0 returns"),
+    "not finite": (lambda points, _: points * np.nan, Fault.RETURNS, "0 returns"),
+    "one point in 500": (lambda points, _: points[::500], Fault.RETURNS, "only 60 returns"),
+    "one point in 50": (lambda points, _: points[::50], Fault.RETURNS, "returns fell from 30000 to 600"),
+    "front half blind": (lambda points, _: blind(points, -90, 90), Fault.SECTOR, "no returns any more from -90 to 90 degrees"),
+    "60 degrees blind": (lambda points, _: blind(points, 120, 181), Fault.SECTOR, "no returns any more from 120 to 180 degrees"),
+    "millimetres": (lambda points, _: points * 1000, Fault.RANGE, "are the coordinates in millimetres?"),
+    "frozen but for a value": (frozen, Fault.FROZEN, "the sweep is the same as the one before"),
+}
+
+
+@pytest.mark.parametrize("name", BREAKS)
+def test_a_broken_lidar_is_broken_from_the_first_sweep_on_and_for_as_long(name) -> None:
+    broken, fault, sentence = BREAKS[name]
+    good = [room(seed) for seed in range(5)]
+    findings = judge_all([*good, *(broken(room(5 + k), None) for k in range(30)), *(room(50 + k) for k in range(3))])
+    assert all(finding.ok for finding in findings[:5])
+    # A frozen sweep repeats the last good one: the first repetition is the first that can be known.
+    during = findings[5:35]
+    assert {finding.verdict for finding in during} == {Verdict.BROKEN}
+    assert {finding.fault for finding in during} == {fault}
+    assert sentence in during[0].reason
+    assert findings[-1].ok
+
+
+def test_turning_at_90_degrees_a_second_and_flying_out_of_the_hall_is_no_fault() -> None:
+    turning = [room(k, yaw=np.radians(9.0 * k)) for k in range(60)]
+    assert all(finding.ok for finding in judge_all(turning))
+    moving = [room(k, x=0.5 * k) for k in range(38)]
+    assert all(finding.ok for finding in judge_all(moving))
+
+
+def test_a_mirror_of_5_centimetre_steps_is_not_frozen() -> None:
+    # Coarse ranges repeat themselves often: half of the points of a standing sensor may be where they were.
+    coarse = [np.round(room(k) / 0.05) * np.float32(0.05) for k in range(10)]
+    assert all(finding.ok for finding in judge_all(coarse))
+
+
+@pytest.mark.skipif(not DATA.exists(), reason=f"no real data at {DATA}: set ALULA_DATA")
+def test_real_sweeps_are_good() -> None:
+    kitti = [np.fromfile(path, np.float32).reshape(-1, 4)[:, :3] for path in sorted((DATA / "lidar_kitti").glob("*.bin"))]
+    handheld = [np.fromfile(path, np.float32).reshape(-1, 3) for path in sorted((DATA / "lidar_handheld").glob("raw_*.bin"))]
+    assert len(kitti) == len(handheld) == 3
+    assert all(finding.ok for finding in judge_all(kitti))
+    assert all(finding.ok for finding in judge_all(handheld))

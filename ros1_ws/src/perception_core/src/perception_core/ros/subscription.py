@@ -1,0 +1,97 @@
+"""A subscription that neither a message cut short on the wire nor a broken stream can end."""
+
+from __future__ import annotations
+
+import time
+from threading import Lock, Thread
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+import genpy
+import rospy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+SILENCE_S = 2.0  # wall clock: what is wrong is a connection, not the mission
+LONGEST_SILENCE_S = 30.0
+
+
+class MessageLike(Protocol):
+    """What is needed of a message's class."""
+
+    _type: str
+
+    def deserialize(self, data: bytes) -> object:
+        """Read the message from its bytes."""
+
+
+Message = TypeVar("Message", bound=MessageLike)
+
+
+class RawSubscriber(Generic[Message]):
+    """Subscribe to bytes and decode them here.
+
+    rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
+    So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A stream that has lost the
+    borders between its messages can't be decoded at all: after `SILENCE_S` without a message the connections are made anew, at growing
+    intervals.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        kind: type[Message],
+        on_message: Callable[[Message], None],
+        on_garbage: Callable[[str], None],
+        *,
+        buffer_bytes: int,
+    ) -> None:
+        self._topic, self._kind, self._buffer_bytes = topic, kind, buffer_bytes
+        self._on_message, self._on_garbage = on_message, on_garbage
+        self._lock = Lock()
+        self._heard_s = time.monotonic()
+        self._patience_s = SILENCE_S
+        self._subscriber = self._subscribe()
+        self._ended = False
+        self._watch = Thread(target=self._watch_connections, daemon=True)
+        self._watch.start()
+
+    def _subscribe(self) -> rospy.Subscriber:
+        return rospy.Subscriber(self._topic, rospy.AnyMsg, self._on_bytes, queue_size=1, buff_size=self._buffer_bytes, tcp_nodelay=True)
+
+    def close(self) -> None:
+        """End the subscription."""
+        with self._lock:
+            self._ended = True
+            self._subscriber.unregister()
+
+    def _on_bytes(self, raw: rospy.AnyMsg) -> None:
+        self._heard_s, self._patience_s = time.monotonic(), SILENCE_S
+        sent = raw._connection_header.get("type", "*")  # noqa: SLF001 -- rospy's documented way to the publisher's type
+        wanted = self._kind._type  # noqa: SLF001 -- generated messages have it
+        if sent not in {"*", wanted}:
+            self._on_garbage(f"{self._topic} carries {sent}, expected {wanted}")
+            return
+        message = self._kind()
+        try:
+            message.deserialize(raw._buff)  # noqa: SLF001 -- all that an AnyMsg has
+        except (genpy.DeserializationError, ValueError, MemoryError) as error:
+            self._on_garbage(f"a message of {len(raw._buff)} bytes can't be decoded: {error}")  # noqa: SLF001
+            return
+        self._on_message(message)
+
+    def _watch_connections(self) -> None:
+        pause = rospy.rostime.wallsleep
+        while not (rospy.is_shutdown() or self._ended):
+            pause(SILENCE_S / 4)
+            if time.monotonic() - self._heard_s >= self._patience_s:
+                self._reconnect()
+
+    def _reconnect(self) -> None:
+        with self._lock:
+            if self._ended or not self._subscriber.get_num_connections():
+                self._heard_s = time.monotonic()
+                return
+            self._subscriber.unregister()
+            self._subscriber = self._subscribe()
+        self._heard_s, self._patience_s = time.monotonic(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)

@@ -1,0 +1,183 @@
+"""Two CameraInfos to what the matching needs: checked, the images rectified where they are not, and scaled down where that is cheaper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import cv2
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Gray = NDArray[np.uint8]
+
+ROW_TOLERANCE_PX = 1.0  # by which the rows of both projections may disagree
+FOCAL_LIMITS = (0.2, 10.0)  # of the width: views of 136 and of 6 degrees
+BASELINE_LIMITS_M = (0.005, 3.0)
+FISHEYE = "equidistant"
+
+
+class InfoLike(Protocol):
+    """What is read of a sensor_msgs/CameraInfo."""
+
+    width: int
+    height: int
+    distortion_model: str
+    D: Sequence[float]
+    K: Sequence[float]
+    R: Sequence[float]
+    P: Sequence[float]
+    binning_x: int
+    binning_y: int
+
+
+class CalibrationError(ValueError):
+    """The camera_info can't be that of these images."""
+
+
+@dataclass(frozen=True)
+class StereoGeometry:
+    """Pinhole of the left rectified camera, in pixels, and the distance between the cameras in metres.
+
+    ``offset_px`` is the disparity of what is infinitely far away: the difference of the principal points, left minus right.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    baseline_m: float
+    offset_px: float = 0.0
+
+    def depth_error_m(self, depth_m: float, disparity_error_px: float) -> float:
+        """Return the error of a depth for an error of the disparity: it grows with the square of the depth."""
+        return depth_m**2 / (self.fx * self.baseline_m) * disparity_error_px
+
+    def disparity_of(self, depth_m: float) -> float:
+        """Return the disparity in pixels at a depth."""
+        return self.fx * self.baseline_m / depth_m + self.offset_px
+
+    def scaled(self, divisor: int) -> StereoGeometry:
+        """Return the geometry of images of which each ``divisor`` x ``divisor`` pixels were averaged."""
+        return StereoGeometry(
+            fx=self.fx / divisor,
+            fy=self.fy / divisor,
+            cx=(self.cx + 0.5) / divisor - 0.5,
+            cy=(self.cy + 0.5) / divisor - 0.5,
+            baseline_m=self.baseline_m,
+            offset_px=self.offset_px / divisor,
+        )
+
+
+@dataclass(frozen=True)
+class Camera:
+    """One checked CameraInfo: what the rectification needs, for images of ``width`` x ``height``."""
+
+    width: int
+    height: int
+    K: Floats
+    D: Floats
+    R: Floats
+    P: Floats
+    fisheye: bool
+
+    @classmethod
+    def of(cls, info: InfoLike, side: str) -> Camera:
+        """Read and check one side's message; raise CalibrationError with a sentence."""
+        D = np.array(info.D, dtype=np.float64)  # noqa: N806 -- the message's names
+        K: Floats = np.array(info.K, dtype=np.float64).reshape(3, 3)  # noqa: N806
+        R: Floats = np.array(info.R, dtype=np.float64).reshape(3, 3)  # noqa: N806
+        P: Floats = np.array(info.P, dtype=np.float64).reshape(3, 4)  # noqa: N806
+        if not all(np.isfinite(values).all() for values in (D, K, R, P)):
+            raise CalibrationError(f"the {side} camera_info holds values that are not finite")
+        bins = np.array([max(1, int(info.binning_x)), max(1, int(info.binning_y))])
+        width, height = info.width // int(bins[0]), info.height // int(bins[1])
+        scale = np.diag([1.0 / bins[0], 1.0 / bins[1], 1.0])
+        if not R.any():
+            if D.any():
+                raise CalibrationError(f"the {side} camera_info has a distortion but no rectification (R is zero): calibrate the pair")
+            R = np.eye(3)  # noqa: N806
+        if np.abs(R @ R.T - np.eye(3)).max() > 1e-3:
+            raise CalibrationError(f"the {side} camera_info's R is no rotation")
+        camera = cls(width=width, height=height, K=scale @ K, D=D, R=R, P=scale @ P, fisheye=info.distortion_model == FISHEYE)
+        camera.check_projection(side)
+        return camera
+
+    def check_projection(self, side: str) -> None:
+        """Raise CalibrationError unless P can be that of a camera with images of this size."""
+        fx, fy, cx, cy = self.P[0, 0], self.P[1, 1], self.P[0, 2], self.P[1, 2]
+        if not (fx > 0.0 and fy > 0.0):
+            raise CalibrationError(f"the {side} camera_info's P has the focal lengths {fx:g} and {fy:g} px: the camera is not calibrated")
+        low, high = (limit * self.width for limit in FOCAL_LIMITS)
+        if not low <= fx <= high:
+            raise CalibrationError(f"the {side} camera_info's fx of {fx:g} px is not that of images {self.width} px wide")
+        if not (0.0 < cx < self.width and 0.0 < cy < self.height):
+            raise CalibrationError(
+                f"the {side} camera_info's principal point ({cx:.0f}, {cy:.0f}) is outside of its {self.width}x{self.height} image"
+            )
+
+    @property
+    def rectified(self) -> bool:
+        """Whether the images need no rectification."""
+        if not self.K.any():
+            return True
+        same = np.abs(self.K - self.P[:, :3]).max() < 1e-6 * self.width
+        return bool(same and not self.D.any() and np.abs(self.R - np.eye(3)).max() < 1e-9)
+
+    def maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+        """Return OpenCV's maps from the rectified image to the raw one."""
+        size = (self.width, self.height)
+        if self.fisheye:
+            first, second = cv2.fisheye.initUndistortRectifyMap(self.K, self.D[:4], self.R, self.P[:, :3], size, cv2.CV_16SC2)
+        else:
+            first, second = cv2.initUndistortRectifyMap(self.K, self.D, self.R, self.P[:, :3], size, cv2.CV_16SC2)
+        return first, second
+
+
+def geometry_of(left: Camera, right: Camera) -> StereoGeometry:
+    """Return the geometry of a rectified pair; raise CalibrationError when the projections are not those of one."""
+    if (left.width, left.height) != (right.width, right.height):
+        raise CalibrationError(f"the left camera_info is for {left.width}x{left.height} images, the right for {right.width}x{right.height}")
+    fx, fy, cx, cy = (float(left.P[index]) for index in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    apart = {"fx": abs(right.P[0, 0] - fx), "fy": abs(right.P[1, 1] - fy), "cy": abs(right.P[1, 2] - cy)}
+    for name, pixels in apart.items():
+        if pixels > ROW_TOLERANCE_PX:
+            raise CalibrationError(f"no rectified stereo pair: {name} of the left and the right P differ by {pixels:.1f} px")
+    baseline_m = float(left.P[0, 3] / fx - right.P[0, 3] / right.P[0, 0])
+    if not BASELINE_LIMITS_M[0] <= baseline_m <= BASELINE_LIMITS_M[1]:
+        raise CalibrationError(f"no rectified stereo pair: the baseline is {baseline_m:g} m (the right P[3] must be -fx * baseline)")
+    return StereoGeometry(fx=fx, fy=fy, cx=cx, cy=cy, baseline_m=baseline_m, offset_px=float(cx - right.P[0, 2]))
+
+
+class StereoCalibration:
+    """Make pairs of raw images ready for matching: rectified, and about ``max_width_px`` wide if they are larger."""
+
+    def __init__(self, left: InfoLike, right: InfoLike, *, rectified: bool, max_width_px: int) -> None:
+        """Raise CalibrationError; ``rectified``: the images are, though the camera_info may be that of the raw ones."""
+        cameras = Camera.of(left, "left"), Camera.of(right, "right")
+        self.size = (cameras[0].height, cameras[0].width)
+        self.full = geometry_of(*cameras)
+        self.divisor = max(1, round(cameras[0].width / max_width_px))
+        self.geometry = self.full.scaled(self.divisor)
+        self._maps = tuple(None if rectified or camera.rectified else camera.maps() for camera in cameras)
+
+    def prepared(self, left: Gray, right: Gray) -> tuple[Gray, Gray]:
+        """Return both images ready for matching; raise CalibrationError when they have another size than the camera_info says."""
+        for side, image in (("left", left), ("right", right)):
+            if image.shape != self.size:
+                told, sent = (f"{shape[1]}x{shape[0]}" for shape in (self.size, image.shape))
+                raise CalibrationError(f"camera_info is for {told} images, the {side} image is {sent}")
+        return self._one(left, 0), self._one(right, 1)
+
+    def _one(self, image: Gray, index: int) -> Gray:
+        maps = self._maps[index]
+        straight = image if maps is None else cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        if self.divisor > 1:
+            size = (image.shape[1] // self.divisor, image.shape[0] // self.divisor)
+            straight = cv2.resize(straight[: size[1] * self.divisor, : size[0] * self.divisor], size, interpolation=cv2.INTER_AREA)
+        return np.asarray(straight)

@@ -1,0 +1,66 @@
+"""What single images tell of their camera: exposure, content, change. Cheap enough for every pair."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from perception_core import FINE, Fault, Finding, broken
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from zed_depth.pairing import StereoPair
+
+    Gray = NDArray[np.uint8]
+
+THUMB = 8  # pixels of the image averaged into one: noise of 8 grey levels has 1 there, content keeps its contrast
+SATURATED = 250
+STRIDE = 3
+
+
+@dataclass(frozen=True)
+class ImageLimits:
+    """Grey levels (0..255) and shares (0..1); measured on real images, see docs/perception.md.
+
+    ``min_contrast``: deviation of the averaged image; a dark image (mean below ``dark_mean``) needs twice as much. ``min_changed``: share
+    of the pixels that differ from the image before; noise alone changes most of them.
+    """
+
+    dark_mean: float = 20.0
+    min_contrast: float = 4.0
+    max_saturated: float = 0.6
+    min_changed: float = 0.001
+
+
+class ImageJudge:
+    """Judge the pairs of one camera in their order; not thread-safe."""
+
+    def __init__(self, limits: ImageLimits) -> None:
+        self._limits = limits
+        self._previous: dict[str, Gray] = {}
+
+    def finding(self, pair: StereoPair) -> Finding:
+        """Return what the images of this pair tell; call it once for each pair."""
+        findings = [self._one(side, image) for side, image in (("left", pair.left), ("right", pair.right))]
+        return next((finding for finding in findings if not finding.ok), FINE)
+
+    def _one(self, side: str, image: Gray) -> Finding:
+        sample = image[::STRIDE, ::STRIDE]
+        previous, self._previous[side] = self._previous.get(side), sample
+        limits = self._limits
+        size = (max(1, image.shape[1] // THUMB), max(1, image.shape[0] // THUMB))
+        thumb = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+        mean, contrast = float(thumb.mean()), float(thumb.std())
+        saturated = float(np.mean(sample >= SATURATED))
+        told = f"mean {mean:.0f}, contrast {contrast:.1f} of 255"
+        if saturated > limits.max_saturated:
+            return broken(Fault.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
+        if contrast < limits.min_contrast or (mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast):
+            return broken(Fault.EXPOSURE, f"{side} image is {'dark' if mean < limits.dark_mean else 'blank'} ({told})")
+        if previous is not None and previous.shape == sample.shape and np.mean(previous != sample) < limits.min_changed:
+            return broken(Fault.FROZEN, f"{side} image is frozen")
+        return FINE

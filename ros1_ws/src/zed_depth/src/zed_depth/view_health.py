@@ -1,0 +1,166 @@
+"""What both images together tell of the rig: do the cameras see the same scene, and as a rectified pair does?
+
+Features of both images (ORB) are matched without any knowledge of the geometry. Of a rectified pair, matches lie in one row, and never more
+to the right in the right image. A fit of the vertical offset over the image tells a shifted, a turned and a zoomed camera apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from perception_core import FINE, Fault, Finding, broken, unsure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Gray = NDArray[np.uint8]
+    Floats = NDArray[np.float64]
+
+FEATURES = 400
+FAST_THRESHOLDS = (25, 7)  # corners by clear edges; by faint ones only where the clear ones are few
+FEW_FEATURES = 60
+ENOUGH_FEATURES = 120
+ENOUGH_MATCHES = 20
+AGREE_PX = 2.0
+FIRST_GUESS_SHARE = 0.03  # of the height: by as much the rows of a camera that is off may differ over the image
+FITS = 4
+EDGE_PX = 9
+STRONGEST = 99.5  # percentile of the gradient: the edges that are looked at
+
+
+@dataclass(frozen=True)
+class ViewLimits:
+    """Pixels of the image that is matched, and shares (0..1); measured on real images, see docs/perception.md."""
+
+    max_vertical_px: float = 1.0
+    min_agreeing: float = 0.25
+    max_negative: float = 0.5
+    min_parallax_px: float = 0.5
+    max_edge_px: float = 6.0
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Matched features: places in the left image (N, 2), and how much lower (N,) and more to the left (N,) they are in the right one."""
+
+    count_left: int
+    count_right: int
+    places: Floats
+    vertical_px: Floats
+    disparity_px: Floats
+
+
+def view_finding(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) -> Finding:
+    """Return what a rectified pair tells of its rig; ``offset_px`` is the disparity of infinity."""
+    for side, image in (("left", left), ("right", right)):
+        width_px = edge_width_px(image)
+        if width_px > limits.max_edge_px:
+            return broken(Fault.BLUR, f"{side} image is blurred: its sharpest edges are {width_px:.1f} px wide")
+    if np.array_equal(left, right):
+        return broken(Fault.VIEW, "both cameras deliver the same image")
+    matches = match(left, right)
+    fewest = min(matches.count_left, matches.count_right)
+    if fewest < FEW_FEATURES:
+        return unsure(Fault.VIEW, f"too little texture to judge the cameras: {fewest} features")
+    fit = fit_rows(matches, FIRST_GUESS_SHARE * left.shape[0])
+    agreeing = int(np.count_nonzero(fit.agree))
+    if agreeing < max(ENOUGH_MATCHES, limits.min_agreeing * len(matches.vertical_px)):
+        told = f"{agreeing} of {len(matches.vertical_px)} features agree"
+        if fewest < ENOUGH_FEATURES:
+            return unsure(Fault.VIEW, f"too little texture to judge the cameras: {told}")
+        return broken(Fault.VIEW, f"the cameras do not see the same scene: {told}")
+    return _rows_finding(fit, left.shape, limits) or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
+
+
+def match(left: Gray, right: Gray) -> Matches:
+    """Match the features of both images, mutually best ones only."""
+    (keys_left, words_left), (keys_right, words_right) = (_features(image) for image in (left, right))
+    pairs = []
+    if words_left is not None and words_right is not None:
+        pairs = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(words_left, words_right)
+    places = np.array([keys_left[pair.queryIdx].pt for pair in pairs], dtype=np.float64).reshape(-1, 2)
+    moved = np.array([keys_right[pair.trainIdx].pt for pair in pairs], dtype=np.float64).reshape(-1, 2) - places
+    return Matches(len(keys_left), len(keys_right), places, moved[:, 1], -moved[:, 0])
+
+
+def _features(image: Gray) -> tuple[Sequence[cv2.KeyPoint], Gray | None]:
+    """Return the corners and their descriptors, (N, 32) or None."""
+    for threshold in FAST_THRESHOLDS:
+        keys, words = cv2.ORB_create(FEATURES, fastThreshold=threshold).detectAndCompute(image, None)
+        if len(keys) >= ENOUGH_FEATURES:
+            break
+    return keys, words
+
+
+@dataclass(frozen=True)
+class RowFit:
+    """The vertical offset over the image: ``at_centre`` px, and per pixel to the right and down; which matches agree with it, (N,)."""
+
+    at_centre: float
+    per_column: float
+    per_row: float
+    agree: NDArray[np.bool_]
+
+
+def fit_rows(matches: Matches, first_guess_px: float) -> RowFit:
+    """Fit a plane to the vertical offsets of those matches that agree with most others."""
+    vertical = matches.vertical_px
+    if len(vertical) < ENOUGH_MATCHES:
+        return RowFit(0.0, 0.0, 0.0, np.zeros(len(vertical), dtype=np.bool_))
+    agree = np.abs(vertical - _densest(vertical)) <= first_guess_px
+    terms = np.column_stack([np.ones(len(vertical)), matches.places - matches.places.mean(axis=0)])
+    solution = np.zeros(3)
+    for _ in range(FITS):
+        if np.count_nonzero(agree) < ENOUGH_MATCHES // 2:
+            break
+        solution = np.linalg.lstsq(terms[agree], vertical[agree], rcond=None)[0]
+        agree = np.abs(vertical - terms @ solution) <= AGREE_PX
+    at_centre, per_column, per_row = (float(value) for value in solution)
+    return RowFit(at_centre, per_column, per_row, agree)
+
+
+def _densest(values: Floats) -> float:
+    """Return the middle of the shortest interval that holds a quarter of the values."""
+    ordered = np.sort(values)
+    quarter = max(2, len(ordered) // 4)
+    spans = ordered[quarter - 1 :] - ordered[: len(ordered) - quarter + 1]
+    at = int(np.argmin(spans))
+    return float(ordered[at : at + quarter].mean())
+
+
+def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Finding | None:
+    height, width = shape[:2]
+    angle = float(np.degrees(np.arctan(fit.per_column)))
+    # The sentence names the greatest of the three; a turn and a zoom are measured where they do least, or noise would be told as one.
+    troubles = {
+        f"the right image is {abs(fit.at_centre):.1f} px off the left one's rows": abs(fit.at_centre),
+        f"the cameras are turned against each other by {abs(angle):.2f} degrees": abs(fit.per_column) * width / 3.0,
+        f"the images differ in scale by {abs(fit.per_row):.1%}": abs(fit.per_row) * height / 4.0,
+    }
+    told = max(troubles, key=lambda trouble: troubles[trouble])
+    return broken(Fault.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
+
+
+def _disparity_finding(disparity_px: Floats, limits: ViewLimits) -> Finding:
+    negative = float(np.mean(disparity_px < -1.0))
+    if negative > limits.max_negative:
+        return broken(Fault.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
+    if float(np.percentile(np.abs(disparity_px), 95.0)) < limits.min_parallax_px:
+        return unsure(Fault.VIEW, "no parallax: everything is far away, or both cameras show the same")
+    return FINE
+
+
+def edge_width_px(image: Gray) -> float:
+    """Return how wide the strongest edges are: the step over them by their steepest gradient. A sharp image has 3 px, noise or not."""
+    smooth = cv2.GaussianBlur(image, (0, 0), 0.7).astype(np.float32)
+    gradient = cv2.magnitude(cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=1), cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=1)) / 2.0
+    strong = gradient >= np.percentile(gradient[::2, ::2], STRONGEST)
+    kernel = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1), np.uint8)
+    step = cv2.dilate(smooth, kernel) - cv2.erode(smooth, kernel)
+    return float(np.median(step[strong] / np.maximum(gradient[strong], 1e-3)))

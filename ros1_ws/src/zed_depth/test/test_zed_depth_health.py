@@ -1,0 +1,148 @@
+"""What pairs tell of the rig: each way to be broken without being silent, on a real pair when it is at hand, and no false alarm."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from perception_core import NS, Fault, Verdict
+from perception_core.testing import wall_pair
+from zed_depth import StereoPair, StereoRig, ZedSettings
+
+ROOT = Path(__file__).resolve().parents[4]
+DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data")) / "stereo_motorcycle"
+
+
+def noisy(image, seed, sigma=1.5) -> np.ndarray:
+    return np.clip(image + np.random.default_rng(seed).normal(0, sigma, image.shape), 0, 255).astype(np.uint8)
+
+
+def shifted(image, rows) -> np.ndarray:
+    return np.roll(image, rows, axis=0)
+
+
+def turned(image, degrees) -> np.ndarray:
+    height, width = image.shape
+    matrix = cv2.getRotationMatrix2D((width / 2, height / 2), degrees, 1.0)
+    return cv2.warpAffine(image, matrix, (width, height), borderMode=cv2.BORDER_REPLICATE)
+
+
+def blurred(image) -> np.ndarray:
+    return cv2.GaussianBlur(image, (0, 0), 3.0)
+
+
+def zoomed(image) -> np.ndarray:
+    height, width = image.shape
+    matrix = cv2.getRotationMatrix2D((width / 2, height / 2), 0.0, 1.03)
+    return cv2.warpAffine(image, matrix, (width, height), borderMode=cv2.BORDER_REPLICATE)
+
+
+def flickering(image, seed) -> np.ndarray:
+    again = image.copy()
+    again[12, 12] = seed % 256
+    return again
+
+
+BROKEN, UNKNOWN = Verdict.BROKEN, Verdict.UNKNOWN
+# name: (what becomes of the pair, with a seed for each; verdict; fault; words of the sentence)
+BREAKS = {
+    "shifted 3 px": (lambda a, b, s: (noisy(a, s), noisy(shifted(b, 3), s + 1)), BROKEN, Fault.CALIBRATION, "px off the left one's rows"),
+    "turned 1 degree": (
+        lambda a, b, s: (noisy(a, s), noisy(turned(b, 1.0), s + 1)),
+        BROKEN,
+        Fault.CALIBRATION,
+        "turned against each other",
+    ),
+    "zoomed 3 %": (lambda a, b, s: (noisy(a, s), noisy(zoomed(b), s + 1)), BROKEN, Fault.CALIBRATION, "differ in scale by"),
+    "swapped": (lambda a, b, s: (noisy(b, s), noisy(a, s + 1)), BROKEN, Fault.CALIBRATION, "left and right are swapped"),
+    "doubled": (lambda a, b, s: (noisy(a, s), noisy(a, s)), BROKEN, Fault.VIEW, "both cameras deliver the same image"),
+    "doubled, with noise": (lambda a, b, s: (noisy(a, s), noisy(a, s + 1)), UNKNOWN, Fault.VIEW, "no parallax"),
+    "unrelated": (lambda a, b, s: (noisy(a, s), noisy(b[:, ::-1], s + 1)), BROKEN, Fault.VIEW, "do not see the same scene"),
+    "one blurred": (lambda a, b, s: (noisy(a, s), noisy(blurred(b), s + 1)), BROKEN, Fault.BLUR, "right image is blurred"),
+    "both blurred": (lambda a, b, s: (noisy(blurred(a), s), noisy(blurred(b), s + 1)), BROKEN, Fault.BLUR, "left image is blurred"),
+    "dark, with noise": (lambda a, b, s: (noisy(a * 0.02, s, 5), noisy(b * 0.02, s + 1, 5)), BROKEN, Fault.EXPOSURE, "is dark"),
+    "black": (lambda a, b, s: (a * 0, b * 0), BROKEN, Fault.EXPOSURE, "left image is dark"),
+    "blank": (lambda a, b, s: (noisy(a, s), noisy(b * 0 + 128, s + 1)), BROKEN, Fault.EXPOSURE, "right image is blank"),
+    "overexposed": (lambda a, b, s: (noisy(a * 8.0, s), noisy(b * 8.0, s + 1)), BROKEN, Fault.EXPOSURE, "overexposed"),
+    "frozen": (lambda a, b, s: (a, b), BROKEN, Fault.FROZEN, "left image is frozen"),
+    "frozen but for a pixel": (lambda a, b, s: (noisy(a, s), flickering(b, s)), BROKEN, Fault.FROZEN, "right image is frozen"),
+}
+
+
+def scenes():
+    yield pytest.param(wall_pair(9.5, seed=1), 240.0, id="wall")
+    if DATA.exists():
+        images = (cv2.imread(str(DATA / f"motorcycle_{side}.png"), cv2.IMREAD_GRAYSCALE) for side in ("left", "right"))
+        half = (cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for image in images)
+        yield pytest.param(tuple(half), 124.0, id="motorcycle")
+    else:
+        yield pytest.param(None, 0.0, id="motorcycle", marks=pytest.mark.skip(reason=f"no real data at {DATA}: set ALULA_DATA"))
+
+
+def rig_for(image, fx) -> StereoRig:
+    from test_zed_depth_calibration import info
+
+    rig = StereoRig(ZedSettings())
+    height, width = image.shape
+    for side in ("left", "right"):
+        rig.take_info(side, info(right=side == "right", width=width, height=height, fx=fx, cx=width / 2, cy=height / 2))
+    return rig
+
+
+@pytest.mark.parametrize(("scene", "fx"), scenes())
+@pytest.mark.parametrize("name", BREAKS)
+def test_a_broken_rig_is_known_within_half_a_second(scene, fx, name) -> None:
+    change, verdict, fault, sentence = BREAKS[name]
+    left, right = scene
+    rig = rig_for(left, fx)
+    for k in range(3):
+        assert rig.finding(StereoPair(k * NS // 10, noisy(left, 90 + k), noisy(right, 190 + k))).ok
+    during = [rig.finding(StereoPair((3 + k) * NS // 10, *change(left, right, 300 + 2 * k))) for k in range(7)]
+    assert all(finding.verdict is verdict for finding in during[4:]), [finding.reason for finding in during]
+    assert {finding.fault for finding in during[4:]} == {fault}
+    assert sentence in during[-1].reason
+    after = [rig.finding(StereoPair((20 + k) * NS // 10, noisy(left, 90 + k), noisy(right, 190 + k))) for k in range(3)]
+    assert all(finding.ok for finding in after)
+
+
+@pytest.mark.parametrize(("scene", "fx"), scenes())
+@pytest.mark.parametrize("gain", [0.3, 0.6, 1.0, 1.4])
+def test_a_good_rig_is_never_suspected(scene, fx, gain) -> None:
+    left, right = (np.clip(image * gain, 0, 255) for image in scene)
+    rig = rig_for(left, fx)
+    findings = [rig.finding(StereoPair(k * NS // 2, noisy(left, 2 * k), noisy(right, 2 * k + 1))) for k in range(6)]
+    assert all(finding.ok for finding in findings), [finding.reason for finding in findings]
+
+
+def test_without_camera_info_nothing_is_known_and_wrong_info_is_told() -> None:
+    from test_zed_depth_calibration import info
+
+    left, right = wall_pair(9.5, seed=1)
+    rig = StereoRig(ZedSettings())
+    unknown = rig.finding(StereoPair(0, left, right))
+    assert (unknown.verdict, unknown.fault, unknown.reason) == (UNKNOWN, Fault.INFO, "no camera_info of both sides yet")
+    for side in ("left", "right"):
+        rig.take_info(side, info(right=side == "right", width=960, height=540, fx=480, cx=480, cy=270))
+    finding = rig.finding(StereoPair(NS, noisy(left, 1), noisy(right, 2)))
+    assert (finding.verdict, finding.fault) == (BROKEN, Fault.INFO)
+    assert finding.reason == "camera_info is for 960x540 images, the left image is 480x270"
+    for side in ("left", "right"):
+        rig.take_info(side, info(right=side == "right", P=[0.0] * 12))
+    assert "the camera is not calibrated" in rig.finding(StereoPair(2 * NS, noisy(left, 3), noisy(right, 4))).reason
+
+
+def test_a_pair_without_any_depth_is_unknown() -> None:
+    left, right = wall_pair(9.5, seed=1)
+    rig = rig_for(left, 240.0)
+    sky = (noisy(np.full_like(left, 190), 1), noisy(np.full_like(left, 190), 2))
+    assert rig.finding(StereoPair(0, left, right)).ok
+    assert np.isfinite(rig.depth(StereoPair(0, *sky)).metres).mean() < 0.002
+    finding = rig.finding(StereoPair(NS // 10, noisy(left, 3), noisy(right, 4)))
+    assert (finding.verdict, finding.reason) == (UNKNOWN, finding.reason)
+    assert "of the image has a depth" in finding.reason
+    rig.rest()
+    assert rig.finding(StereoPair(NS // 5, noisy(left, 5), noisy(right, 6))).ok
