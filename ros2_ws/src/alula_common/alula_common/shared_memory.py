@@ -5,20 +5,24 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import time
 from pathlib import Path
 
 SHARED_MEMORY = Path("/dev/shm")  # noqa: S108  (where POSIX puts it)
 
 
-def sweep_shared_memory() -> int:
+def sweep_shared_memory(*, older_than_s: float = 0.0) -> int:
     """Remove the segments whose owner is dead; return how many.
 
-    Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, nobody does.
+    Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, nobody does. While others
+    may be creating segments, ``older_than_s`` spares those whose lock was made but not yet taken.
     """
     removed = 0
     for lock in SHARED_MEMORY.glob("fastrtps_*_el"):
         segment = lock.with_name(lock.name.removesuffix("_el"))
         with contextlib.suppress(OSError):
+            if time.time() - lock.stat().st_mtime < older_than_s:
+                continue
             descriptor = os.open(lock, os.O_RDWR)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skill_model.execution_state import ExecutionState
-from skill_runtime.bench.cases import CASES, FREE, INPUT, LOST, USED, Case, make_skillset, resource_name, skill_name
-from skill_runtime.bench.figures import (
+from skill_bench.cases import CASES, FREE, INPUT, LOST, USED, Case, make_skillset, resource_name, skill_name
+from skill_bench.figures import (
     HEADINGS,
     Load,
     Measured,
@@ -25,6 +24,7 @@ from skill_runtime.bench.figures import (
     times_of,
     verdicts,
 )
+from skill_model.execution_state import ExecutionState
 from skill_runtime.core import SkillsetEngine
 from skill_runtime.hooks import SkillHooks
 

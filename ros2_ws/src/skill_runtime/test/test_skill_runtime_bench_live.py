@@ -17,10 +17,10 @@ pytest.importorskip("navigation_interfaces.action")
 
 from alula_common.network import is_claimed
 from alula_testing.waits import until
+from skill_bench.cases import CASES
+from skill_bench.clients import States
+from skill_bench.run import LEAST, open_bench
 from skill_model.execution_state import ExecutionState
-from skill_runtime.bench.cases import CASES
-from skill_runtime.bench.clients import States
-from skill_runtime.bench.run import LEAST, open_bench
 from skill_runtime.handle import SkillHandle
 
 LIMIT_S = 60.0
@@ -67,7 +67,7 @@ def test_a_state_counts_from_when_it_was_entered_first():
 
 
 def test_an_interrupted_run_leaves_no_process():
-    command = [sys.executable, "-m", "skill_runtime.bench", "--quick", "--case", "1 skill"]
+    command = [sys.executable, "-m", "skill_bench", "--quick", "--case", "1 skill"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True) as process:
         limit = threading.Timer(LIMIT_S, process.kill)
         limit.start()

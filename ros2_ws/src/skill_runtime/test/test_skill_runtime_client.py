@@ -67,12 +67,13 @@ def arrive(managers):
 
 def test_actions_rest_unless_an_answer_is_due(managers, uav):
     group = uav.navigation.client._middleware._group
-    waited_for = lambda: [entity for entity, awake in group.awake.items() if awake()]  # noqa: E731
+    may_rest = set(group.resting)
+    waited_for = lambda: [entity for entity in may_rest if entity not in group.resting]  # noqa: E731
     until(lambda: waited_for() == [], "nothing is due of earlier goals")
     handle = uav.navigation.takeoff(height=5.0, speed=1.0)
     managers.running()
     until(lambda: handle.progress == 0.5, "feedback comes while the goal runs")
-    assert [entity.topic_name for entity in waited_for()] == ["/navigation/skill/takeoff/_action/feedback"]
+    until(lambda: [getattr(one, "topic_name", "") for one in waited_for()] == ["/navigation/skill/takeoff/_action/feedback"], "that")
     managers.running().terminate("AT_ALTITUDE", "there")
     assert handle.get(SOON_S).result == "AT_ALTITUDE"
     until(lambda: waited_for() == [], "nothing is due any more")

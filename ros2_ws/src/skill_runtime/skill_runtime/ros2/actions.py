@@ -5,6 +5,7 @@ So a client asks again for what got lost, with the same goal id, and needs no st
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 from collections.abc import Callable, Mapping
@@ -24,6 +25,7 @@ from skill_runtime.ros2.convert import fields_of, fill, ros_types, values_of
 from skill_runtime.ros2.names import SERVICE
 
 if TYPE_CHECKING:
+    from skill_runtime.ros2.calls import Calls
     from skill_runtime.ros2.middleware import RclpyMiddleware
 
 ID_DIGITS = 12
@@ -140,16 +142,20 @@ class RclpyLink:
         self._goals: dict[str, Any] = {}
         place = f"skill/{skill}/_action"
         self._send = middleware.calls(f"{place}/send_goal", action.Impl.SendGoalService)
-        self._cancel = middleware.calls(f"{place}/cancel_goal", CancelGoal)
-        self._result = middleware.calls(f"{place}/get_result", action.Impl.GetResultService)
-        self._feedback = middleware.resting_subscription(
-            f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback, awake=lambda: bool(self._goals)
-        )
+        self._follow = middleware.resting_subscription(f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback)
+
+    @functools.cached_property
+    def _cancels(self) -> Calls:
+        return self._middleware.calls(f"skill/{self._skill}/_action/cancel_goal", CancelGoal)
+
+    @functools.cached_property
+    def _results(self) -> Calls:
+        return self._middleware.calls(f"skill/{self._skill}/_action/get_result", self._action.Impl.GetResultService)
 
     @property
     def connected(self) -> bool:
-        """Tell whether the action's services are there."""
-        return self._send.ready and self._cancel.ready and self._result.ready
+        """Tell whether the action is there; its other services are met when they are used first."""
+        return self._send.ready
 
     @property
     def input_types(self) -> dict[str, str]:
@@ -169,6 +175,7 @@ class RclpyLink:
         identifier = UUID(uuid=list(bytes.fromhex(goal_id) + os.urandom(UUID_BYTES - ID_DIGITS // 2)))
         with self._lock:
             self._goals[goal_id] = identifier
+            self._follow(True)
 
         def answered(response: Any, tries: int) -> None:
             # Who is offered a goal twice refuses the second offer; the first may have been taken.
@@ -177,18 +184,19 @@ class RclpyLink:
 
         request = self._action.Impl.SendGoalService.Request(goal_id=identifier, goal=goal)
         self._send.call(request, answered, _nothing, timeout_s=GOAL_S, once=False)
+        _ = self._cancels  # met by the time that it is wanted
 
     def cancel(self, goal_id: str) -> None:
         """Cancel a goal."""
         identifier = self._goals.get(goal_id)
         if identifier is not None:
             request = CancelGoal.Request(goal_info=GoalInfo(goal_id=identifier))
-            self._cancel.call(request, lambda *_: None, _nothing, timeout_s=CALL_S, once=False)
+            self._cancels.call(request, lambda *_: None, _nothing, timeout_s=CALL_S, once=False)
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:
         """Cancel all goals: a goal of zeros at a time of zero (action_msgs/srv/CancelGoal)."""
         counted = lambda response, _: on_count(len(response.goals_canceling))  # noqa: E731
-        self._cancel.call(CancelGoal.Request(), counted, on_error, timeout_s=CALL_S, once=False)
+        self._cancels.call(CancelGoal.Request(), counted, on_error, timeout_s=CALL_S, once=False)
 
     def ask_ending(self, goal_id: str) -> None:
         """Ask for a goal's result; who does not know the goal answers at once."""
@@ -205,12 +213,14 @@ class RclpyLink:
             )
             self._listener.on_ending(goal_id, known)
 
-        self._result.call(self._action.Impl.GetResultService.Request(goal_id=identifier), answered, _nothing, timeout_s=GOAL_S, once=True)
+        self._results.call(self._action.Impl.GetResultService.Request(goal_id=identifier), answered, _nothing, timeout_s=GOAL_S, once=True)
 
     def release(self, goal_id: str) -> None:
         """Follow a goal no more."""
         with self._lock:
             self._goals.pop(goal_id, None)
+            if not self._goals:
+                self._follow(False)
 
     def _on_feedback(self, message: Any) -> None:
         goal_id = execution_id(message.goal_id)

@@ -22,7 +22,7 @@ WINDOW = 50
 """So many requests are under way at a time; the others wait."""
 QUEUE = 10_000
 """So many may wait; one more is refused at once."""
-LOOK_S = 0.1
+LOOK_S = 0.25
 Later = Callable[[float, Job], Timer]
 
 
@@ -45,23 +45,18 @@ class Calls:
     Args:
         client: rclpy's.
         later: has a job done after a delay of wall clock.
-        rouse: has the executor wait for the client: it may rest while nothing is awaited of it.
+        awaits: has the executor wait for the client, or not: it rests while nothing is awaited of it.
     """
 
-    def __init__(self, client: Any, later: Later, rouse: Job) -> None:
+    def __init__(self, client: Any, later: Later, awaits: Callable[[bool], None]) -> None:
         self._client = client
         self._later = later
-        self._rouse = rouse
+        self._await = awaits
         self._lock = threading.Lock()
         self._waiting: deque[_Call] = deque()
         self._open: list[_Call] = []
         self._looking = False
         self._closed = False
-
-    @property
-    def awaits(self) -> bool:
-        """Tell whether an answer is due."""
-        return bool(self._open)
 
     @property
     def ready(self) -> bool:
@@ -110,7 +105,7 @@ class Calls:
         future = self._client.call_async(call.request)
         # With no executor, the callback is called where the answer is taken, not a turn of the executor later.
         future._set_executor = _ignore  # noqa: SLF001 - rclpy 7.1.6 has no other way
-        self._rouse()
+        self._await(True)
         future.add_done_callback(lambda future: self._take(call, future))
 
     def _take(self, call: _Call, future: Any) -> None:
@@ -127,6 +122,8 @@ class Calls:
                 self._open.remove(call)
             elif call in self._waiting:
                 self._waiting.remove(call)
+            if not self._open:
+                self._await(False)
         return first
 
     def _look_later(self) -> None:

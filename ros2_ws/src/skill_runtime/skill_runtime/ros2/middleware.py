@@ -47,13 +47,11 @@ class RestingGroup(MutuallyExclusiveCallbackGroup):  # type: ignore[misc]  # rcl
 
     def __init__(self) -> None:
         super().__init__()
-        self.awake: dict[Any, Callable[[], bool]] = {}
-        """By entity, for those that may rest: whether something is awaited of it."""
+        self.resting: set[Any] = set()
 
     def can_execute(self, entity: Any) -> bool:
         """Tell whether the executor should wait for an entity, and may call back."""
-        awake = self.awake.get(entity)
-        return (awake is None or awake()) and bool(super().can_execute(entity))
+        return entity not in self.resting and bool(super().can_execute(entity))
 
 
 class RclpyMiddleware:
@@ -176,7 +174,7 @@ class RclpyMiddleware:
             self._listen_once_known(self.name(topic.name), take, latched(topic.keep))
         return lambda: True
 
-    def _listen(self, name: str, kind: Any, callback: OnValue, qos: QoSProfile, awake: Callable[[], bool] | None = None) -> Any:
+    def _listen(self, name: str, kind: Any, callback: OnValue, qos: QoSProfile) -> Any:
         """Subscribe; all messages that are there are taken in one turn of the executor."""
         made: list[Any] = []
 
@@ -190,8 +188,6 @@ class RclpyMiddleware:
                 callback(taken[0])
 
         made.append(self.node.create_subscription(kind, name, self.on_loop(hear), qos, callback_group=self._group))
-        if awake is not None:
-            self._group.awake[made[0]] = awake
         return made[0]
 
     def _listen_once_known(self, name: str, callback: OnValue, qos: QoSProfile) -> None:
@@ -211,9 +207,11 @@ class RclpyMiddleware:
 
         self.when(known, listen)
 
-    def resting_subscription(self, relative: str, kind: Any, callback: OnValue, *, awake: Callable[[], bool]) -> Any:
-        """Subscribe to what is of interest only now and then."""
-        return self._listen(self.name(relative), kind, callback, QoSProfile(depth=AT_ONCE), awake)
+    def resting_subscription(self, relative: str, kind: Any, callback: OnValue) -> Callable[[bool], None]:
+        """Subscribe to what is of interest only now and then; the returned function has the executor wait for it, or not."""
+        subscription = self._listen(self.name(relative), kind, callback, QoSProfile(depth=AT_ONCE))
+        self._group.resting.add(subscription)
+        return functools.partial(self._await, subscription)
 
     # --- services ----------------------------------------------------------------------------------------------------
 
@@ -261,16 +259,20 @@ class RclpyMiddleware:
     def calls(self, relative: str, kind: Any) -> Calls:
         """Make a client of a service; the executor waits for it only while an answer is due."""
         client = self.node.create_client(kind, self.name(relative), qos_profile=SERVICE, callback_group=self._group)
-        made = Calls(client, self.later, self._rouse)
-        self._group.awake[client] = lambda: made.awaits
+        self._group.resting.add(client)
+        made = Calls(client, self.later, functools.partial(self._await, client))
         self._calls[relative] = made
         return made
 
-    def _rouse(self) -> None:
-        """Have the executor gather its entities anew: it may be waiting without one that something is awaited of now."""
-        executor = self.node.executor
-        if executor is not None and not self._is_here():
-            executor.wake()
+    def _await(self, entity: Any, awaited: bool) -> None:  # noqa: FBT001 - one of two
+        """Have an entity rest or not; an executor that waits without one that is awaited now has to gather its entities anew."""
+        if not awaited:
+            self._group.resting.add(entity)
+        elif entity in self._group.resting:
+            self._group.resting.discard(entity)
+            executor = self.node.executor
+            if executor is not None and not self._is_here():
+                executor.wake()
 
     # --- actions -----------------------------------------------------------------------------------------------------
 

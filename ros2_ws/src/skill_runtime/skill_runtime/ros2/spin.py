@@ -20,6 +20,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
+from alula_common.shared_memory import sweep_shared_memory
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.hook_processes import RemoteHooks, pipe_address
@@ -33,6 +34,7 @@ LISTEN_FIRST_S = 0.5
 """How long (wall clock) managers that begin listen for others."""
 PROCESSES_S = 0.5
 REFUSED = 2
+SWEPT_AFTER_S = 5.0
 END_LIMIT_S = 30.0
 """Wall clock; hooks may take some seconds to stop their functions."""
 ROS_ARGUMENTS = "--ros-args"
@@ -73,6 +75,8 @@ def run_skillset(
         if code:
             sys.exit(code)
         return
+    # Processes that were killed have left theirs.
+    sweep_shared_memory(older_than_s=SWEPT_AFTER_S)
     # Our own handlers: rclpy's would shut the context down before the callers were told.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     refusals: list[str] = []
@@ -166,7 +170,7 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
     A callback that raises (most are of hooks) fails what runs, for nobody knows whose function is without its watch now;
     the managers live on.
     """
-    # rclpy 7.1.6's EventsExecutor should be lighter, but idles at 60 % of a core with action servers and loses timers.
+    # rclpy 7.1.6's EventsExecutor should be lighter, but knows no guard conditions and idles at 60 % of a core with action servers.
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     over = threading.Event()

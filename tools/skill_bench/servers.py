@@ -16,10 +16,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
+from skill_bench.cases import Case, make_skillset
+from skill_bench.processes import follow
 from skill_model.model import Skillset
 from skill_model.ros_types import camel
-from skill_runtime.bench.cases import Case, make_skillset
-from skill_runtime.bench.processes import follow
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.ros2 import SkillsetNode
 from skill_runtime.ros2.names import EVENTS

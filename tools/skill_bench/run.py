@@ -8,11 +8,11 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 from alula_common.network import claim_domain
-from skill_runtime.bench.cases import Case
-from skill_runtime.bench.clients import follow_bare, follow_skills
-from skill_runtime.bench.figures import Load, Measured, Samples, idle_percent, join, times_of
-from skill_runtime.bench.processes import Child, usage
-from skill_runtime.bench.servers import serve_bare, serve_managers
+from skill_bench.cases import Case
+from skill_bench.clients import follow_bare, follow_skills
+from skill_bench.figures import Load, Measured, Samples, idle_percent, join, times_of
+from skill_bench.processes import Child, usage
+from skill_bench.servers import serve_bare, serve_managers
 
 Say = Callable[[str], None]
 

@@ -12,10 +12,10 @@ from rclpy.action import ActionClient
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
+from skill_bench.cases import FREE, INPUT, LOST, Case, make_skillset, resource_name, skill_name
+from skill_bench.processes import follow
+from skill_bench.servers import ACTION, BARE_ACTION, BARE_TOPIC, make_interfaces
 from skill_model.execution_state import ExecutionState
-from skill_runtime.bench.cases import FREE, INPUT, LOST, Case, make_skillset, resource_name, skill_name
-from skill_runtime.bench.processes import follow
-from skill_runtime.bench.servers import ACTION, BARE_ACTION, BARE_TOPIC, make_interfaces
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.ros2 import SkillHandle, SkillsetClient
 from skill_runtime.ros2.names import EVENTS

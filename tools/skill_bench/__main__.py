@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 
-from skill_runtime.bench.cases import CASES
-from skill_runtime.bench.figures import as_json, table, verdicts
-from skill_runtime.bench.processes import BenchError
+from skill_bench.cases import CASES
+from skill_bench.figures import as_json, table, verdicts
+from skill_bench.processes import BenchError
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
@@ -34,7 +34,7 @@ def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def run(options: argparse.Namespace) -> str:
     """Measure, write the file, and return the table."""
-    from skill_runtime.bench.run import FULL, QUICK, open_bench
+    from skill_bench.run import FULL, QUICK, open_bench
 
     effort = QUICK if options.quick else FULL
     begin_s = time.monotonic()
