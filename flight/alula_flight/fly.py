@@ -29,7 +29,7 @@ from alula_common.signals import Interrupts
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
-from alula_flight.spec import SCENARIOS, RequestError, RunSpec, read_faults, read_world
+from alula_flight.spec import SCENARIOS, RequestError, RunSpec, read_faults, read_imperfections, read_world
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.world.config import world_names
 
@@ -52,6 +52,8 @@ class Arguments(argparse.Namespace):
     rate: float | None
     world: str
     autopilot: str | None
+    sensors: str | None
+    imperfections: str
     mock: bool
     behaviour: list[Path]
 
@@ -68,6 +70,15 @@ def parse(arguments: list[str]) -> RunSpec:
     parser.add_argument("--seed", type=int, default=0, help="seed of world details, wind and noise (default 0)")
     parser.add_argument("--rate", type=float, help="simulated seconds per second at most, 0: no limit (default 1)")
     parser.add_argument("--autopilot", metavar="URL", help="fly a real autopilot (pymavlink connection) instead of the simulator")
+    parser.add_argument(
+        "--sensors", choices=["simulated"], help="with --autopilot: ArduPilot flies the simulator's body (its JSON interface)"
+    )
+    parser.add_argument(
+        "--imperfections",
+        default="off",
+        metavar="off|realistic|NAME=VALUE,...",
+        help="of the simulated autopilot and sensors (default off)",
+    )
     parser.add_argument("--mock", action="store_true", help="fly over mocks in virtual time: no simulator, no ROS graph, seconds")
     parser.add_argument(
         "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what the mocks do, on top of the drone's own"
@@ -79,8 +90,7 @@ def parse(arguments: list[str]) -> RunSpec:
         raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")
     if given.rate is not None and not 0 <= given.rate <= 1000:  # also refuses nan
         raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to 1000")
-    if given.autopilot is not None and given.fail:
-        raise RequestError("--fail breaks simulated sensors; with --autopilot there are none")
+    check_autopilot(given)
     check_mock(given)
     return RunSpec(
         scenario=given.scenario,
@@ -91,12 +101,26 @@ def parse(arguments: list[str]) -> RunSpec:
         faults=read_faults(given.fail, None if given.mock else FAULTS),
         world=read_world(given.world),
         autopilot=given.autopilot,
+        sensors=given.sensors or "",
+        imperfections=read_imperfections(given.imperfections),
         master_port=0 if given.mock else free_port(),
         mavlink_port=0 if given.mock else free_port(),
         domain=0,
         mock=given.mock,
         behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
     )
+
+
+def check_autopilot(given: Arguments) -> None:
+    """Refuse what does not go together with another autopilot, or without one."""
+    if given.sensors is not None and given.autopilot is None:
+        raise RequestError("--sensors says what a real autopilot has for sensors; add --autopilot URL")
+    if given.autopilot is None or given.sensors is not None:
+        return
+    if given.fail:
+        raise RequestError("--fail breaks simulated sensors; with --autopilot there are none, unless --sensors simulated is added")
+    if given.imperfections != "off":
+        raise RequestError("--imperfections are those of simulated sensors; with --autopilot there are none")
 
 
 def check_mock(given: Arguments) -> None:

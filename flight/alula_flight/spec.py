@@ -10,6 +10,7 @@ from pathlib import Path
 from alula_common.faults import FaultError, parse_fault
 from alula_common.files import write_json
 from uav_simulator.errors import ConfigError
+from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.world.config import find_world, load_world
 
 SCENARIOS = {"mapping": "map the yard; watch ahead with the ZED, or with the LiDAR when the ZED has failed (paper, section 2.2)"}
@@ -27,6 +28,15 @@ def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]] | None)
         raise RequestError(f"--fail: {error}") from None
 
 
+def read_imperfections(text: str) -> str:
+    """Check what is imperfect, and return it."""
+    try:
+        parse_imperfections(text)
+    except ConfigError as error:
+        raise RequestError(f"--imperfections: {error}") from None
+    return text
+
+
 def read_world(text: str) -> str:
     """Check a world, given by name or file, and return its file."""
     try:
@@ -42,7 +52,8 @@ class RunSpec:
     """One run.
 
     ``world`` is a world file; ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at
-    most, 0 unlimited.
+    most, 0 unlimited. ``sensors``: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors, "" where
+    real drivers run elsewhere. ``imperfections`` of the simulated autopilot and sensors.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
     """
 
@@ -57,8 +68,15 @@ class RunSpec:
     master_port: int
     mavlink_port: int
     domain: int
+    sensors: str = ""
+    imperfections: str = "off"
     mock: bool = False
     behaviour: tuple[str, ...] = ()
+
+    @property
+    def simulated(self) -> bool:
+        """Tell whether the simulator takes part, with its clock, its truth and its sensors."""
+        return self.autopilot is None or self.sensors == "simulated"
 
     def save(self, path: Path) -> None:
         """Write the specification beside the results."""
@@ -81,6 +99,8 @@ class RunSpec:
             f"world:={self.world}",
             f"mavlink_port:={self.mavlink_port}",
         ]
+        if self.imperfections != "off":
+            arguments.append(f"imperfections:={self.imperfections}")
         if self.autopilot is not None:
-            arguments += ["simulate:=false", f"autopilot:={self.autopilot}"]
+            arguments += ["vehicle:=ardupilot" if self.sensors else "simulate:=false", f"autopilot:={self.autopilot}"]
         return arguments

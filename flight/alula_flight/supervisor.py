@@ -103,7 +103,7 @@ class Supervisor:
 
     def __init__(self, spec: RunSpec) -> None:
         self._spec = spec
-        self._clock = MissionClock(simulated=spec.autopilot is None)
+        self._clock = MissionClock(simulated=spec.simulated)
         self._record = DeathRecord(Path(spec.out_dir) / "deaths.jsonl")
         self._watch = Watch(self._record, self._clock)
         self._asked_to_end = threading.Event()

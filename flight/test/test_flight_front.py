@@ -33,7 +33,10 @@ from uav_simulator.world.config import find_world
         (["mapping", "--seed", "-3"], ["--seed -3"]),
         (["mapping", "--rate", "nan"], ["--rate nan"]),
         (["mapping", "--rate", "-1"], ["--rate -1"]),
-        (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--fail", "zed@3"], ["--autopilot"]),
+        (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--fail", "zed@3"], ["--autopilot", "--sensors simulated"]),
+        (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--imperfections", "realistic"], ["--imperfections"]),
+        (["mapping", "--sensors", "simulated"], ["--sensors", "add --autopilot"]),
+        (["mapping", "--imperfections", "some"], ["--imperfections", "'some'", "realistic"]),
     ],
 )
 def test_wrong_request_is_one_line_and_exit_code_2(arguments, names, capsys):
@@ -94,6 +97,17 @@ def test_a_world_file_that_is_wrong_is_refused_with_its_line(tmp_path, capsys):
 def test_real_autopilot_takes_the_place_of_the_simulator(tmp_path):
     spec = parse(["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--out", str(tmp_path / "run")])
     assert {"simulate:=false", "autopilot:=udpin:127.0.0.1:14550"} <= set(spec.launch_arguments())
+
+
+def test_ardupilot_flies_the_simulators_body(tmp_path):
+    words = ["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "simulated", "--fail", "zed@30", "--out", str(tmp_path / "run")]
+    spec = parse(words)
+    assert {"vehicle:=ardupilot", "autopilot:=tcp:127.0.0.1:5760", "faults:=zed@30"} <= set(spec.launch_arguments())
+    assert "simulate:=false" not in spec.launch_arguments()
+    assert spec.simulated
+    assert not parse(["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--out", str(tmp_path / "run")]).simulated
+    imperfect = parse(["mapping", "--imperfections", "realistic,exposure=0", "--out", str(tmp_path / "run")])
+    assert "imperfections:=realistic,exposure=0" in imperfect.launch_arguments()
 
 
 def test_mocks_need_no_ports_and_know_their_own_faults(tmp_path):

@@ -5,6 +5,7 @@ setup(
     **generate_distutils_setup(
         packages=[
             "uav_simulator",
+            "uav_simulator.ardupilot",
             "uav_simulator.autopilot",
             "uav_simulator.sensors",
             "uav_simulator.vehicle",

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from alula_common.faults import parse_faults
 from uav_simulator.autopilot.types import LandedState
+from uav_simulator.flown import SimulatedAutopilotVehicle
 from uav_simulator.simulation import Simulation
 from uav_simulator.world.config import find_world, load_world
 
@@ -25,7 +26,7 @@ class Client:
 
     def command(self, command, *params):
         values = [*params, *([0.0] * (7 - len(params)))]
-        self.simulation.endpoint.feed(mavlink.MAVLink_command_long_message(1, 1, command, 0, *values).pack(self._mavlink))
+        self.simulation.flown.endpoint.feed(mavlink.MAVLink_command_long_message(1, 1, command, 0, *values).pack(self._mavlink))
 
     def run_until(self, condition, timeout_s=20.0):
         start = self.simulation.now_s
@@ -37,27 +38,27 @@ class Client:
         self.command(176, 1, 4)
         self.command(400, 1)
         self.command(22, 0, 0, 0, 0, 0, 0, 3.0)
-        self.run_until(lambda: self.simulation.autopilot.landed_state is LandedState.IN_AIR)
+        self.run_until(lambda: self.simulation.flown.autopilot.landed_state is LandedState.IN_AIR)
 
     def fly_leg(self, a, b):
         yaw_ned = math.atan2(b[0] - a[0], b[1] - a[1])
         for way in np.arange(0.0, math.dist(a, b) + 1e-6, 0.1 * SPEED_M_S):
             x, y, z = np.array(a) + (np.array(b) - np.array(a)) * way / math.dist(a, b)
             message = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x09F8, y, x, -z, 0, 0, 0, 0, 0, 0, yaw_ned, 0)
-            self.simulation.endpoint.feed(message.pack(self._mavlink))
+            self.simulation.flown.endpoint.feed(message.pack(self._mavlink))
             for _ in range(5):
                 self.simulation.tick()
-        self.run_until(lambda: math.dist(self.simulation.vehicle.body.position, b) < 0.3)
+        self.run_until(lambda: math.dist(self.simulation.flown.body.position, b) < 0.3)
 
 
 def fly_route(seed):
-    simulation = Simulation(CONFIG, seed=seed, faults=parse_faults("zed@30-35"), boot_before_s=60.0)
+    simulation = Simulation(CONFIG, SimulatedAutopilotVehicle(seed=seed), seed=seed, faults=parse_faults("zed@30-35"))
     client = Client(simulation)
     client.take_off()
     for a, b in pairwise(CONFIG.route):
         client.fly_leg(a, b)
     client.command(21)
-    client.run_until(lambda: not simulation.autopilot.armed)
+    client.run_until(lambda: not simulation.flown.autopilot.armed)
     return simulation
 
 
@@ -72,22 +73,22 @@ def test_the_route_is_flown_without_a_contact_and_with_clearance():
 
 
 def test_flying_into_a_wall_is_a_contact_and_does_not_go_through():
-    simulation = Simulation(CONFIG, seed=0, faults=[], boot_before_s=60.0)
+    simulation = Simulation(CONFIG, SimulatedAutopilotVehicle(seed=0), seed=0, faults=[])
     client = Client(simulation)
     client.take_off()
     client.fly_leg((0.0, 0.0, 3.0), (4.0, 0.0, 3.0))
     message = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DF8, -8, 4, -3, 0, 0, 0, 0, 0, 0, 0, 0)
-    simulation.endpoint.feed(message.pack(mavlink.MAVLink(None, srcSystem=1, srcComponent=191)))
+    simulation.flown.endpoint.feed(message.pack(mavlink.MAVLink(None, srcSystem=1, srcComponent=191)))
     for _ in range(400):
         simulation.tick()
     assert simulation.state.collisions >= 1
     assert simulation.state.min_clearance_m < 0.0
-    assert simulation.vehicle.body.position[1] > -4.3
+    assert simulation.flown.body.position[1] > -4.3
 
 
 def test_the_same_seed_and_commands_give_the_same_flight_and_measurements():
     def run():
-        simulation = Simulation(CONFIG, seed=3, faults=[], boot_before_s=60.0)
+        simulation = Simulation(CONFIG, SimulatedAutopilotVehicle(seed=3), seed=3, faults=[])
         client = Client(simulation)
         client.take_off()
         client.fly_leg((0.0, 0.0, 3.0), (2.0, 0.0, 3.0))

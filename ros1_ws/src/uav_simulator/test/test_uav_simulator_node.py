@@ -1,6 +1,7 @@
 """The node on a live ROS graph, with a real MAVLink client over TCP."""
 
 import json
+import math
 import socket
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from sensor_msgs.msg import CameraInfo, Image, Imu, PointCloud2
 from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from uav_msgs.srv import SetSensor
+from uav_simulator_ardupilot import InThread, Peer
 
 from alula_testing.ros1 import wait_until
 
@@ -228,6 +230,34 @@ def test_time_waits_for_who_works_for_it_and_lets_go_of_the_dead(start_simulator
     work.unregister()
     # Before the second word and once the patience is over, time runs flat out.
     assert set(clock_steps_ns(seen, from_s=words[2], to_s=held_at)) == {20_000_000}, "paced, no tick is lost"
+
+
+def test_ardupilot_flies_the_body_and_makes_the_clock(start_node, collect):
+    if rospy.has_param("/uav_simulator/ardupilot_port"):
+        rospy.delete_param("/uav_simulator/ardupilot_port")
+    node = start_node([sys.executable, str(NODE), "__name:=uav_simulator", "_vehicle:=ardupilot", "_ardupilot_port:=0", "_rate:=0"])
+    try:
+        port = lambda: int(rospy.get_param("/uav_simulator/ardupilot_port", 0))  # noqa: E731
+        wait_until(lambda: port() > 0, timeout_s=30.0, what="the body waits for ArduPilot")
+        seen = collect(clock=("/clock", Clock), pose=("/sim/true_pose", PoseStamped), state=("/sim/state", String))
+        peer = Peer(port())
+        flight = InThread(lambda: peer.fly(3.0, math.pi / 2, 4.0))
+        wait_until(lambda: not flight.running, timeout_s=60.0, what="the flight is over")
+        flight.join()
+        wait_until(
+            lambda: seen.count("clock") and seen.count("state") and seen.messages["clock"][-1].clock.to_sec() >= 3.9,
+            timeout_s=5.0,
+            what="its clock",
+        )
+        stopped_s = seen.messages["clock"][-1].clock.to_sec()
+        assert stopped_s == pytest.approx(peer.state["timestamp"], abs=0.021)
+        assert seen.messages["pose"][-1].pose.position.z == pytest.approx(-peer.state["position"][2], abs=0.1)
+        assert json.loads(seen.messages["state"][-1].data)["lift_off_s"] > 0.0
+        assert {step % 20_000_000 for step in clock_steps_ns(seen)} == {0}
+    finally:
+        node.terminate()
+        node.wait(10.0)
+        rospy.delete_param("/uav_simulator")
 
 
 @pytest.mark.usefixtures("ros_master")

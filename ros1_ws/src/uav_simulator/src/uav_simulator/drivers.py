@@ -126,7 +126,7 @@ class ImuDriver:
             return None
         simulation = self._simulation
         if self._last is None or mode not in HELD:
-            body = simulation.vehicle.body
+            body = simulation.flown.body
             self._last = simulation.imu.measure(body.rates, body.specific_force)
         message = ros_messages.imu(degradation.inertial(mode, self._last, self._rng), simulation.now_ns + stamp_shift_ns)
         return Measurement(simulation.now_ns, lambda: self._imu.publish(message))

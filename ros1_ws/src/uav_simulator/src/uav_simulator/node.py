@@ -19,13 +19,11 @@ from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
 from alula_common.faults import FaultError, parse_faults
 from uav_simulator import ros_messages
-from uav_simulator.autopilot.link_server import LinkServer
-from uav_simulator.autopilot.params import parse_parameters
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError
 from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.pacing import Pacer, header_stamp_s
-from uav_simulator.pilot_hooks import apply_pilot_word
+from uav_simulator.pilots import make_pilot
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.settings import Settings, settings_from_params
 from uav_simulator.simulation import TICK_S, Simulation
@@ -44,19 +42,16 @@ class SimulatorNode:
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         config = load_world(find_world(settings.world))
-        faults = parse_faults(settings.faults, FAULTS)
-        self._simulation = simulation = Simulation(
+        self._pilot = make_pilot(settings, config.home)
+        self._simulation = Simulation(
             config,
+            self._pilot.flown,
             seed=settings.seed,
-            faults=faults,
-            boot_before_s=settings.boot_before_s,
-            params=parse_parameters(settings.autopilot_params),
-            ground_link=settings.gcs_port >= 0,
+            faults=parse_faults(settings.faults, FAULTS),
             imperfections=parse_imperfections(settings.imperfections),
         )
         if settings.world_path:
             write_mesh(Path(settings.world_path), self._simulation.world.vertices, self._simulation.world.triangles)
-        self._link = LinkServer(simulation.endpoint, simulation.ground_endpoint, port=settings.mavlink_port, gcs_port=settings.gcs_port)
         self._pacer = Pacer(settings.pace_topics, limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
         self._pilot_words: queue.SimpleQueue[str] = queue.SimpleQueue()
         # Holds more ticks than a pace limit lets through at once, so a paced run loses none; flat out, the oldest may be dropped.
@@ -69,9 +64,8 @@ class SimulatorNode:
         self._last_state = self._simulation.state
         self._left_out: list[str] = []
         self._stopping = threading.Event()
-        rospy.set_param("~mavlink_port", self._link.port)
-        if settings.gcs_port >= 0:
-            rospy.set_param("~gcs_port", self._link.gcs_port)
+        for name, port in self._pilot.ports.items():
+            rospy.set_param(f"~{name}", port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
         rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
         for topic in (word.partition("=")[0] for word in settings.pace_topics):
@@ -91,12 +85,13 @@ class SimulatorNode:
         due = time.monotonic()
         while not self._ended:
             self._obey_pilot()
-            self._simulation.tick()
+            if not self._simulation.tick():
+                continue  # who flies it has not come so far yet
             self._publish()
             if self._settings.rate > 0.0:
                 due = max(due + TICK_S / self._settings.rate, time.monotonic() - CATCH_UP_S)
             self._wait(due)
-        self._link.close()
+        self._pilot.close()
 
     def _wait(self, due: float) -> None:
         """Serve the link until wall time and everybody's work have come far enough."""
@@ -104,7 +99,7 @@ class SimulatorNode:
             now = time.monotonic()
             held = not self._pacer.may_advance(self._simulation.now_s, now)
             rest = max(due - now, WAIT_S if held else 0.0)
-            self._link.serve(rest)
+            self._pilot.serve(rest)
             if not held and rest <= 0.0:
                 break
         self._tell_left_out()
@@ -112,7 +107,7 @@ class SimulatorNode:
     def _publish(self) -> None:
         """Publish the tick's clock, truth and measurements."""
         simulation = self._simulation
-        self._link.serve()  # an answer to the new state may leave before the images are made
+        self._pilot.serve()  # an answer to the new state may leave before the images are made
         self._clock.publish(Clock(clock=ros_messages.ros_time(simulation.now_ns)))
         if simulation.now_ns >= self._pose_due_ns:
             self._pose_due_ns += POSE_PERIOD_NS
@@ -132,7 +127,7 @@ class SimulatorNode:
     def _obey_pilot(self) -> None:
         while not self._pilot_words.empty():
             try:
-                apply_pilot_word(self._pilot_words.get(), self._simulation.autopilot, self._simulation.endpoint)
+                self._pilot.obey(self._pilot_words.get())
             except ConfigError as error:
                 rospy.logwarn(str(error))
 

@@ -7,6 +7,8 @@ from typing import Any
 
 from uav_simulator.errors import ConfigError
 
+VEHICLES = ("simulated", "ardupilot")
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -16,6 +18,8 @@ class Settings:
     world: str = "yard"  # name of a world that comes with the simulator, or a world file
     world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
     faults: str = ""  # between commas; how each is written: alula_common.faults, what there is: sensors.faults
+    vehicle: str = "simulated"  # who flies the body: simulated (the simulator's own autopilot) or ardupilot (its JSON interface)
+    ardupilot_port: int = 9002  # UDP on loopback, where ArduPilot's motor outputs come
     imperfections: str = "off"  # off, realistic, or NAME=VALUE,... as in imperfections.py
     mavlink_port: int = 5760  # TCP on loopback, for the companion; 0: any free one, which the parameter then tells
     gcs_port: int = -1  # UDP on loopback, for a ground station; 0: any free one, which the parameter then tells; -1: one is made up
@@ -38,6 +42,8 @@ def settings_from_params(params: dict[str, Any]) -> Settings:
     for name in ("seed", "rate", "pace_limit_s", "pace_patience_s", "boot_before_s"):
         if getattr(settings, name) < 0:
             raise ConfigError(f"parameter ~{name}: {getattr(settings, name)} must not be negative")
+    if settings.vehicle not in VEHICLES:
+        raise ConfigError(f"parameter ~vehicle: {settings.vehicle!r} is none of {', '.join(VEHICLES)}")
     return settings
 
 

@@ -1,4 +1,4 @@
-"""The whole simulation without ROS: a world, a vehicle with its autopilot in it, and the sensors that see it, on a clock of its own.
+"""The whole simulation without ROS: a world, a vehicle that somebody flies in it, and the sensors that see it, on a clock of its own.
 
 One tick is 20 ms. Everything that varies is drawn from generators of the seed, each for one purpose, so the same seed and the
 same commands give the same flight, images and clouds.
@@ -7,24 +7,20 @@ same commands give the same flight, images and clouds.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alula_common.faults import FaultRequest
-from uav_simulator.autopilot.core import Autopilot
-from uav_simulator.autopilot.endpoint import Endpoint
 from uav_simulator.autopilot.estimator import PERFECT
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor
+from uav_simulator.flown import Flown
 from uav_simulator.imperfections import Imperfections
 from uav_simulator.sensors.faults import SensorBoard
 from uav_simulator.sensors.imu import Imu
 from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.pose_track import Pose, PoseTrack
 from uav_simulator.sensors.stereo import StereoPair
-from uav_simulator.vehicle.airframe import Airframe
-from uav_simulator.vehicle.hexacopter import Hexacopter
-from uav_simulator.vehicle.noise import Wind
 from uav_simulator.world.config import WorldConfig
 from uav_simulator.world.parts import build_parts
 from uav_simulator.world.scene import World
@@ -52,34 +48,23 @@ class Simulation:
     def __init__(
         self,
         config: WorldConfig,
+        flown: Flown,
         *,
         seed: int,
         faults: Sequence[FaultRequest] = (),
-        boot_before_s: float = 60.0,
-        params: Mapping[str, float] | None = None,
-        ground_link: bool = False,
         imperfections: Imperfections = PERFECT,
     ) -> None:
-        """``params`` of the autopilot; ``ground_link``: a ground station speaks over a link of its own, so none is made up."""
-        airframe = Airframe()
         self.seed = seed
         self.now_ns = 0
+        self.flown = flown
         self.world = World(build_parts(config, seed))
-        self.vehicle = Hexacopter(airframe, Wind(seed=seed), config.home, yaw_rad=0.0)
-        self.autopilot = Autopilot(
-            self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections
-        )
-        self.endpoint = Endpoint(self.autopilot, gcs_present=not ground_link)
-        self.ground_endpoint = Endpoint(self.autopilot, gcs_present=False) if ground_link else None
-        if self.ground_endpoint is not None:
-            self.endpoint.connect(self.ground_endpoint)
         self.imperfections = imperfections
         self.stereo = StereoPair(self.world, seed, noise=imperfections.pixel_noise, exposure=imperfections.exposure)
         self.lidar = Lidar(self.world, seed, noise_m=imperfections.range_noise_m)
         self.imu = Imu(seed, gyro_bias_rad_s=imperfections.gyro_bias_rad_s, accel_bias_m_s2=imperfections.accel_bias_m_s2)
         self.sensors = SensorBoard(faults)
         self.track = PoseTrack()
-        self._contacts = ContactMonitor(self.world, airframe.radius_m)
+        self._contacts = ContactMonitor(self.world, flown.body.airframe.radius_m)
         self.lift_off_s: float | None = None
         self._distance_m = 0.0
         self.track.add(self.pose)
@@ -92,19 +77,16 @@ class Simulation:
     @property
     def pose(self) -> Pose:
         """Return the true pose of this moment."""
-        return Pose(self.now_s, self.vehicle.body.position, self.vehicle.body.attitude)
+        return Pose(self.now_s, self.flown.body.position, self.flown.body.attitude)
 
-    def tick(self) -> None:
-        """Advance by 20 ms: the vehicle moves, the autopilot decides, contacts and faults are looked after."""
-        body = self.vehicle.body
+    def tick(self) -> bool:
+        """Advance by 20 ms: the vehicle moves, contacts and faults are looked after. False: who flies it has not come so far yet."""
+        body = self.flown.body
         before = body.position
-        self.vehicle.advance(TICK_S)
+        if not self.flown.tick((self.now_ns + TICK_NS) * 1e-9, TICK_S):
+            return False
         self.now_ns += TICK_NS
-        self.autopilot.step(self.now_s, TICK_S)
-        self.endpoint.step()
-        if self.ground_endpoint is not None:
-            self.ground_endpoint.step()
-        landed_state = self.autopilot.landed_state
+        landed_state = self.flown.landed_state
         if self.lift_off_s is None and landed_state is not LandedState.ON_GROUND:
             self.lift_off_s = self.now_s
         if landed_state is not LandedState.ON_GROUND:
@@ -112,6 +94,7 @@ class Simulation:
         self._contacts.step(body, landed_state)
         self.sensors.apply_due(self.now_s, self.lift_off_s)
         self.track.add(self.pose)
+        return True
 
     @property
     def state(self) -> State:

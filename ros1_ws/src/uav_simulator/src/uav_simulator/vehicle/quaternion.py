@@ -40,3 +40,14 @@ def tilted(up: Vec3, yaw_rad: float) -> Quat:
     # Shortest turn from vertical to `up`, after the yaw: q = q_tilt q_yaw.
     w = math.sqrt(max(1e-9, (1.0 + up[2]) / 2.0))
     return multiply((w, -up[1] / (2.0 * w), up[0] / (2.0 * w), 0.0), from_yaw(yaw_rad))
+
+
+def rotation_vector(before: Quat, after: Quat) -> Vec3:
+    """Return the rotation from one attitude to another in the first one's body axes, radians; for small rotations."""
+    w, x, y, z = before
+    dw, dx, dy, dz = multiply((w, -x, -y, -z), after)
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if length < 1e-12:
+        return 0.0, 0.0, 0.0
+    scale = 2.0 * math.atan2(length, abs(dw)) / length * (1.0 if dw >= 0.0 else -1.0)
+    return dx * scale, dy * scale, dz * scale

@@ -17,8 +17,10 @@ ZERO: Vec3 = (0.0, 0.0, 0.0)
 class RigidBody:
     """A hexacopter in the air or on the ground."""
 
-    def __init__(self, airframe: Airframe, position: Vec3 = ZERO, yaw_rad: float = 0.0) -> None:
+    def __init__(self, airframe: Airframe, position: Vec3 = ZERO, yaw_rad: float = 0.0, *, ground_decel_m_s2: float = math.inf) -> None:
+        """``ground_decel_m_s2``: how hard the ground stops a body that comes down."""
         self.airframe = airframe
+        self._ground_decel_m_s2 = ground_decel_m_s2
         self.position: Vec3 = position
         self.velocity: Vec3 = ZERO
         self.attitude: Quat = from_yaw(yaw_rad)
@@ -43,8 +45,10 @@ class RigidBody:
         px, py, pz = self.position
         px, py, pz = px + vx * dt_s, py + vy * dt_s, pz + vz * dt_s
         if pz <= 0.0 and vz <= 0.0:
-            self._rest(px, py)
-            return
+            if vz + self._ground_decel_m_s2 * dt_s >= 0.0:
+                self._rest(*(self.position[:2] if self.on_ground else (px, py)))
+                return
+            vz += (self._ground_decel_m_s2 + GRAVITY_M_S2) * dt_s
         self.on_ground = False
         self.position, self.velocity = (px, py, pz), (vx, vy, vz)
         self._turn(dt_s, torque)

@@ -1,0 +1,156 @@
+"""The body that ArduPilot flies: a step for each packet, an answer for each step, and nothing without a packet.
+
+ArduPilot waits for the answer before it goes on, and the simulator's clock is the body's time: so both keep pace, whatever the machine
+does. Accelerometers and gyros are the body's motion over the step, so that they agree with it also where it touches the ground.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import select
+import socket
+import time
+
+from uav_simulator.ardupilot.motors import HexaX, thrusts_n
+from uav_simulator.ardupilot.protocol import BodyState, MotorPacket, answer, parse_packet
+from uav_simulator.autopilot.types import LandedState
+from uav_simulator.contacts import CRUISE_HEIGHT_M
+from uav_simulator.errors import SimulatorError
+from uav_simulator.frames import Vec3, frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
+from uav_simulator.vehicle.airframe import GRAVITY_M_S2
+from uav_simulator.vehicle.hexacopter import STEP_S
+from uav_simulator.vehicle.noise import Wind
+from uav_simulator.vehicle.quaternion import rotate, rotation_vector
+from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
+
+PORT = 9002  # where ArduPilot's simulator looks for the body
+BUFFER = 4096
+WAIT_S = 0.1  # wall clock that one call of `tick` waits for a packet
+GROUND_DECEL_M_S2 = 60.0  # a softer landing than the accelerometers' range of 16 g
+LEAST_STEPS, MOST_STEPS = 1, 40  # a tick; 50 to 2000 Hz
+AIRBORNE_M = 0.1
+SILENCE_S = 10.0  # wall clock; then, and so often, it is told
+
+log = logging.getLogger(__name__)
+
+
+class ArduPilotVehicle:
+    """Serves one ArduPilot; one that is started anew finds the body where it is, and its own time at zero."""
+
+    def __init__(self, *, seed: int, home: Vec3 = ZERO, port: int = PORT, address: str = "127.0.0.1") -> None:
+        """Listen on UDP; raises SimulatorError when the port is taken."""
+        self._airframe = HexaX()
+        self.body = RigidBody(self._airframe, home, 0.0, ground_decel_m_s2=GROUND_DECEL_M_S2)
+        self._wind = Wind(seed=seed)
+        self._wind_m_s = ZERO
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((address, port))
+        except OSError as error:
+            self._socket.close()
+            raise SimulatorError(f"UDP port {port} on {address} for ArduPilot can't be used: {error.strerror}") from error
+        self._socket.setblocking(False)
+        self.port: int = self._socket.getsockname()[1]
+        self._tell_wall_s = time.monotonic() + SILENCE_S
+        self._peer: tuple[str, int] | None = None
+        self._served: tuple[str, int] | None = None  # whose frame was the last one
+        self._frame = 0
+        self._answer = b""
+        self._time_s = self._session_s = 0.0
+        self._steps = self._steps_done = 0
+        self._high = False
+
+    @property
+    def landed_state(self) -> LandedState:
+        """What the body's height and the flight so far say; nobody knows what ArduPilot has in mind."""
+        height = self.body.position[2]
+        if self.body.on_ground or (height < AIRBORNE_M and not self._high):
+            return LandedState.ON_GROUND
+        if height >= CRUISE_HEIGHT_M:
+            return LandedState.IN_AIR
+        return LandedState.LANDING if self._high else LandedState.TAKING_OFF
+
+    def tick(self, now_s: float, dt_s: float) -> bool:
+        """Take packets until the tick is complete; False when none has come for a while."""
+        until_s = time.monotonic() + WAIT_S
+        while True:
+            packet = self._receive(until_s)
+            if packet is None:
+                self._tell_silence()
+                return False
+            if self._take(packet, dt_s) and self._steps_done == self._steps:
+                self._steps_done = 0
+                self._time_s = now_s
+                self._note_height()
+                return True
+
+    def close(self) -> None:
+        """Free the port."""
+        self._socket.close()
+
+    def _receive(self, until_s: float) -> MotorPacket | None:
+        """Return the next packet; None when there is none in time."""
+        while (rest_s := until_s - time.monotonic()) > 0.0:
+            readable, _, _ = select.select([self._socket], [], [], rest_s)
+            if not readable:
+                continue
+            # A peer that has gone makes a call fail (ICMP port unreachable); the next one is waited for.
+            with contextlib.suppress(BlockingIOError, ConnectionError):
+                data, self._peer = self._socket.recvfrom(BUFFER)
+                packet = parse_packet(data)
+                if packet is not None:
+                    self._tell_wall_s = time.monotonic() + SILENCE_S
+                    return packet
+        return None
+
+    def _tell_silence(self) -> None:
+        if time.monotonic() >= self._tell_wall_s:
+            self._tell_wall_s += SILENCE_S
+            log.warning("no motor outputs on UDP port %d for %g s: is ArduPilot running with --model JSON:127.0.0.1?", self.port, SILENCE_S)
+
+    def _take(self, packet: MotorPacket, dt_s: float) -> bool:
+        """Make the packet's step and answer; one that comes twice gets its answer again. Return whether there was a step."""
+        anew = self._peer != self._served or packet.frame < self._frame
+        fresh = anew or packet.frame != self._frame
+        if fresh:
+            if anew:
+                self._session_s = self._time_s + self._steps_done * (dt_s / max(self._steps, 1))
+            self._served, self._frame = self._peer, packet.frame
+            if self._steps_done == 0:
+                self._steps = min(max(round(dt_s * packet.rate_hz), LEAST_STEPS), MOST_STEPS)
+                self._wind_m_s = self._wind.step(dt_s)
+            self._step(packet, dt_s / self._steps)
+        if self._peer is not None:
+            with contextlib.suppress(BlockingIOError, ConnectionError):
+                self._socket.sendto(self._answer, self._peer)
+        return fresh
+
+    def _step(self, packet: MotorPacket, dt_s: float) -> None:
+        body = self.body
+        velocity, attitude = body.velocity, body.attitude
+        commands = thrusts_n(packet.pwm_us, self._airframe.rotor_max_n)
+        parts = max(1, round(dt_s / STEP_S))
+        for _ in range(parts):
+            body.step(dt_s / parts, commands, self._wind_m_s)
+        self._steps_done += 1
+        forces = [(after - before) / dt_s for after, before in zip(body.velocity, velocity, strict=True)]
+        w, x, y, z = body.attitude
+        felt = rotate((w, -x, -y, -z), (forces[0], forces[1], forces[2] + GRAVITY_M_S2))
+        turn = rotation_vector(attitude, body.attitude)
+        self._answer = answer(
+            BodyState(
+                time_s=round(self._time_s + self._steps_done * dt_s - self._session_s, 9),
+                gyro_rad_s=frd_from_flu((turn[0] / dt_s, turn[1] / dt_s, turn[2] / dt_s)),
+                accel_m_s2=frd_from_flu(felt),
+                position_m=ned_from_enu(body.position),
+                velocity_m_s=ned_from_enu(body.velocity),
+                attitude=quat_ned_frd_from_enu_flu(body.attitude),
+            )
+        )
+
+    def _note_height(self) -> None:
+        if self.body.on_ground:
+            self._high = False
+        elif self.body.position[2] >= CRUISE_HEIGHT_M:
+            self._high = True

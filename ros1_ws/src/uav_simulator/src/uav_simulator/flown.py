@@ -1,0 +1,76 @@
+"""What flies in a simulation: a body, moved by one tick at a time by whoever flies it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from uav_simulator.autopilot.core import Autopilot
+from uav_simulator.autopilot.endpoint import Endpoint
+from uav_simulator.autopilot.estimator import PERFECT
+from uav_simulator.autopilot.types import LandedState
+from uav_simulator.frames import Vec3
+from uav_simulator.imperfections import Imperfections
+from uav_simulator.vehicle.airframe import Airframe
+from uav_simulator.vehicle.hexacopter import Hexacopter
+from uav_simulator.vehicle.noise import Wind
+from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
+
+
+class Flown(Protocol):
+    """A vehicle and whoever flies it."""
+
+    @property
+    def body(self) -> RigidBody:
+        """The body."""
+
+    @property
+    def landed_state(self) -> LandedState:
+        """Whether it stands, climbs, flies or lands."""
+
+    def tick(self, now_s: float, dt_s: float) -> bool:
+        """Advance by one tick that ends at ``now_s``; False: who flies it has not come so far yet, call again."""
+
+
+class SimulatedAutopilotVehicle:
+    """The hexacopter, flown by the simulator's own autopilot behind MAVLink."""
+
+    def __init__(
+        self,
+        *,
+        seed: int,
+        home: Vec3 = ZERO,
+        boot_before_s: float = 60.0,
+        params: Mapping[str, float] | None = None,
+        ground_link: bool = False,
+        imperfections: Imperfections = PERFECT,
+    ) -> None:
+        """``params`` of the autopilot; ``ground_link``: a ground station speaks over a link of its own, so none is made up."""
+        airframe = Airframe()
+        self.vehicle = Hexacopter(airframe, Wind(seed=seed), home, yaw_rad=0.0)
+        self.autopilot = Autopilot(
+            self.vehicle, airframe, seed=seed, boot_before_s=boot_before_s, params=params, imperfections=imperfections
+        )
+        self.endpoint = Endpoint(self.autopilot, gcs_present=not ground_link)
+        self.ground_endpoint = Endpoint(self.autopilot, gcs_present=False) if ground_link else None
+        if self.ground_endpoint is not None:
+            self.endpoint.connect(self.ground_endpoint)
+
+    @property
+    def body(self) -> RigidBody:
+        """The body."""
+        return self.vehicle.body
+
+    @property
+    def landed_state(self) -> LandedState:
+        """What the autopilot says."""
+        return self.autopilot.landed_state
+
+    def tick(self, now_s: float, dt_s: float) -> bool:
+        """Move the body, then let the autopilot decide and speak."""
+        self.vehicle.advance(dt_s)
+        self.autopilot.step(now_s, dt_s)
+        self.endpoint.step()
+        if self.ground_endpoint is not None:
+            self.ground_endpoint.step()
+        return True

@@ -1,0 +1,97 @@
+"""Who flies the body, as the node sees it: something flown, served while time waits, and told what the pilot does."""
+
+from __future__ import annotations
+
+import logging
+import time
+from typing import Protocol
+
+from uav_simulator.ardupilot.vehicle import ArduPilotVehicle
+from uav_simulator.autopilot.link_server import LinkServer
+from uav_simulator.autopilot.params import parse_parameters
+from uav_simulator.errors import ConfigError
+from uav_simulator.flown import Flown, SimulatedAutopilotVehicle
+from uav_simulator.frames import Vec3
+from uav_simulator.imperfections import parse_imperfections
+from uav_simulator.pilot_hooks import apply_pilot_word
+from uav_simulator.settings import Settings
+
+log = logging.getLogger(__name__)
+
+
+class Pilot(Protocol):
+    """Who flies the body."""
+
+    @property
+    def flown(self) -> Flown:
+        """The body and who flies it."""
+
+    @property
+    def ports(self) -> dict[str, int]:
+        """Those that it listens on, by the names of their parameters."""
+
+    def serve(self, wait_s: float = 0.0) -> None:
+        """Handle what has come over its links, or comes within ``wait_s``."""
+
+    def obey(self, word: str) -> None:
+        """Do what a word of ``/sim/pilot`` says; raises ConfigError for one that can't be done."""
+
+    def close(self) -> None:
+        """Free the ports."""
+
+
+class SimulatedPilot:
+    """The simulator's own autopilot, behind MAVLink."""
+
+    def __init__(self, settings: Settings, home: Vec3) -> None:
+        self.flown = SimulatedAutopilotVehicle(
+            seed=settings.seed,
+            home=home,
+            boot_before_s=settings.boot_before_s,
+            params=parse_parameters(settings.autopilot_params),
+            ground_link=settings.gcs_port >= 0,
+            imperfections=parse_imperfections(settings.imperfections),
+        )
+        endpoints = (self.flown.endpoint, self.flown.ground_endpoint)
+        self._links = LinkServer(*endpoints, port=settings.mavlink_port, gcs_port=settings.gcs_port)
+        self.ports = {"mavlink_port": self._links.port}
+        if settings.gcs_port >= 0:
+            self.ports["gcs_port"] = self._links.gcs_port
+
+    def serve(self, wait_s: float = 0.0) -> None:
+        """Carry MAVLink."""
+        self._links.serve(wait_s)
+
+    def obey(self, word: str) -> None:
+        """Flip the pilot's switch, move the stick, lose a link."""
+        apply_pilot_word(word, self.flown.autopilot, self.flown.endpoint)
+
+    def close(self) -> None:
+        """Let the clients go."""
+        self._links.close()
+
+
+class ArduPilotPilot:
+    """ArduPilot's own program, which the guidance speaks to directly."""
+
+    def __init__(self, settings: Settings, home: Vec3) -> None:
+        self.flown = ArduPilotVehicle(seed=settings.seed, home=home, port=settings.ardupilot_port)
+        self.ports = {"ardupilot_port": self.flown.port}
+        log.info("the body waits for ArduPilot on UDP 127.0.0.1:%d (--model JSON:127.0.0.1)", self.flown.port)
+
+    def serve(self, wait_s: float = 0.0) -> None:
+        """Wait: packets are taken by the vehicle's tick alone, for each of them moves the body."""
+        time.sleep(wait_s)
+
+    def obey(self, word: str) -> None:
+        """Refuse: the pilot of a real autopilot has a remote control, or a ground station."""
+        raise ConfigError(f"/sim/pilot: {word!r} is for the simulated autopilot; ArduPilot takes it over MAVLink")
+
+    def close(self) -> None:
+        """Free the port."""
+        self.flown.close()
+
+
+def make_pilot(settings: Settings, home: Vec3) -> Pilot:
+    """Return who the settings say flies it; raises SimulatorError when its port is taken."""
+    return ArduPilotPilot(settings, home) if settings.vehicle == "ardupilot" else SimulatedPilot(settings, home)
