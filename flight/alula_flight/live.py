@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from alula_flight.deaths import read_deaths
+from alula_flight.report.files import mapping
+from skill_model.execution_state import ExecutionState
+from skill_runtime.core.events import EngineEvent, TransitionEvent, read_event
 
-_QUIET_STATES = {"REQUESTED"}
 
-
-def event_line(event: Mapping[str, Any]) -> str | None:
+def event_line(event: EngineEvent) -> str | None:
     """Return what a person wants to read of one event, or None where it is not worth a line."""
-    stamp = f"t={event.get('stamp_s', 0.0):6.1f} s"
-    if "resource" in event and event.get("resource"):
-        return f"{stamp}  {event['skillset']}.{event['resource']}: {event.get('from_state')} -> {event.get('to_state')}"
-    state = event.get("state", "")
-    if state in _QUIET_STATES or not event.get("skill"):
+    stamp = f"t={event.stamp_s:6.1f} s"
+    if isinstance(event, TransitionEvent):
+        return f"{stamp}  {event.skillset}.{event.resource}: {event.from_state} -> {event.to_state}"
+    if event.state is ExecutionState.REQUESTED:
         return None
-    named = f" {event['result']}" if event.get("result") else ""
-    why = f" ({event['message']})" if event.get("message") and state != "RUNNING" else ""
-    return f"{stamp}  {event['skillset']}.{event['skill']}: {state}{named}{why}"
+    named = f" {event.result}" if event.result else ""
+    why = f" ({event.message})" if event.message and event.state is not ExecutionState.RUNNING else ""
+    return f"{stamp}  {event.skillset}.{event.skill}: {event.state.value}{named}{why}"
 
 
 class LiveEvents:
@@ -52,8 +51,8 @@ class LiveEvents:
 
     def _show(self, line: bytes) -> None:
         try:
-            text = event_line(json.loads(line))
-        except (json.JSONDecodeError, TypeError, KeyError):
+            text = event_line(read_event(mapping(json.loads(line))))
+        except ValueError:
             return  # the report names unreadable lines
         if text is not None:
             self._say(text)

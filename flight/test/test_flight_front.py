@@ -18,6 +18,8 @@ from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import command
 from alula_flight.spec import RequestError, RunSpec
+from skill_model.execution_state import ExecutionState
+from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 from uav_simulator.world.config import find_world
 
 
@@ -212,7 +214,7 @@ def test_live_lines_wait_for_whole_lines(tmp_path):
     live = LiveEvents(tmp_path, said.append)
     live.show_new()
     events = tmp_path / "events.jsonl"
-    whole = '{"stamp_s": 3.0, "skillset": "navigation", "skill": "goto", "state": "RUNNING", "resource": ""}\n'
+    whole = '{"stamp_s": 3.0, "skillset": "navigation", "kind": "EXECUTION", "skill": "goto", "id": "1", "state": "RUNNING"}\n'
     events.write_text(whole + whole[:20])
     live.show_new()
     assert len(said) == 1
@@ -224,11 +226,11 @@ def test_live_lines_wait_for_whole_lines(tmp_path):
 
 
 def test_event_line_tells_transitions_and_hides_requests():
-    base = {"stamp_s": 1.0, "skillset": "perception"}
-    arrow = event_line({**base, "resource": "zed_status", "from_state": "OK", "to_state": "BROKEN"})
+    arrow = event_line(TransitionEvent(1, 1_000_000_000, "zed_status", "OK", "BROKEN", "extern", "perception"))
     assert arrow is not None
     assert "OK -> BROKEN" in arrow
-    assert event_line({**base, "skill": "zed_depthmap", "state": "REQUESTED"}) is None
+    request = ExecutionEvent(2, 1_000_000_000, "zed_depthmap", "1", ExecutionState.REQUESTED, "", "", {}, {}, "perception")
+    assert event_line(request) is None
 
 
 def test_the_package_needs_no_ros_to_be_imported():

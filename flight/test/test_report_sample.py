@@ -116,18 +116,18 @@ class Log:
     def __init__(self) -> None:
         self.events: list[dict[str, Any]] = []
 
-    def _add(self, t_s: float, skillset: str, kind: int, **values: Any) -> None:
+    def _add(self, t_s: float, skillset: str, kind: str, **values: Any) -> None:
         self.events.append({"stamp_s": LIFT_OFF_S + t_s, "skillset": skillset, "kind": kind, **values})
 
     def skill(self, t_s: float, name: str, id_: str, state: str, **values: Any) -> None:
         """Add a change of an execution; ``name`` is skillset.skill, ``t_s`` counts from lift-off."""
         skillset, skill = name.split(".")
-        self._add(t_s, skillset, 0, skill=skill, id=id_, state=state, **values)
+        self._add(t_s, skillset, "EXECUTION", skill=skill, id=id_, state=state, **values)
 
     def change(self, t_s: float, name: str, source: str, target: str, cause: str = "extern") -> None:
         """Add a transition; ``name`` is skillset.resource."""
         skillset, resource = name.split(".")
-        self._add(t_s, skillset, 1, resource=resource, from_state=source, to_state=target, cause=cause)
+        self._add(t_s, skillset, "TRANSITION", resource=resource, from_state=source, to_state=target, cause=cause)
 
     def write(self, path: Path, *, tail: str = "") -> None:
         """Write ``events.jsonl`` in the order of time; ``tail`` is a last line without its end."""
@@ -143,7 +143,7 @@ def failing_flight() -> Log:
     log = Log()
     for number, (begin_s, end_s) in enumerate([(5.0, 27.3), (27.5, 30.3)], start=1):
         target = {"target": {"x": 22.0, "y": 14.0 * (number - 1), "z": 3.0}, "speed": 1.0}
-        log.skill(begin_s, "navigation.goto_straight", f"s{number}", "REQUESTED", inputs_json=json.dumps(target))
+        log.skill(begin_s, "navigation.goto_straight", f"s{number}", "REQUESTED", inputs=target)
         log.skill(begin_s + 0.02, "navigation.goto_straight", f"s{number}", "RUNNING")
         state = {"state": "TERMINATED", "result": "ARRIVED"} if number == 1 else {"state": "INTERRUPTED"}
         log.skill(end_s, "navigation.goto_straight", f"s{number}", **state)

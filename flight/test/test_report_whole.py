@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import sys
 import xml.etree.ElementTree as ET
@@ -294,7 +295,7 @@ def test_a_crash_in_flight(folder):
 def test_nominal_has_no_recovery(tmp_path):
     log = Log()
     log.change(0.0, "navigation.flight_status", "ON_GROUND", "IN_AIR")
-    log.skill(1.0, "navigation.goto_straight", "s1", "REQUESTED", inputs_json='{"speed": NaN}')
+    log.skill(1.0, "navigation.goto_straight", "s1", "REQUESTED", inputs={"speed": math.nan})
     log.skill(1.0, "navigation.goto_straight", "s1", "NOT_READY", result="in_air", message="flight_status is ON_GROUND")
     log.write(tmp_path / "events.jsonl")
     summary = make_report(facts(tmp_path, faults=[]))

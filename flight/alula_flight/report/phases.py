@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import takewhile
 
-from alula_flight.report.events import History, Transition
+from alula_flight.report.events import History
 from alula_flight.report.recording import ON_GROUND, GuidanceAccount, Recording
+from skill_runtime.core.events import TransitionEvent
 
 FLIGHT_STATUS = "flight_status"
 TAKEOFF = "takeoff"
@@ -53,7 +54,7 @@ def _origin(history: History, recording: Recording) -> tuple[float, str]:
     if recording.simulator is not None and recording.simulator.lift_off_s is not None:
         return recording.simulator.lift_off_s, "simulator"
     for transition in flight_status(history):
-        if transition.source == "ON_GROUND":
+        if transition.from_state == "ON_GROUND":
             return transition.stamp_s, FLIGHT_STATUS
     if history.first_s is not None:
         return history.first_s, "first event"
@@ -62,7 +63,7 @@ def _origin(history: History, recording: Recording) -> tuple[float, str]:
     return 0.0, "nothing"
 
 
-def flight_status(history: History) -> list[Transition]:
+def flight_status(history: History) -> list[TransitionEvent]:
     """Return the transitions between ON_GROUND and IN_AIR."""
     return [transition for transition in history.transitions if transition.resource == FLIGHT_STATUS]
 
@@ -86,7 +87,7 @@ def _landing(history: History, guidance: tuple[GuidanceAccount, ...], zero_s: fl
 
 def _touch_down(history: History, guidance: tuple[GuidanceAccount, ...], zero_s: float) -> float | None:
     changes = [change for change in flight_status(history) if change.stamp_s > zero_s]
-    if changes and changes[-1].target == "ON_GROUND":
+    if changes and changes[-1].to_state == "ON_GROUND":
         return changes[-1].stamp_s
     block = list(takewhile(lambda state: state.landed_state == ON_GROUND and state.t_s > zero_s, reversed(guidance)))
     return block[-1].t_s if block else None

@@ -41,7 +41,7 @@ def injected(recording: Recording) -> tuple[Fault, ...]:
 def find_recovery(scenario: str, history: History, recording: Recording, phases: Phases) -> Recovery | None:
     """Return the recovery from the first failure, or None without one."""
     faults = injected(recording)
-    broken = [change.stamp_s for change in history.transitions if change.target == BROKEN]
+    broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN]
     if not faults and not broken:
         return None
     failure_s = faults[0].t_s if faults else None

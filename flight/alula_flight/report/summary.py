@@ -135,7 +135,7 @@ def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None
 def landed(history: History, recording: Recording, problems: Problems, *, resting: bool | None) -> bool | None:
     """Tell whether the vehicle stands on the ground at the end: it must be said so, and be true where the truth is known."""
     said = [recording.guidance[-1].landed_state == ON_GROUND] if recording.guidance else []
-    said += [change.target == "ON_GROUND" for change in flight_status(history)[-1:]]
+    said += [change.to_state == "ON_GROUND" for change in flight_status(history)[-1:]]
     if not said or resting is None:
         return any(said) if said else resting
     if any(said) != resting:
@@ -235,8 +235,8 @@ def resources(history: History, phases: Phases) -> list[ResourceSummary]:
             "t_s": phases.since(change.stamp_s),
             "skillset": change.skillset,
             "resource": change.resource,
-            "from": change.source,
-            "to": change.target,
+            "from": change.from_state,
+            "to": change.to_state,
             "cause": change.cause,
         }
         for change in history.transitions

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TypedDict
 
-from alula_flight.report.events import History, Transition
+from alula_flight.report.events import History
 from alula_flight.report.phases import Phases
 from alula_flight.report.recovery import Recovery
 from alula_flight.report.summary import SkillSummary, skills
+from skill_runtime.core.events import TransitionEvent
 
 # The paper's notation does not tell good results from bad ones, the mission does; these names say it by themselves.
 FAILURE_WORDS = ("BLOCKED", "ABORT", "FAIL", "ERROR", "LOST", "TIMEOUT", "REFUSED", "DRIFT", "UNREACH", "STUCK", "REJECT", "INVALID")
@@ -104,15 +105,15 @@ def _skill_rows(executions: list[SkillSummary], end_s: float) -> list[SkillRow]:
     return sorted(rows.values(), key=lambda row: skillsets.index(row["skillset"]))
 
 
-def _resource_rows(transitions: tuple[Transition, ...], phases: Phases, begin_s: float, end_s: float) -> list[ResourceRow]:
+def _resource_rows(transitions: tuple[TransitionEvent, ...], phases: Phases, begin_s: float, end_s: float) -> list[ResourceRow]:
     rows: dict[tuple[str, str], ResourceRow] = {}
     for change in transitions:
         key = (change.skillset, change.resource)
         t_s = phases.since(change.stamp_s) or 0.0
-        first = [Band(state=change.source, from_s=begin_s, until_s=t_s)]
+        first = [Band(state=change.from_state, from_s=begin_s, until_s=t_s)]
         row = rows.setdefault(key, ResourceRow(skillset=key[0], resource=key[1], bands=first))
         row["bands"][-1]["until_s"] = t_s
-        row["bands"].append(Band(state=change.target, from_s=t_s, until_s=end_s))
+        row["bands"].append(Band(state=change.to_state, from_s=t_s, until_s=end_s))
     skillsets = list(dict.fromkeys(row["skillset"] for row in rows.values()))
     return sorted(rows.values(), key=lambda row: skillsets.index(row["skillset"]))
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from skill_missions.pending import PendingInterrupts
 from skill_missions.skillset import NANOSECONDS, Clock
+from skill_model.execution_state import ExecutionState
 
 
 @dataclass(frozen=True)
@@ -18,13 +19,14 @@ class Failure:
 
     leaf: str
     skill: str
-    outcome: str
+    state: ExecutionState
     result: str
     message: str
 
     def sentence(self) -> str:
         """Return what a person wants to read."""
-        what = self.result if self.outcome == "TERMINATED" else " ".join(filter(None, (self.outcome, self.result)))
+        ended = self.state is ExecutionState.TERMINATED
+        what = self.result if ended else f"{self.state.value} {self.result}".strip()
         why = self.message.removeprefix(f"{self.result}: ") if self.result else self.message
         return f"{self.skill}: {what}" + (f" ({why})" if why else "")
 

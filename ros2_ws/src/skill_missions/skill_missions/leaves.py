@@ -12,7 +12,9 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from skill_missions.blackboard import Blackboard, Failure
-from skill_missions.skillset import Client, Handle
+from skill_missions.skillset import Client
+from skill_model.execution_state import ExecutionState
+from skill_runtime.handle import SkillHandle
 
 Board = TypeVar("Board", bound=Blackboard)
 Inputs = Mapping[str, object] | Callable[[Board], Mapping[str, object]]
@@ -45,7 +47,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         super().__init__(name)
         self.client = client
         self.skill = skill
-        self.handle: Handle | None = None
+        self.handle: SkillHandle | None = None
         self._interrupted = False
         self._inputs = inputs
         self._blackboard = blackboard
@@ -70,11 +72,11 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         handle = self.handle
         if handle is None or not handle.done:
             return Status.RUNNING
-        if handle.outcome == "TERMINATED" and handle.result in self._success:
+        if handle.state is ExecutionState.TERMINATED and handle.result in self._success:
             self.feedback_message = handle.result
             self._on_success(self._blackboard)
             return Status.SUCCESS
-        failure = Failure(self.name, self.skill_name, str(handle.outcome), handle.result, handle.message)
+        failure = Failure(self.name, self.skill_name, handle.state, handle.result, handle.message)
         self._blackboard.failures.append(failure)
         self.feedback_message = failure.sentence()
         return Status.FAILURE

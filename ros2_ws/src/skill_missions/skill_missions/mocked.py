@@ -3,49 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from alula_common.faults import FaultRequest
 from skill_missions.director import Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
-from skill_missions.skillset import Handle
+from skill_missions.skillset import WakingClient
 from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent
-from skill_runtime.local import LocalClient, LocalWorld, event_record
+from skill_runtime.local import LocalWorld
 from skill_runtime.mock import Behaviour, Play, mock_world
 
 TICK_PERIOD_S = 0.1
 LATENCY_S = 0.005
 LIMIT_S = 3600.0
 """Mission clock after which a mission that goes round in circles is aborted, and after which twice it is left."""
-
-
-class _Waking:
-    """A skillset's client that has the tree ticked at once when an execution ends or a resource changes."""
-
-    def __init__(self, client: LocalClient, wake: Callable[[], None]) -> None:
-        self.skillset = client.skillset
-        self._client = client
-        self._wake = wake
-        client.on_change(lambda _: wake())
-
-    @property
-    def ready(self) -> bool:
-        """Tell whether it can be called."""
-        return self._client.ready
-
-    @property
-    def resources(self) -> Mapping[str, str]:
-        """State of every resource."""
-        return self._client.resources
-
-    def start(self, skill: str, **inputs: object) -> Handle:
-        """Start an execution."""
-        handle = self._client.start(skill, **inputs)
-        handle.add_done_callback(lambda _: self._wake())
-        return handle
 
 
 class MockedMission:
@@ -77,7 +51,7 @@ class MockedMission:
         self.world: LocalWorld
         self.play: Play
         self.world, self.play = mock_world(skillsets, behaviour, seed=seed, latency_s=latency_s)
-        self.events: list[tuple[str, EngineEvent]] = []
+        self.events: list[EngineEvent] = []
         self.wall_s = 0.0
         for fault in faults:
             self.play.fail(fault)
@@ -85,7 +59,7 @@ class MockedMission:
         self._record = None if out is None else MissionRecord(out, plan)
         self._due = False
         self._abort_reasons: list[str] = []
-        clients = {skillset.name: _Waking(self.world.client(skillset.name), self._wake) for skillset in skillsets}
+        clients = {skillset.name: WakingClient(self.world.client(skillset.name), self._wake) for skillset in skillsets}
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         mission, blackboard = plan.make(clients, clock_ns, plan.parameters)
         self.director = Director(mission, blackboard)
@@ -152,8 +126,8 @@ class MockedMission:
             self.director.abort(f"the tree raised {type(error).__name__}: {error}")
         self.director.remember()
 
-    def _on_event(self, skillset: str, event: EngineEvent) -> None:
-        self.events.append((skillset, event))
+    def _on_event(self, _skillset: str, event: EngineEvent) -> None:
+        self.events.append(event)
         if self._record is not None:
-            self._record.note(event_record(skillset, event))
+            self._record.note(event)
         self._wake()

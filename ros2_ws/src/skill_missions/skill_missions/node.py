@@ -9,7 +9,7 @@ import json
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,10 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
 from skill_missions.director import EXIT_CODES, Director, End, Outcome
-from skill_missions.files import event_record
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
-from skill_missions.skillset import Handle
+from skill_missions.skillset import WakingClient
+from skill_runtime.codecs import event_of
 from skill_runtime.ros2 import SkillsetClient
 
 TICK_PERIOD_S = 0.1
@@ -38,32 +38,6 @@ ALL_EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, dura
 LAST_EVENTS_S = 2.0  # wall clock to wait for the events of what has ended
 
 
-class WakingClient:
-    """A skillset's client that has the tree ticked at once when an execution ends or a resource changes."""
-
-    def __init__(self, node: Node, skillset: str, wake: Callable[[], None]) -> None:
-        self.skillset = skillset
-        self.client = SkillsetClient(node, skillset)
-        self._wake = wake
-        self.client.on_change(lambda *_: wake())
-
-    @property
-    def ready(self) -> bool:
-        """Tell whether it can be called."""
-        return bool(self.client.ready)
-
-    @property
-    def resources(self) -> Mapping[str, str]:
-        """State of every resource; empty until the skillset was heard of."""
-        return dict(self.client.resources)
-
-    def start(self, skill: str, **inputs: object) -> Handle:
-        """Start an execution."""
-        handle = self.client.start(skill, **inputs)
-        handle.add_done_callback(lambda *_: self._wake())
-        return handle
-
-
 class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """`/mission`: ticks the tree at 10 Hz of the mission clock and after every event, and keeps the run's record."""
 
@@ -73,7 +47,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.record = MissionRecord(out, plan)
         self._plan = plan
         self._view_json = ""
-        self._skillsets = {name: WakingClient(self, name, self.wake) for name in plan.skillsets}
+        self._skillsets = {name: WakingClient(SkillsetClient(self, name), self.wake) for name in plan.skillsets}
         self.director = self._make_director()
         self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", 10)
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
@@ -131,7 +105,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._tree.publish(String(data=view_json))
 
     def _on_event(self, event: Event) -> None:
-        self.record.note(event_record(event))
+        self.record.note(event_of(event))
         self.wake()
 
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

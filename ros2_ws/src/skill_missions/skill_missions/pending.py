@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skill_missions.skillset import NANOSECONDS, Clock, Handle
+from skill_missions.skillset import NANOSECONDS, Clock
+from skill_runtime.handle import SkillHandle
 
 
 @dataclass(frozen=True)
 class _Pending:
     skillset: str
     skill: str
-    handle: Handle
+    handle: SkillHandle
     since_ns: int
 
 
@@ -28,7 +29,7 @@ class PendingInterrupts:
         self._bound_ns = bound_s * NANOSECONDS
         self._pending: list[_Pending] = []
 
-    def interrupt(self, skillset: str, skill: str, handle: Handle) -> None:
+    def interrupt(self, skillset: str, skill: str, handle: SkillHandle) -> None:
         """Ask for the end of an execution and remember it until it has ended."""
         handle.interrupt()
         self._pending.append(_Pending(skillset, skill, handle, self._clock_ns()))

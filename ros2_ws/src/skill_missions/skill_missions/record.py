@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from skill_missions.director import Director, End, Outcome
 from skill_missions.drawing import draw
 from skill_missions.files import EventLog, write_json, write_text
 from skill_missions.plan import MissionPlan
-from skill_model.execution_state import ExecutionState
+from skill_runtime.core.events import EngineEvent, ExecutionEvent
 
 
 class MissionRecord:
@@ -34,14 +33,13 @@ class MissionRecord:
         """When the plan's state of departure was left first, seconds of mission clock."""
         return self._departure_s
 
-    def note(self, record: Mapping[str, object]) -> None:
+    def note(self, event: EngineEvent) -> None:
         """Write an event."""
-        self._events.add(record)
-        if record.get("skill"):
-            ended = ExecutionState(record["state"]).terminal
-            (self._unended.discard if ended else self._unended.add)(str(record["id"]))
-        if self._departure_s is None and self._plan.departure == (record.get("resource"), record.get("from_state")):
-            self._departure_s = float(str(record["stamp_s"]))
+        self._events.add(event)
+        if isinstance(event, ExecutionEvent):
+            (self._unended.discard if event.state.terminal else self._unended.add)(event.id)
+        elif self._departure_s is None and self._plan.departure == (event.resource, event.from_state):
+            self._departure_s = event.stamp_s
 
     def finish(self, end: End, director: Director, end_s: float) -> None:
         """Write what is left to write."""

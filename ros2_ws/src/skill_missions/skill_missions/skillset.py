@@ -1,51 +1,16 @@
-"""What a mission needs of a skillset's client: the part of `skill_runtime`'s SkillsetClient that the leaves use."""
+"""What a mission needs of a skillset: the part of the client that the leaves use, and the client that wakes the tree."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
+from skill_runtime.client import Client as SkillsetClient
+from skill_runtime.handle import SkillHandle
+
 NANOSECONDS = 1e9
 Clock = Callable[[], int]
 """Mission clock in nanoseconds."""
-
-
-class Handle(Protocol):
-    """One execution, as its client sees it."""
-
-    @property
-    def state(self) -> object:
-        """An ExecutionState."""
-        ...
-
-    @property
-    def done(self) -> bool:
-        """Tell whether the execution has ended and its outcome is known."""
-        ...
-
-    @property
-    def outcome(self) -> str:
-        """Name of the terminal state, as TERMINATED; empty before the end."""
-        ...
-
-    @property
-    def result(self) -> str:
-        """Name of the result in the model, or of the precondition or invariant that refused or ended it."""
-        ...
-
-    @property
-    def message(self) -> str:
-        """Why, in words."""
-        ...
-
-    @property
-    def progress(self) -> float:
-        """How far it is, 0 to 1."""
-        ...
-
-    def interrupt(self) -> None:
-        """Ask for the end; returns at once."""
-        ...
 
 
 class Client(Protocol):
@@ -63,9 +28,35 @@ class Client(Protocol):
 
     @property
     def resources(self) -> Mapping[str, str]:
-        """State of every resource."""
+        """State of every resource; empty until the skillset was heard of."""
         ...
 
-    def start(self, skill: str, **inputs: object) -> Handle:
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
         """Start an execution; returns at once."""
         ...
+
+
+class WakingClient:
+    """A skillset's client that has the tree ticked at once when an execution ends or a resource changes."""
+
+    def __init__(self, client: SkillsetClient, wake: Callable[[], None]) -> None:
+        self.client = client
+        self.skillset = client.skillset
+        self._wake = wake
+        client.on_change(lambda _: wake())
+
+    @property
+    def ready(self) -> bool:
+        """Tell whether it can be called."""
+        return self.client.ready
+
+    @property
+    def resources(self) -> Mapping[str, str]:
+        """State of every resource; empty until the skillset was heard of."""
+        return self.client.resources
+
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        """Start an execution."""
+        handle = self.client.start(skill, **inputs)
+        handle.add_done_callback(lambda _: self._wake())
+        return handle

@@ -15,38 +15,27 @@ from skill_missions.blackboard import Blackboard, Failure
 from skill_missions.decorators import RetryAfter, Until
 from skill_missions.leaves import Check, Do, SkillLeaf, Stays
 from skill_missions.pending import PendingInterrupts
+from skill_model.execution_state import ExecutionState
+from skill_runtime.handle import SkillHandle
 
+E = ExecutionState
 S, F, R = Status.SUCCESS, Status.FAILURE, Status.RUNNING
 
 
 @dataclass
-class Execution:
-    """A handle that ends when the test says so."""
-
-    done: bool = False
-    outcome: str = ""
-    result: str = ""
-    message: str = ""
-    progress: float = 0.0
-    interrupts: int = 0
-
-    def interrupt(self) -> None:
-        self.interrupts += 1
-
-    def end(self, outcome: str, result: str = "", message: str = "") -> None:
-        self.done, self.outcome, self.result, self.message = True, outcome, result, message
-
-
-@dataclass
 class Client:
+    """Its handles end when the test says so."""
+
     skillset: str = "arm"
     ready: bool = True
     resources: dict[str, str] = field(default_factory=dict)
-    started: list[tuple[str, dict, Execution]] = field(default_factory=list)
+    started: list[tuple[str, dict, SkillHandle]] = field(default_factory=list)
+    interrupts: list[str] = field(default_factory=list)
 
-    def start(self, skill: str, **inputs: object) -> Execution:
-        self.started.append((skill, inputs, Execution()))
-        return self.started[-1][2]
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        handle = SkillHandle(skill, str(len(self.started)), lambda: self.interrupts.append(skill))
+        self.started.append((skill, inputs, handle))
+        return handle
 
 
 class Script(Behaviour):
@@ -94,7 +83,7 @@ def test_a_skill_is_started_once_with_inputs_of_that_moment_and_succeeds_by_its_
     assert [ticked(grip), ticked(grip)] == [R, R]
     ((skill, inputs, execution),) = client.started
     assert (skill, inputs) == ("grip", {"at_s": 3.0})
-    execution.end("TERMINATED", "HELD")
+    execution.end(E.TERMINATED, "HELD", "")
     assert ticked(grip) is S
     assert (done, clock.board.failures, grip.feedback_message) == ([clock.board], [], "HELD")
     assert ticked(grip) is R  # a leaf that is ticked again asks again
@@ -104,10 +93,10 @@ def test_a_skill_is_started_once_with_inputs_of_that_moment_and_succeeds_by_its_
 @pytest.mark.parametrize(
     ("end", "sentence"),
     [
-        (("TERMINATED", "DROPPED", "slippery"), "arm.grip: DROPPED (slippery)"),
-        (("NOT_READY", "arm_free", "arm_free: arm is BUSY"), "arm.grip: NOT_READY arm_free (arm is BUSY)"),
-        (("FAILED", "", "the managers have gone"), "arm.grip: FAILED (the managers have gone)"),
-        (("INTERRUPTED", "", ""), "arm.grip: INTERRUPTED"),
+        ((E.TERMINATED, "DROPPED", "slippery"), "arm.grip: DROPPED (slippery)"),
+        ((E.NOT_READY, "arm_free", "arm_free: arm is BUSY"), "arm.grip: NOT_READY arm_free (arm is BUSY)"),
+        ((E.FAILED, "", "the managers have gone"), "arm.grip: FAILED (the managers have gone)"),
+        ((E.INTERRUPTED, "", ""), "arm.grip: INTERRUPTED"),
     ],
 )
 def test_any_other_end_is_a_failure_that_says_why(clock, end, sentence):
@@ -126,7 +115,7 @@ def test_a_leaf_that_is_left_interrupts_once_and_the_next_start_in_its_skillset_
     ticked(grip)
     for _ in range(3):
         grip.stop(Status.INVALID)
-    assert client.started[0][2].interrupts == 1
+    assert client.interrupts == ["grip"]
     assert [ticked(lift), ticked(walk)] == [R, R]
     assert ([skill for skill, _, _ in client.started], [skill for skill, _, _ in other.started]) == (["grip"], ["walk"])
     assert lift.feedback_message == "waits for the end of arm.grip"
@@ -139,10 +128,10 @@ def test_a_leaf_that_is_left_interrupts_once_and_the_next_start_in_its_skillset_
 
 
 def test_the_reason_names_each_failure_once_and_nothing_that_fails_afterwards(clock):
-    first, second = Failure("a", "arm.grip", "FAILED", "", "cold"), Failure("b", "arm.lift", "TERMINATED", "STUCK", "")
+    first, second = Failure("a", "arm.grip", E.FAILED, "", "cold"), Failure("b", "arm.lift", E.TERMINATED, "STUCK", "")
     clock.board.failures += [first, first, second]
     clock.board.note_reason()
-    clock.board.failures.append(Failure("c", "arm.rest", "FAILED", "", ""))
+    clock.board.failures.append(Failure("c", "arm.rest", E.FAILED, "", ""))
     assert clock.board.reason == "arm.grip: FAILED (cold); then arm.lift: STUCK"
 
 

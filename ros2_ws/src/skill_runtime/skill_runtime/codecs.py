@@ -93,7 +93,9 @@ def event_of(message: Any) -> EngineEvent:
     """Return an event without the name of its managers."""
     stamp_ns = stamp_ns_of(message.header.stamp)
     if message.kind == Event.TRANSITION:
-        return TransitionEvent(message.sequence, stamp_ns, message.resource, message.from_state, message.to_state, message.cause)
+        return TransitionEvent(
+            message.sequence, stamp_ns, message.resource, message.from_state, message.to_state, message.cause, message.skillset
+        )
     return ExecutionEvent(
         message.sequence,
         stamp_ns,
@@ -104,6 +106,7 @@ def event_of(message: Any) -> EngineEvent:
         message.message,
         json.loads(message.inputs_json or "null"),
         json.loads(message.outputs_json or "{}"),
+        message.skillset,
     )
 
 

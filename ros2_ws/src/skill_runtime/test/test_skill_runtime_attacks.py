@@ -15,7 +15,7 @@ from alula_testing import waits
 from alula_testing.misbehaviours import CIRCLE, MISBEHAVIOURS, Misbehaviour, Unprintable, returning
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Interrupt, Invariant, Parameter, Result, Skill
-from skill_runtime.core.events import ExecutionEvent, event_of, event_record
+from skill_runtime.core.events import ExecutionEvent, event_record, read_event
 from skill_runtime.core.watchdog import TICK_S, Watchdog
 from skill_runtime.core.wire import TEXT_LIMIT, as_text
 from skill_runtime.workers import Workers
@@ -88,7 +88,7 @@ def test_a_hook_that_misbehaves_ends_its_own_execution_only(misbehaviour):
     assert len(ends(bench, execution)) == 1
     for event in bench.events:
         assert_fits_the_wire(event_record(event))
-        assert event_of(json.loads(json.dumps(event_record(event)))).sequence == event.sequence
+        assert read_event(json.loads(json.dumps(event_record(event)))).sequence == event.sequence
     for error in bench.errors:
         assert_fits_the_wire(error)
     assert other.state is S.RUNNING

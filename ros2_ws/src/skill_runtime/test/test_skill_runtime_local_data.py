@@ -12,7 +12,7 @@ from alula_testing.recorder import Recorder
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Assignment, Comparison, Data, DataIs, Effect, Event, Invariant, Parameter, Precondition
 from skill_model.ros_types import parse_type
-from skill_runtime.local import event_record
+from skill_runtime.core.events import event_record
 from skill_runtime.waiting import NoAnswerError
 
 
@@ -138,7 +138,7 @@ def test_missing_outputs_are_as_in_an_empty_message():
 def test_records_are_those_of_the_event_messages():
     _, client = make()
     records: list = []
-    client.on_event(lambda event: records.append(event_record("flying", event)))
+    client.on_event(lambda event: records.append(event_record(event)))
     assert client.start("takeoff", height=3.0).wait(2.0)
     requested, taken = records[0], records[1]
     assert json.loads(json.dumps(requested)) == {

@@ -8,7 +8,7 @@ from skill_runtime_local_rig import make, timed
 from skill_runtime_models import flying_skillset
 
 from skill_model.execution_state import ExecutionState
-from skill_runtime.local import event_record
+from skill_runtime.core.events import event_record
 
 STEPS = st.lists(
     st.one_of(
@@ -28,7 +28,7 @@ def play(steps, latency_s: float):
     clients = [world.client("flying") for _ in range(2)]
     story, handles = [], []
     for name in world.managers:
-        world.client(name).on_event(lambda event, name=name: story.append(event_record(name, event)))
+        world.client(name).on_event(lambda event, name=name: story.append(event_record(event)))
     for what, value in steps:
         if what == "start":
             handles.append(clients[value].start("takeoff", height=3.0))

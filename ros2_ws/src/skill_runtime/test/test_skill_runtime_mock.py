@@ -13,7 +13,7 @@ from alula_common.faults import FaultRequest
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Data, Parameter, Result, ResultKind
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.local import event_record
+from skill_runtime.core.events import event_record
 from skill_runtime.mock import Behaviour, BehaviourError, Change, Ending, Formula, FormulaError, Rule, load_behaviour, mock_world
 
 S = ExecutionState
@@ -391,7 +391,7 @@ def test_whatever_the_script_every_execution_ends_once_and_the_story_repeats(rul
     def story():
         mocked = Mocked(Behaviour(rules={("flying", "takeoff"): tuple(rules)}), seed=seed)
         told = []
-        mocked.client.on_event(lambda event: told.append(event_record("flying", event)))
+        mocked.client.on_event(lambda event: told.append(event_record(event)))
         handles = []
         for gap_s in gaps:
             handles.append(mocked.client.start("takeoff", height=3.0))

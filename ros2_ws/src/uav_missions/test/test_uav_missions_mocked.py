@@ -61,14 +61,14 @@ def landed(mission: MockedMission) -> bool:
 def executions(mission: MockedMission) -> list[tuple[str, str, str]]:
     """Return skill, outcome and result of each execution in the order of the requests."""
     found: dict[str, tuple[str, str, str]] = {}
-    for _, event in mission.events:
+    for event in mission.events:
         if isinstance(event, ExecutionEvent):
             found[event.id] = (event.skill, event.state.value, event.result)
     return list(found.values())
 
 
 def ends(mission: MockedMission) -> Counter:
-    return Counter(event.id for _, event in mission.events if isinstance(event, ExecutionEvent) and event.state.terminal)
+    return Counter(event.id for event in mission.events if isinstance(event, ExecutionEvent) and event.state.terminal)
 
 
 def comparable(story: list[tuple[str, str, str]]) -> list[object]:
@@ -82,10 +82,10 @@ def test_losing_the_zed_is_flown_as_in_the_simulator():
     mission = make(FaultRequest("zed", begin_s=30.0))
     assert mission.run().outcome is Outcome.DEGRADED
     assert comparable(executions(mission)) == comparable(SIMULATED)
-    lift_off_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "IN_AIR")
-    lost_ns = next(event.stamp_ns for _, event in mission.events if getattr(event, "to_state", "") == "BROKEN")
+    lift_off_ns = next(event.stamp_ns for event in mission.events if getattr(event, "to_state", "") == "IN_AIR")
+    lost_ns = next(event.stamp_ns for event in mission.events if getattr(event, "to_state", "") == "BROKEN")
     watching_ns = next(
-        event.stamp_ns for _, event in mission.events if getattr(event, "skill", "") == "lidar_depthmap" and event.state.value == "RUNNING"
+        event.stamp_ns for event in mission.events if getattr(event, "skill", "") == "lidar_depthmap" and event.state.value == "RUNNING"
     )
     assert (lost_ns - lift_off_ns) / 1e9 == pytest.approx(30.34, abs=0.05)
     assert 0.0 < (watching_ns - lost_ns) / 1e9 < 0.2
@@ -129,7 +129,7 @@ def test_the_same_seed_flies_the_same_flight():
     first, second = make(FaultRequest("zed", begin_s=40.0), seed=5), make(FaultRequest("zed", begin_s=40.0), seed=5)
     first.run()
     second.run()
-    assert [event for _, event in first.events] == [event for _, event in second.events]
+    assert first.events == second.events
 
 
 def test_a_campaign_always_comes_to_an_end_and_down():

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skill_missions.files import EventLog, write_json
+from skill_runtime.core.events import TransitionEvent
 from uav_missions.route import Route, RouteError, load_route, wrap_rad
 
 
@@ -79,7 +80,7 @@ def test_json_files_are_replaced_as_a_whole_and_nothing_is_left_beside(tmp_path)
 def test_each_event_is_on_disk_at_once(tmp_path):
     log = EventLog(tmp_path / "events.jsonl")
     for number in range(3):
-        log.add({"sequence": number})
+        log.add(TransitionEvent(number, 0, "door", "OPEN", "CLOSED", "extern", "house"))
         lines = (tmp_path / "events.jsonl").read_text().splitlines()
         assert [json.loads(line)["sequence"] for line in lines] == list(range(number + 1))
     log.close()

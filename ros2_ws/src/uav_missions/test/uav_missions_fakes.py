@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 
 from skill_missions.pending import PendingInterrupts
+from skill_model.execution_state import ExecutionState as State
+from skill_runtime.handle import SkillHandle
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients
 from uav_missions.route import Route
 
 SQUARE = [(0.0, 0.0, 3.0), (10.0, 0.0, 3.0), (10.0, 8.0, 3.0)]
-
-
-class State(Enum):
-    REQUESTED = 0
-    RUNNING = 1
-    TERMINATED = 2
-    INTERRUPTED = 3
-    RESOURCE_INVARIANT_VIOLATED = 4
-    NOT_READY = 5
-    FAILED = 6
 
 
 # Which resource each skill holds while it runs.
@@ -47,33 +38,21 @@ NOMINAL = {
 }
 
 
-@dataclass
-class FakeHandle:
-    skill: str
-    inputs: dict
-    world: World
-    started_s: float
-    state: State = State.REQUESTED
-    result: str = ""
-    message: str = ""
-    progress: float = 0.0
-    interrupted_s: float | None = None
-
-    @property
-    def done(self) -> bool:
-        return self.state not in {State.REQUESTED, State.RUNNING}
-
-    @property
-    def outcome(self) -> str:
-        return self.state.name if self.done else ""
+class FakeHandle(SkillHandle):
+    def __init__(self, skill: str, inputs: dict, world: World) -> None:
+        super().__init__(skill, str(len(world.handles)))
+        self.inputs = inputs
+        self.world = world
+        self.started_s = world.now_s
+        self.interrupted_s: float | None = None
 
     def interrupt(self) -> None:
         self.interrupted_s = self.world.now_s
         self.world.log.append(("interrupt", self.skill))
 
-    def end(self, state: State, result: str = "", message: str = "") -> None:
-        self.state, self.result, self.message = state, result, message
+    def end(self, state: State, result: str = "", message: str = "", outputs: dict | None = None) -> None:
         self.world.log.append(("end", self.skill, result or state.name))
+        super().end(state, result, message, outputs)
 
 
 @dataclass
@@ -94,7 +73,7 @@ class World:
         return round(self.now_s * 1e9)
 
     def start(self, skill: str, inputs: dict) -> FakeHandle:
-        handle = FakeHandle(skill, inputs, self, self.now_s)
+        handle = FakeHandle(skill, inputs, self)
         self.log.append(("start", skill))
         for other in self.running():
             shared = set(HOLDS[skill]) & set(HOLDS[other.skill])
@@ -151,7 +130,7 @@ class World:
         elif flying and air is (handle.skill == "takeoff"):
             handle.end(State.NOT_READY, "on_ground" if handle.skill == "takeoff" else "in_air")
         else:
-            handle.state = State.RUNNING
+            handle.enter(State.RUNNING)
             self.log.append(("running", handle.skill))
 
     def starts(self) -> list[str]:

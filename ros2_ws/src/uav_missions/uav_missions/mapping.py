@@ -46,6 +46,7 @@ from py_trees.decorators import FailureIsSuccess, SuccessIsFailure
 from skill_missions.decorators import RetryAfter, Until
 from skill_missions.leaves import Check, Do, SkillLeaf, Stays
 from skill_missions.skillset import Client
+from skill_model.execution_state import ExecutionState
 from uav_missions.blackboard import RouteBlackboard, WaypointWriter
 from uav_missions.route import wrap_rad
 
@@ -250,7 +251,7 @@ def beside(name: str, work: Behaviour, companion: Behaviour) -> Parallel:
 
 def is_on(leaf: SkillLeaf[RouteBlackboard]) -> Callable[[], bool]:
     """Make a condition: the leaf's skill is RUNNING."""
-    return lambda: leaf.handle is not None and getattr(leaf.handle.state, "name", "") == "RUNNING"
+    return lambda: leaf.handle is not None and leaf.handle.state is ExecutionState.RUNNING
 
 
 def sees(leaf: SkillLeaf[RouteBlackboard]) -> Callable[[], bool]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Callable
 from typing import Any
 
 from alula_testing import waits
+from skill_runtime.codecs import event_of
+from skill_runtime.core.events import event_record
 
 PATIENCE_S = 90.0
 
@@ -55,22 +56,10 @@ class Listener:
     def hear(self, event: Any) -> None:
         """Take an ``Event`` of either world."""
         with self._lock:
-            self._heard[event.sequence] = event_record(event)
+            self._heard[event.sequence] = event_record(event_of(event))
 
     def events(self) -> list[dict[str, Any]]:
         """Return all, in order; none while one is missing in between."""
         with self._lock:
             numbers = sorted(self._heard)
             return [self._heard[number] for number in numbers] if numbers == list(range(1, len(numbers) + 1)) else []
-
-
-def event_record(event: Any) -> dict[str, Any]:
-    """Return a message as a record like that of ``skill_runtime.local``."""
-    record = {"sequence": event.sequence}
-    if event.kind == event.EXECUTION:
-        names = ("skill", "id", "state", "result", "message")
-        record |= {"kind": "EXECUTION", "inputs": json.loads(event.inputs_json), "outputs": json.loads(event.outputs_json or "{}")}
-    else:
-        names = ("resource", "from_state", "to_state", "cause")
-        record |= {"kind": "TRANSITION"}
-    return record | {name: getattr(event, name) for name in names}

@@ -9,8 +9,8 @@ from typing import Any
 from navigation_managers.model import SKILLSET
 
 from alula_testing.traces.stage import Client, HooksFactory
-from skill_runtime.core.events import EngineEvent
-from skill_runtime.local import LocalWorld, event_record
+from skill_runtime.core.events import EngineEvent, event_record
+from skill_runtime.local import LocalWorld
 
 PATIENCE_S = 10.0
 
@@ -26,7 +26,7 @@ class NoneStage:
         self._world.client(SKILLSET.name).on_event(self._hear)
 
     def _hear(self, event: EngineEvent) -> None:
-        self._heard.append(event_record(SKILLSET.name, event))
+        self._heard.append(event_record(event))
 
     def client(self) -> Client:
         """Return a new client that is ready."""

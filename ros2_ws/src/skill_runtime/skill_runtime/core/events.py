@@ -9,6 +9,7 @@ from typing import Any
 from skill_model.execution_state import ExecutionState
 from skill_runtime.plain import to_plain
 
+NANOSECONDS = 1e9
 EXECUTION = "EXECUTION"
 TRANSITION = "TRANSITION"
 
@@ -28,6 +29,11 @@ class ExecutionEvent:
     outputs: Mapping[str, object]
     skillset: str = ""
 
+    @property
+    def stamp_s(self) -> float:
+        """Seconds of mission clock."""
+        return self.stamp_ns / NANOSECONDS
+
 
 @dataclass(frozen=True)
 class TransitionEvent:
@@ -41,6 +47,11 @@ class TransitionEvent:
     cause: str
     skillset: str = ""
 
+    @property
+    def stamp_s(self) -> float:
+        """Seconds of mission clock."""
+        return self.stamp_ns / NANOSECONDS
+
 
 EngineEvent = ExecutionEvent | TransitionEvent
 Listener = Callable[[Sequence[EngineEvent]], None]
@@ -52,7 +63,7 @@ Listener = Callable[[Sequence[EngineEvent]], None]
 
 def event_record(event: EngineEvent) -> dict[str, object]:
     """Return an event as ``json`` can write it: ``stamp_s`` in seconds, inputs as an object, outputs of an end too."""
-    record: dict[str, object] = {"stamp_s": event.stamp_ns / 1e9, "sequence": event.sequence, "skillset": event.skillset}
+    record: dict[str, object] = {"stamp_s": event.stamp_s, "sequence": event.sequence, "skillset": event.skillset}
     if isinstance(event, ExecutionEvent):
         record |= {"kind": EXECUTION, "skill": event.skill, "id": event.id, "state": event.state.value}
         record |= {"result": event.result, "message": event.message, "inputs": to_plain(event.inputs)}
@@ -61,7 +72,7 @@ def event_record(event: EngineEvent) -> dict[str, object]:
     return {**record, "cause": event.cause}
 
 
-def event_of(record: Mapping[str, Any]) -> EngineEvent:
+def read_event(record: Mapping[str, Any]) -> EngineEvent:
     """Return the event that a record was made of; names that may be missing are empty then.
 
     Raises:
@@ -79,7 +90,7 @@ def event_of(record: Mapping[str, Any]) -> EngineEvent:
 
 
 def _stamp_ns(record: Mapping[str, Any]) -> int:
-    return round(float(record["stamp_s"]) * 1e9)
+    return round(float(record["stamp_s"]) * NANOSECONDS)
 
 
 def _execution_of(record: Mapping[str, Any], sequence: int, stamp_ns: int, skillset: str) -> ExecutionEvent:

@@ -2,7 +2,6 @@
 
 from skill_runtime.local.clock import Timer, VirtualClock, WorldError
 from skill_runtime.local.managers import LocalManagers
-from skill_runtime.local.records import event_record
 from skill_runtime.local.world import LocalClient, LocalWorld
 
 __all__ = [
@@ -12,5 +11,4 @@ __all__ = [
     "Timer",
     "VirtualClock",
     "WorldError",
-    "event_record",
 ]
