@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import graphlib
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
-
+from alula_common.located_yaml import Located, read_yaml
 from ros_bridge.config import ActionRoute, BridgeConfig, Direction, Reliability, ServiceRoute, TopicRoute, World
 from ros_bridge.errors import ConfigError
 from ros_bridge.mapping import TypeRule, TypeRules
@@ -116,7 +115,7 @@ DISCOVER_KEYS: Mapping[str, Reader] = {
     "rename": _mapping(_name, _name),
     "parameters": _flag,
 }
-SECTIONS: Mapping[str, Mapping[str, Reader]] = {"topics": TOPIC_KEYS, "services": SERVICE_KEYS, "actions": SERVICE_KEYS}
+SECTIONS = ("topics", "services", "actions", "discover", "types")
 
 
 def load_config(paths: Iterable[Path], selection: Selection | None = None) -> BridgeConfig:
@@ -125,7 +124,7 @@ def load_config(paths: Iterable[Path], selection: Selection | None = None) -> Br
     Raises:
         ConfigError: A file can't be read, a key or value is wrong, or routes meet each other.
     """
-    configs = [parse_config(_read(path), str(path)) for path in paths]
+    configs = [read_config(path) for path in paths]
     merged = BridgeConfig(
         tuple(route for config in configs for route in config.topics),
         tuple(route for config in configs for route in config.services),
@@ -162,39 +161,16 @@ def merge_selections(selections: Iterable[Selection]) -> Selection:
     )
 
 
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: can't be read: {error}") from error
-
-
-def parse_config(text: str, file: str) -> BridgeConfig:
-    """Read one file's text; ``file`` is its name for messages. Raises ConfigError."""
-    try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise ConfigError(f"{file}:{line}: no YAML: {error.problem}") from error
-    entries: dict[str, list[tuple[int, dict[str, Any]]]] = {section: [] for section in SECTIONS}
-    selection, rules = Selection(), TypeRules()
-    for section, node, line in _pairs(root, file) if root is not None else ():
-        if section == "discover":
-            selection = _selection(_entry(node, DISCOVER_KEYS, file))
-        elif section == "types":
-            rules = _rules(node, file)
-        elif section in SECTIONS:
-            entries[section] = [
-                (item.start_mark.line + 1, _entry(item, SECTIONS[section], file)) for item in _items(section, node, line, file)
-            ]
-        else:
-            raise ConfigError(f"{file}:{line}: unknown key '{section}'; known are {', '.join(SECTIONS)}, discover, types")
+def read_config(path: Path) -> BridgeConfig:
+    """Read one file; raises ConfigError."""
+    root = read_yaml(path, ConfigError)
+    sections = root.record("the configuration", SECTIONS) if root is not None else {}
     return BridgeConfig(
-        tuple(_route(TopicRoute, values, ("direction", "type"), f"{file}:{line}") for line, values in entries["topics"]),
-        tuple(_route(ServiceRoute, values, ("server", "type"), f"{file}:{line}") for line, values in entries["services"]),
-        tuple(_route(ActionRoute, values, ("server", "type"), f"{file}:{line}") for line, values in entries["actions"]),
-        selection,
-        rules,
+        tuple(_route(TopicRoute, item, TOPIC_KEYS, "direction") for item in _items(sections, "topics")),
+        tuple(_route(ServiceRoute, item, SERVICE_KEYS, "server") for item in _items(sections, "services")),
+        tuple(_route(ActionRoute, item, SERVICE_KEYS, "server") for item in _items(sections, "actions")),
+        _selection(_entry(sections["discover"], "'discover'", DISCOVER_KEYS)) if "discover" in sections else Selection(),
+        _rules(sections["types"]) if "types" in sections else TypeRules(),
     )
 
 
@@ -203,65 +179,47 @@ def _selection(values: dict[str, Any]) -> Selection:
     return Selection(include=include, renames=tuple(values.pop("rename", {}).items()), **values)
 
 
-def _rules(node: yaml.Node, file: str) -> TypeRules:
-    packages: dict[str, str] = {}
-    rules = []
-    for key, part, line in _pairs(node, file):
-        if key == "packages":
-            packages = _value(part, _mapping(_package, _package), f"{file}:{line}: packages")
-        elif key in {"messages", "services"}:
-            for item in _items(key, part, line, file):
-                values = _entry(item, RULE_KEYS, file)
-                if not {"ros1", "ros2"} <= values.keys():
-                    raise ConfigError(f"{file}:{item.start_mark.line + 1}: a rule needs 'ros1' and 'ros2', each a type")
-                rules.append(TypeRule(**values))
-        else:
-            raise ConfigError(f"{file}:{line}: unknown key '{key}'; known are packages, messages, services")
-    return TypeRules(packages, rules)
+def _rules(types: Located) -> TypeRules:
+    parts = types.record("'types'", ("packages", "messages", "services"))
+    packages = _value(parts["packages"], "packages", _mapping(_package, _package)) if "packages" in parts else {}
+    return TypeRules(packages, [_rule(item) for key in ("messages", "services") for item in _items(parts, key)])
 
 
-def _items(section: str, node: yaml.Node, line: int, file: str) -> Iterator[yaml.Node]:
-    if not isinstance(node, yaml.SequenceNode):
-        raise ConfigError(f"{file}:{line}: '{section}' has to be a list of entries")
-    yield from node.value
+def _rule(item: Located) -> TypeRule:
+    values = _entry(item, "a rule", RULE_KEYS)
+    if not {"ros1", "ros2"} <= values.keys():
+        raise item.wrong("a rule needs 'ros1' and 'ros2', each a type")
+    return TypeRule(**values)
 
 
-def _pairs(node: yaml.Node, file: str) -> Iterable[tuple[str, yaml.Node, int]]:
-    """Yield a mapping's keys, value nodes and lines; a key that is there twice is an error, not a choice."""
-    if not isinstance(node, yaml.MappingNode):
-        raise ConfigError(f"{file}:{node.start_mark.line + 1}: expected keys and values here, such as 'name: /clock'")
-    seen: set[str] = set()
-    for key, value in node.value:
-        if key.value in seen:
-            raise ConfigError(f"{file}:{key.start_mark.line + 1}: key '{key.value}' is given twice; keep one")
-        seen.add(key.value)
-        yield str(key.value), value, key.start_mark.line + 1
+def _items(parts: Mapping[str, Located], key: str) -> list[Located]:
+    if key not in parts:
+        return []
+    if not parts[key].is_list:
+        raise parts[key].wrong(f"'{key}' has to be a list of entries")
+    return parts[key].elements()
 
 
-def _entry(node: yaml.Node, readers: Mapping[str, Reader], file: str) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for key, value_node, line in _pairs(node, file):
-        if key not in readers:
-            raise ConfigError(f"{file}:{line}: unknown key '{key}'; known are {', '.join(readers)}")
-        values[key] = _value(value_node, readers[key], f"{file}:{line}: {key}")
-    return values
+def _entry(part: Located, what: str, readers: Mapping[str, Reader]) -> dict[str, Any]:
+    return {key: _value(value, key, readers[key]) for key, value in part.record(what, readers).items()}
 
 
-def _value(node: yaml.Node, reader: Reader, place: str) -> Any:
-    value = yaml.SafeLoader("").construct_object(node, deep=True)
+def _value(part: Located, key: str, reader: Reader) -> Any:
+    value = part.value
     try:
         return reader(value)
     except ValueError as expected:
-        raise ConfigError(f"{place}: {value!r} is not {expected}") from None
+        raise part.wrong(f"{key}: {value!r} is not {expected}") from None
 
 
-def _route(kind: type[Route], values: dict[str, Any], required: tuple[str, ...], place: str) -> Route:
+def _route(kind: type[Route], item: Located, readers: Mapping[str, Reader], way: str) -> Route:
+    values = _entry(item, "a route", readers)
     name = values.pop("name", None)
     if name is None and not {"ros1_name", "ros2_name"} <= values.keys():
-        raise ConfigError(f"{place}: no name; give 'name', or 'ros1_name' and 'ros2_name'")
-    for key in required:
+        raise item.wrong("no name; give 'name', or 'ros1_name' and 'ros2_name'")
+    for key in (way, "type"):
         if key not in values:
-            raise ConfigError(f"{place}: '{key}' is missing for {name or values['ros1_name']}")
+            raise item.wrong(f"'{key}' is missing for {name or values['ros1_name']}")
     values.setdefault("ros1_name", name)
     values.setdefault("ros2_name", name)
     values["type_name"] = values.pop("type")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
+from alula_common.files import write_json
 from ros_bridge import actions, services, topics
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types
@@ -27,7 +28,6 @@ from ros_bridge.parameters import ParameterMirror
 from ros_bridge.plane import Plane
 from ros_bridge.routes import Context, Maker, RouteTable
 from ros_bridge.spinning import spin
-from ros_bridge.stats import write_json
 from ros_bridge.tables import SECTION_OF, Rates, live_table, render, summary
 
 if TYPE_CHECKING:

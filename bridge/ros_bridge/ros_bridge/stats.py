@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 # Durations fall into bins that grow by 5 %: any percentile of a run of any length, to 5 %, in constant memory.
 BIN_GROWTH = 1.05
@@ -103,10 +100,3 @@ class RouteStats:
                 p95_ms=self._durations.percentile_ms(0.95),
                 errors=self.errors,
             )
-
-
-def write_json(path: Path, content: object) -> None:
-    """Write a JSON file so that a reader sees the old one or the new one, never a part."""
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
-    aside.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    aside.replace(path)

@@ -1,13 +1,28 @@
 """Configuration errors name file, line, value and remedy; routes can't meet or go round in circles."""
 
 import re
+from pathlib import Path
 
 import pytest
 
 from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World
-from ros_bridge.config_file import load_config, parse_config
+from ros_bridge.config_file import load_config, read_config
 from ros_bridge.errors import ConfigError
 from ros_bridge.selection import Selection
+
+
+@pytest.fixture
+def parsed(tmp_path, monkeypatch):
+    """Return a function that reads a text as the file ``b.yaml``."""
+    monkeypatch.chdir(tmp_path)
+
+    def parse(text):
+        path = Path("b.yaml")
+        path.write_text(text)
+        return read_config(path)
+
+    return parse
+
 
 GOOD = """
 topics:
@@ -24,8 +39,8 @@ services:
 """
 
 
-def test_reads_all_keys_and_defaults():
-    config = parse_config(GOOD, "b.yaml")
+def test_reads_all_keys_and_defaults(parsed):
+    config = parsed(GOOD)
     assert config.topics == (
         TopicRoute("/clock", "/clock", Direction.ROS1_TO_ROS2, "rosgraph_msgs/Clock", latched=False, depth=10),
         TopicRoute("/old", "/new", Direction.ROS2_TO_ROS1, "std_msgs/String", latched=True, depth=1, reliability=Reliability.BEST_EFFORT),
@@ -51,8 +66,8 @@ types:
 """
 
 
-def test_reads_what_to_discover_and_how_types_map():
-    config = parse_config(DISCOVERED, "b.yaml")
+def test_reads_what_to_discover_and_how_types_map(parsed):
+    config = parsed(DISCOVERED)
     assert config.selection == Selection(
         ("/camera/*", "*"), ("/secret", "*/raw"), "", "/ros1", (("/old", "/new"), ("/clock", "/clock")), parameters=False
     )
@@ -75,31 +90,31 @@ def test_files_and_command_line_are_one_selection(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("discover: {al: true}", "b.yaml:1: unknown key 'al'"),
+        ("discover: {al: true}", "b.yaml:1: 'discover' has no `al`; it may have all, include"),
         ("discover:\n  include: /camera", "b.yaml:2: include: '/camera' is not a list of patterns"),
         ("discover: {rename: {a: /b}}", "is not an absolute ROS name"),
-        ("types: {package: {}}", "b.yaml:1: unknown key 'package'; known are packages, messages, services"),
+        ("types: {package: {}}", "b.yaml:1: 'types' has no `package`; it may have packages, messages, services"),
         ("types: {packages: [a]}", "packages: \\['a'\\] is not keys and values"),
         ("types:\n  messages:\n    - {ros1: a/B}", "b.yaml:3: a rule needs 'ros1' and 'ros2'"),
         ("types:\n  messages:\n    - {ros1: a/B, ros2: a/B, fields: {'a b': c}}", "b.yaml:3: fields: .* is not a field's name"),
     ],
 )
-def test_errors_of_discovery_and_types_name_their_place(text, words):
+def test_errors_of_discovery_and_types_name_their_place(parsed, text, words):
     with pytest.raises(ConfigError, match=words):
-        parse_config(text, "b.yaml")
+        parsed(text)
 
 
-def test_empty_file_is_an_empty_configuration():
-    assert parse_config("", "b.yaml").topics == ()
+def test_empty_file_is_an_empty_configuration(parsed):
+    assert parsed("").topics == ()
 
 
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("topcis: []", 1, ["unknown key 'topcis'", "topics, services, actions, discover, types"]),
+        ("topcis: []", 1, ["the configuration has no `topcis`", "topics, services, actions, discover, types"]),
         ("topics: 3", 1, ["'topics' has to be a list"]),
-        ("topics:\n  - /clock", 2, ["expected keys and values"]),
-        ("topics:\n  - name: /a\n    directoin: x", 3, ["unknown key 'directoin'", "direction"]),
+        ("topics:\n  - /clock", 2, ["should be a mapping"]),
+        ("topics:\n  - name: /a\n    directoin: x", 3, ["a route has no `directoin`", "did you mean", "direction"]),
         ("topics:\n  - {name: /a, direction: up, type: a/B}", 2, ["'up' is not one of ros1_to_ros2, ros2_to_ros1"]),
         ("topics:\n  - {name: a, direction: ros1_to_ros2, type: a/B}", 2, ["'a' is not an absolute ROS name"]),
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/msg/B}", 2, ["'a/msg/B' is not a type in ROS 1's form"]),
@@ -108,16 +123,16 @@ def test_empty_file_is_an_empty_configuration():
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B,\n     depth: 0}", 3, ["depth: 0 is not a number of messages"]),
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B, depth: true}", 2, ["depth: True is not"]),
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B, latched: 1}", 2, ["latched: 1 is not true or false"]),
-        ("topics:\n  - {name: /a, name: /b}", 2, ["'name' is given twice"]),
+        ("topics:\n  - {name: /a, name: /b}", 2, ["`name` is there twice"]),
         ("services:\n  - {name: /a, server: ros3, type: a/B}", 2, ["'ros3' is not one of ros1, ros2"]),
         ("services:\n  - {name: /a, server: ros1, type: a/B, timeout_s: -1}", 2, ["timeout_s: -1 is not a number of seconds"]),
-        ("services:\n  - {name: /a, server: ros1, type: a/B, depth: 1}", 2, ["unknown key 'depth'"]),
-        ("topics: [", 1, ["no YAML"]),
+        ("services:\n  - {name: /a, server: ros1, type: a/B, depth: 1}", 2, ["a route has no `depth`"]),
+        ("topics: [", 1, ["is no YAML"]),
     ],
 )
-def test_errors_name_place_value_and_remedy(text, line, words):
+def test_errors_name_place_value_and_remedy(parsed, text, line, words):
     with pytest.raises(ConfigError, match=re.escape(f"b.yaml:{line}: ")) as caught:
-        parse_config(text, "b.yaml")
+        parsed(text)
     for word in words:
         assert word in str(caught.value)
 

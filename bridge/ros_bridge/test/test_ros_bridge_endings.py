@@ -66,7 +66,7 @@ def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path
 
 def test_wrong_configuration_ends_with_2_and_wrong_type_with_1(master, ros2_domain, tmp_path):
     for config, code, words in [
-        ("topics:\n  - {nmae: /a}", 2, "bridge.yaml:2: unknown key 'nmae'"),
+        ("topics:\n  - {nmae: /a}", 2, "bridge.yaml:2: a route has no `nmae`"),
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: no_msgs/No}", 1, "no_msgs/No"),
     ]:
         process = BridgeProcess(master, tmp_path / str(code), config)
