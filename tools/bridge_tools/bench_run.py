@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+import psutil
+
 from alula_common.network import free_port
 from bridge_tools.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
 from ros_bridge.errors import BridgeError
@@ -24,7 +26,6 @@ from ros_bridge.master import Connection, wait_for_master
 
 WITHIN_S = 60.0
 DRAINED_S = 1.0
-TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 ENDS = Path(__file__).resolve().parent / "bench_ends"
 
@@ -102,9 +103,9 @@ class Usage:
 
 def usage(pid: int) -> Usage:
     """Return what a process has taken so far."""
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
-    return Usage((int(fields[11]) + int(fields[12])) / TICKS_A_SECOND, int(status.split("VmHWM:")[1].split()[0]) / 1024)
+    times = psutil.Process(pid).cpu_times()
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")  # psutil does not tell the peak
+    return Usage(times.user + times.system, int(status.split("VmHWM:")[1].split()[0]) / 1024)
 
 
 class Bench:

@@ -17,8 +17,9 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
+
+import psutil
 
 from bridge_tools.hostile import LENGTH, WITHIN_S, HostilePublisher, master, open_ports
 from ros_bridge.tcpros import encode_header
@@ -56,7 +57,7 @@ class FuzzFigures:
 
 def memory_mb(pid: int) -> float:
     """Return a process's resident memory."""
-    return int(Path(f"/proc/{pid}/status").read_text(encoding="utf-8").split("VmRSS:")[1].split()[0]) / 1024
+    return float(psutil.Process(pid).memory_info().rss) / (1 << 20)
 
 
 def mutated(data: bytes, dice: random.Random) -> bytes:
@@ -143,7 +144,7 @@ class Fuzzer:
         before_mb = 0.0
         throws: list[Callable[[], None]] = [self._publish, self._knock, self._knock, self._knock]
         throws += [self._call] * 3 if self._service else []
-        while (elapsed_s := time.monotonic() - start_s) < seconds and Path(f"/proc/{self.pid}").exists():
+        while (elapsed_s := time.monotonic() - start_s) < seconds and psutil.pid_exists(self.pid):
             if not before_mb and elapsed_s > min(1.0, seconds / 2):
                 before_mb = memory_mb(self.pid)
             self._dice.choice(throws)()

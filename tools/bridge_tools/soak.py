@@ -24,6 +24,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from alula_common.network import free_port
 from bridge_tools import two_worlds
 from bridge_tools.fuzz import memory_mb
@@ -235,7 +237,7 @@ class Ends:
 
 def open_files(pid: int) -> int:
     """Return how many files and sockets a process has open."""
-    return len(list(Path(f"/proc/{pid}/fd").iterdir()))
+    return int(psutil.Process(pid).num_fds())
 
 
 class Soak:
