@@ -384,3 +384,9 @@ def test_closing_a_client_ends_its_waits_and_leaves_the_skill_alone(managers, ro
     assert not waiting.is_alive()
     assert handle.message == "this client was closed"
     assert execution.state is S.RUNNING
+    navigation = uav.navigation
+    assert navigation.takeoff(height=5.0, speed=1.0).get(SOON_S).state is S.FAILED
+    assert (navigation.data.guidance_state.value, navigation.data.guidance_state.stale) == (None, True)
+    for answer in (navigation.flight_status.transition("IN_AIR"), navigation.takeoff.why(), navigation.client.interrupt_all("takeoff")):
+        with pytest.raises(NoAnswerError, match="this client was closed"):
+            answer.get(SOON_S)

@@ -150,7 +150,9 @@ class Client:
     def interrupt_all(self, skill: str) -> Pending[int]:
         """Ask for the end of all executions of a skill, whoever asked for them; the answer is how many there were."""
         self._check_skill(skill)
-        pending = self.moment()
+        pending = self._open_question()
+        if pending.done:
+            return pending
         known = self._news.skills.get(skill, SkillRecord())
         counted = lambda count: pending.resolve(len(known.open) if count is None else count)  # noqa: E731
         self._connection.links[skill].cancel_all(counted, pending.fail)
@@ -214,12 +216,18 @@ class Client:
         once: bool = False,
     ) -> Pending[Any]:
         """Ask; ``answer(reply, tries)`` makes the answer. Never waits."""
-        pending = self.moment()
-        if self._news.closed or self._connection.gone:
-            pending.fail(self._news.closed or self._not_there())
+        pending = self._open_question()
+        if pending.done:
             return pending
         settle = lambda reply, tries: pending.resolve(answer(reply, tries))  # noqa: E731
         self._middleware.call(service, request, settle, pending.fail, timeout_s=timeout_s, once=once)
+        return pending
+
+    def _open_question(self) -> Pending[Any]:
+        """Return an answer to wait for; it has failed already where nobody can give one."""
+        pending = self.moment()
+        if self._news.closed or self._connection.gone:
+            pending.fail(self._news.closed or self._not_there())
         return pending
 
     def _goal(self, skill: str, inputs: Mapping[str, object]) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.handle import SkillHandle
-from skill_runtime.middleware import ActionLink, Ending, Middleware
+from skill_runtime.middleware import ActionLink, Ending, Middleware, Timer
 from skill_runtime.waiting import Pending
 
 ACKNOWLEDGE_S = 5.0
@@ -68,18 +68,21 @@ class GoalTracker:
         self._end: tuple[int, Ending] | None = None
         self._looks = 0
         self._heard = news.heard
-        self._timer = middleware.later(ACKNOWLEDGE_S, self._look)
+        self._timer: Timer | None = None
         self._feedback: tuple[float, Mapping[str, object]] = (0.0, {})
 
     def send(self, goal: Any) -> None:
-        """Send the goal."""
+        """Send the goal; all that is to be noted about it comes afterwards."""
         self.link.send(self.handle.id, goal, self._on_answer)
+        with self._lock:
+            if not self._acknowledged and not self.handle.done:
+                self._timer = self._middleware.later(ACKNOWLEDGE_S, self._look)
 
     def on_event(self, event: ExecutionEvent, life: str, after: int) -> None:
         """Take an event of this execution; its end is told when the resources are known as they were after event ``after``."""
         self.life = life
         self._acknowledge()
-        self._timer.cancel()
+        self._cancel_timer()
         if not event.state.terminal:
             if event.state is not ExecutionState.REQUESTED:
                 self.handle.enter(event.state)
@@ -104,7 +107,7 @@ class GoalTracker:
         elif self._end is None and not self.handle.done:
             self._acknowledge()
             self._end = (2**63, ending)
-            self._timer.cancel()
+            self._cancel_timer()
             self._timer = self._middleware.later(GRACE_S, self._finish)
 
     def settle(self) -> None:
@@ -117,7 +120,7 @@ class GoalTracker:
         if self._end is not None:
             self._finish()
             return
-        self._timer.cancel()
+        self._cancel_timer()
         self._on_over(self, orphan)
         self.handle.fail(reason)
 
@@ -134,7 +137,7 @@ class GoalTracker:
             first, self._acknowledged = not self._acknowledged, True
             cancel = first and self._interrupt_wanted
         if first and not self.handle.done:
-            self._timer.cancel()
+            self._cancel_timer()
             self._timer = self._middleware.later(SILENCE_S, self._look)
         if cancel:
             self.link.cancel(self.handle.id)
@@ -163,10 +166,14 @@ class GoalTracker:
         else:
             self.abandon(f"the managers of {self._skillset} did not answer within {self._looks * ACKNOWLEDGE_S:g} s", orphan=True)
 
+    def _cancel_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+
     def _finish(self) -> None:
         if self._end is None or self.handle.done:
             return
-        self._timer.cancel()
+        self._cancel_timer()
         ending = self._end[1]
         self._on_over(self, False)
         self.handle.end(ending.state, ending.result, ending.message, ending.outputs)

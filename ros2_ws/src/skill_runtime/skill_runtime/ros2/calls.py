@@ -11,7 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from skill_runtime.middleware import Job, OnError, OnReply, Timer
@@ -33,7 +33,7 @@ class _Call:
     on_error: OnError
     timeout_s: float
     once: bool
-    begun_s: float = field(default_factory=time.monotonic)
+    begun_s: float
     asked_s: float = 0.0
     tries: int = 0
     over: bool = False
@@ -68,7 +68,7 @@ class Calls:
         with self._lock:
             full = len(self._waiting) >= QUEUE
             if not full and not self._closed:
-                self._waiting.append(_Call(request, on_reply, on_error, timeout_s, once))
+                self._waiting.append(_Call(request, on_reply, on_error, timeout_s, once, time.monotonic()))
         if full or self._closed:
             why = f"{QUEUE} requests wait for it already" if full else "this client was closed"
             on_error(f"service {self._client.srv_name}: {why}")

@@ -83,12 +83,14 @@ class RclpyMiddleware:
         self._workers = Workers(f"{skillset}_hooks", self.log)
         self._calls: dict[str, Calls] = {}
         self._closed = False
+        self._ended_ns = 0
+        """When this was closed, mission clock: the node may be destroyed afterwards."""
 
     # --- the loop ----------------------------------------------------------------------------------------------------
 
     def now_ns(self) -> int:
         """Return the mission clock."""
-        return int(self.node.get_clock().now().nanoseconds)
+        return self._ended_ns or int(self.node.get_clock().now().nanoseconds)
 
     def at(self, when_ns: int, job: Job) -> Alarm:
         """Have a job done at a moment of the mission clock."""
@@ -162,6 +164,8 @@ class RclpyMiddleware:
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; the type of a data is asked of the graph where it is not known."""
+        if self._closed:
+            return lambda: False
         if topic.name in TOPICS:
             codec = TOPICS[topic.name]
             self._listen(self.name(topic.name), codec.kind, lambda message: callback(codec.decode(message)), latched(topic.keep))
@@ -339,6 +343,7 @@ class RclpyMiddleware:
 
     def close(self) -> None:
         """Ask nothing more; the node's owner destroys what is on it."""
+        self._ended_ns = self.now_ns()
         self._closed = True
         for calls in list(self._calls.values()):
             calls.close()
