@@ -184,6 +184,7 @@ def test_what_was_given_up_with_managers_that_were_only_frozen_is_cancelled(grap
     assert graph.link.cancelled == []
     graph.sign("one")
     assert graph.link.cancelled == [handle.id]
+    assert (client.ready, client.resources) == (True, {"sdk": "AVAILABLE"})
 
 
 def test_nothing_is_cancelled_at_managers_that_are_others(graph, client):

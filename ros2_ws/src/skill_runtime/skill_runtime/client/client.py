@@ -77,12 +77,12 @@ class Client:
     @property
     def resources(self) -> dict[str, str]:
         """Return the state of every resource by name; empty until the managers were heard, and when they have gone."""
-        return dict(self._news.resources)
+        return {} if self._connection.gone else dict(self._news.resources)
 
     @property
     def skills(self) -> dict[str, SkillRecord]:
         """Return what runs of every skill, and what ended last; empty until the managers were heard, and when they have gone."""
-        return dict(self._news.skills)
+        return {} if self._connection.gone else dict(self._news.skills)
 
     def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
         """Return how the skill's last execution ended, whoever asked for it and whenever; None when none has.

@@ -182,8 +182,6 @@ class ClientNews:
                 tracker.abandon(f"the managers of {self.skillset} were started anew and do not know this execution")
 
     def _on_gone(self) -> None:
-        self.resources, self.skills = {}, {}
-        self.states_after = -1
         self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life", orphans=True)
 
     def _cancel_orphans(self) -> None:
