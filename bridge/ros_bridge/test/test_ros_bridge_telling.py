@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from ros_bridge_harness import Master, wait_until
 from ros_bridge_nodes import BEST_EFFORT
 from std_msgs.msg import String
@@ -40,6 +40,24 @@ def test_diagnostics_tell_every_route_in_both_worlds(ros1, ros2_node, bridge):
     while b"ros_bridge: topic /d/told" not in bytes.fromhex(ros1.expect("message", topic="/diagnostics")["hex"]):
         pass
     wait_until(lambda: json.loads(bridge.stats_file.read_text())["topics"].get("/d/told", {}).get("count") == 1, "the file has it")
+
+
+def test_a_topic_that_the_bridge_publishes_itself_crosses_beside_its_own_messages(ros1, ros2_node, bridge):
+    """The bridge's node has two publishers of /diagnostics in ROS 1 then: a subscriber that was there before the second one hears both."""
+    ros1.do("subscribe", topic="/diagnostics", type="diagnostic_msgs/DiagnosticArray")
+    ros1.expect("message", topic="/diagnostics")
+    publisher = ros2_node.publisher("/diagnostics", DiagnosticArray)
+    foreign = DiagnosticArray(status=[DiagnosticStatus(name="motor 7")])
+
+    def both_arrive():
+        publisher.publish(foreign)
+        heard = [line for line in ros1.lines if "/diagnostics" in line]
+        return any(b"motor 7".hex() in line for line in heard)
+
+    ros2_node.until(both_arrive, "what a ROS 2 node says arrives")
+    ros2_node.node.destroy_publisher(publisher)
+    while b"ros_bridge: " not in bytes.fromhex(ros1.expect("message", topic="/diagnostics")["hex"]):
+        pass  # and the bridge goes on with its own
 
 
 def bridge_command(*arguments):
