@@ -7,14 +7,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 from alula_flight.deaths import read_deaths
-from alula_flight.report.files import mapping
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, TransitionEvent, read_event
 
+DEPARTURE = ("flight_status", "ON_GROUND")  # lift-off is when this resource leaves this state first
 
-def event_line(event: EngineEvent) -> str | None:
-    """Return what a person wants to read of one event, or None where it is not worth a line."""
-    stamp = f"t={event.stamp_s:6.1f} s"
+
+def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: float = 0.0) -> str | None:
+    """Return what a person wants to read of one event, or None where it is not worth a line.
+
+    Times count from lift-off; before it, and marked so, from ``begun_s``: no matter where the mission clock begins to count.
+    """
+    stamp = f"start+{event.stamp_s - begun_s:4.1f} s" if lift_off_s is None else f"t={event.stamp_s - lift_off_s:6.1f} s"
     if isinstance(event, TransitionEvent):
         return f"{stamp}  {event.skillset}.{event.resource}: {event.from_state} -> {event.to_state}"
     if event.state is ExecutionState.REQUESTED:
@@ -31,6 +35,8 @@ class LiveEvents:
         self._events = out / "events.jsonl"
         self._deaths = out / "deaths.jsonl"
         self._say = say
+        self._begun_s: float | None = None
+        self._lift_off_s: float | None = None
         self._offset = 0
         self._deaths_shown = 0
 
@@ -51,8 +57,14 @@ class LiveEvents:
 
     def _show(self, line: bytes) -> None:
         try:
-            text = event_line(read_event(mapping(json.loads(line))))
+            record = json.loads(line)
+            event = read_event(record if isinstance(record, dict) else {})
         except ValueError:
             return  # the report names unreadable lines
+        if self._begun_s is None:
+            self._begun_s = event.stamp_s
+        if self._lift_off_s is None and isinstance(event, TransitionEvent) and (event.resource, event.from_state) == DEPARTURE:
+            self._lift_off_s = event.stamp_s
+        text = event_line(event, self._lift_off_s, self._begun_s)
         if text is not None:
             self._say(text)

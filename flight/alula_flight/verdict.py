@@ -24,12 +24,17 @@ def number(value: float | None, unit: str, digits: int = 2) -> str:
     return "unknown" if value is None else f"{value:.{digits}f} {unit}".rstrip()
 
 
+def landed(summary: Mapping[str, Any]) -> str:
+    """Return whether it came down, in words; nothing is said of what is not known to have flown."""
+    return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
+
+
 def flight_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight through a world was."""
     chart = summary.get("map") or {}
     coverage = chart.get("coverage")
     return [
-        f"  landed: {'yes' if summary.get('landed') else 'no'}, duration {number(summary.get('duration_s'), 's', 1)}, "
+        f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}, "
         f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {summary.get('collisions')}, "
         f"nearest surface {number(summary.get('min_clearance_m'), 'm')}",
         f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
@@ -41,7 +46,7 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight over mocks was; there is no world to collide with or to map."""
     mock = summary["mock"]
     return [
-        f"  landed: {'yes' if summary.get('landed') else 'no'}, duration {number(summary.get('duration_s'), 's', 1)}; "
+        f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}; "
         f"flown over mocks in {number(mock.get('wall_s'), 's')}, {number(mock.get('factor'), 'times faster than the clock', 0)}"
     ]
 

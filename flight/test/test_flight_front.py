@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -223,6 +224,18 @@ def test_live_lines_wait_for_whole_lines(tmp_path):
     live.show_new()
     assert len(said) == 2
     assert "navigation.goto" in said[0]
+
+
+def test_live_lines_count_from_lift_off_on_any_clock(tmp_path):
+    said: list[str] = []
+    live = LiveEvents(tmp_path, said.append)
+    epoch_s = 1_900_000_000.0  # a mission clock that is the wall clock
+    record = {"skillset": "navigation", "kind": "EXECUTION", "skill": "takeoff", "id": "1", "state": "RUNNING"}
+    change = {"skillset": "navigation", "kind": "TRANSITION", "resource": "flight_status", "from_state": "ON_GROUND", "to_state": "IN_AIR"}
+    stamps = (0.0, record), (2.5, record), (5.0, change), (35.0, record)
+    (tmp_path / "events.jsonl").write_text("".join(json.dumps({**what, "stamp_s": epoch_s + s, "cause": ""}) + "\n" for s, what in stamps))
+    live.show_new()
+    assert [line.partition("  navigation")[0] for line in said] == ["start+ 0.0 s", "start+ 2.5 s", "t=   0.0 s", "t=  30.0 s"]
 
 
 def test_event_line_tells_transitions_and_hides_requests():

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from alula_flight.report import RunFacts, make_report
+from alula_flight.verdict import verdict_lines
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, Log, failing_flight, write_bag, write_map, write_world
@@ -302,6 +303,18 @@ def test_nominal_has_no_recovery(tmp_path):
     assert summary["recovery"] is None
     assert json.loads((tmp_path / "summary.json").read_text())["skills"][0]["inputs"] == {"speed": None}
     assert "failed or refused" in (tmp_path / "timeline.svg").read_text()
+
+
+def test_nothing_is_said_to_have_landed_that_never_flew(folder):
+    t_s, position = poses()
+    ground = position * 0.0
+    (folder / "events.jsonl").write_text("")
+    states = [{"t_s": t, "reference": "idle", "landed_state": 1} for t in t_s]
+    state = {"lift_off_s": None, "collisions": 0, "min_clearance_m": None, "distance_m": 0.0, "faults": []}
+    write_bag(folder / "functional.bag", poses=(t_s, ground), states=[state], guidance=states)
+    summary = make_report(facts(folder, faults=[], mission_exit=2))
+    assert summary["landed"] is None
+    assert "landed: no lift-off is known" in "\n".join(verdict_lines(summary, [], folder))
 
 
 def test_a_vehicle_that_lies_is_not_believed(folder):

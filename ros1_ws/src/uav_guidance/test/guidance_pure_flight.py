@@ -24,6 +24,7 @@ class PureFlight:
         self.guidance = Guidance(settings or Settings())
         self.setpoints: list[tuple[float, Setpoint]] = []
         self.cut = False
+        self.withheld: set[str] = set()
         self._next_step_s = self.now_s
         self.vehicle.hear(heartbeat_message())
         self.ask_streams()
@@ -96,7 +97,7 @@ class PureFlight:
         return self.ask(PositionRequest(Vec3(x, y, z), speed, along))
 
     def _receive(self, message: object) -> None:
-        if self.cut:
+        if self.cut or message.get_type() in self.withheld:
             return
         if message.get_type() == "STATUSTEXT":
             self.guidance.on_text(message.severity, message.text if isinstance(message.text, str) else message.text.decode())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from guidance_fake_autopilot import GUIDED, LAND, LOITER
@@ -47,6 +48,55 @@ def test_guided_is_taken_once_when_the_vehicle_is_ready(flight):
     flight.run(5.0)
     assert flight.commands == [(MODE, 1.0, GUIDED, 0.0)]
     assert flight.guidance.resources() == {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND", "homepoint_status": "VALID"}
+
+
+def test_the_authority_is_of_use_once_there_is_a_position(flight):
+    flight.withheld = {"LOCAL_POSITION_NED"}
+    flight.until(lambda r: r.authority, 5.0)
+    flight.run(10.0)
+    assert flight.guidance.resources()["SDK_authority"] == "UNAVAILABLE"
+    flight.withheld = set()
+    flight.run(0.2)
+    assert flight.guidance.resources()["SDK_authority"] == "AVAILABLE"
+
+
+def test_checks_that_fail_again_on_the_ground_take_nothing_away(flight):
+    flight.until(lambda r: r.authority and r.vehicle.ready)
+    flight.run(0.2)
+    flight.guidance.vehicle = replace(flight.guidance.vehicle, ready=False)
+    flight.withheld = {"SYS_STATUS"}
+    flight.run(1.0)
+    assert flight.guidance.resources()["SDK_authority"] == "AVAILABLE"
+
+
+def test_life_is_any_message(flying):
+    flying.withheld = {"HEARTBEAT"}
+    flying.run(5.0)
+    assert flying.report.link
+    assert flying.report.authority
+    flying.cut = True
+    lost_s = flying.until(lambda r: not r.link, 4.0)
+    assert lost_s == pytest.approx(Settings().link_lost_s, abs=0.1)
+
+
+def test_a_link_lost_is_told_from_a_take_over(flying, caplog):
+    flying.vehicle.pilot(LOITER)
+    flying.until(lambda r: not r.authority, 2.0)
+    assert "the vehicle is in LOITER: the pilot or a failsafe has it" in flying.ask(HoverRequest()).reason
+    flying.vehicle.pilot(GUIDED)
+    flying.until(lambda r: r.authority, 2.0)
+    flying.cut = True
+    flying.until(lambda r: not r.authority, 4.0)
+    assert "the link is lost, nothing was heard of the autopilot for 2." in flying.ask(HoverRequest()).reason
+    assert [record.getMessage().split(":")[0] for record in caplog.records] == ["authority lost"] * 2
+
+
+def test_spooling_up_is_no_lack_of_progress(flight):
+    flight.until(lambda r: r.authority and r.vehicle.ready)
+    assert flight.agreed(TakeoffRequest(3.0, 1.5)).accepted
+    flight.until(lambda r: r.vehicle.landed == 3, 6.0)
+    flight.run(0.1)
+    assert flight.report.course.still_s < 0.2
 
 
 def test_a_guidance_started_again_in_flight_reports_nothing_before_it_knows(flying):

@@ -13,6 +13,9 @@ from py_trees.common import Status
 from skill_missions.blackboard import Blackboard
 from skill_missions.treeview import NodeView, TreeWatch
 
+START_TIMEOUT_S = 90.0
+"""An autopilot that was just switched on has a position after 42 s, sometimes later."""
+
 
 class Outcome(Enum):
     """How a mission can be, in ``mission.json``."""
@@ -72,7 +75,7 @@ class Mission(Protocol):
 class Director:
     """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event."""
 
-    def __init__(self, mission: Mission, blackboard: Blackboard, *, start_timeout_s: float = 60.0) -> None:
+    def __init__(self, mission: Mission, blackboard: Blackboard, *, start_timeout_s: float = START_TIMEOUT_S) -> None:
         self.end: End | None = None
         self.start_s: float | None = None
         self._mission = mission

@@ -22,7 +22,7 @@ from skillset_interfaces.msg import Event
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
-from skill_missions.director import EXIT_CODES, Director, End, Outcome
+from skill_missions.director import EXIT_CODES, START_TIMEOUT_S, Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
 from skill_missions.skillset import WakingClient
@@ -93,7 +93,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         clock_ns = lambda: int(self.get_clock().now().nanoseconds)  # noqa: E731
         values = {name: self._parameter(name, value) for name, value in self._plan.parameters.items()}
         mission, blackboard = self._plan.make(self._skillsets, clock_ns, values)
-        return Director(mission, blackboard, start_timeout_s=self._parameter("start_timeout_s", 60.0))
+        return Director(mission, blackboard, start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S))
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value

@@ -231,7 +231,7 @@ def unmet_conditions(clients: Clients) -> list[str]:
     navigation, perception = clients.navigation.resources, clients.perception.resources
     unmet = [f"the skillset {client.skillset} can't be called" for client in vars(clients).values() if not client.ready]
     if navigation.get("SDK_authority") != "AVAILABLE":
-        unmet.append("the autopilot is not ours to command (SDK_authority)")
+        unmet.append("the autopilot is not ready, or not ours to command (SDK_authority)")
     if navigation.get("homepoint_status") != "VALID":
         unmet.append("the home point is not valid")
     if navigation.get("flight_status") != "ON_GROUND":

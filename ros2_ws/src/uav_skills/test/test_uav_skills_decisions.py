@@ -42,6 +42,9 @@ class State:
         ({"still_s": 5.1}, "BLOCKED"),
         ({"still_s": 5.1, "drift_m": 2.1}, "ABORTED"),
         ({"vertical_to_go_m": 0.1, "still_s": 9.0, "drift_m": 9.0}, "AT_ALTITUDE"),
+        ({"still_s": 9.0, "landed_state": ON_GROUND}, None),
+        ({"still_s": 12.1, "landed_state": ON_GROUND}, "BLOCKED"),
+        ({"still_s": 5.1, "landed_state": 3}, "BLOCKED"),
     ],
 )
 def test_takeoff(change, result):

@@ -48,6 +48,7 @@ class Thresholds:
     goto_drift_m: float = 3.0
     heading_rad: float = 0.06
     blocked_s: float = 5.0
+    spool_up_s: float = 12.0
     landing_blocked_s: float = 15.0
     reference_lost_s: float = 3.0
     silence_s: float = 2.0
@@ -77,6 +78,8 @@ def decide_takeoff(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLD
     """End a take-off: AT_ALTITUDE, ABORTED by drift, or BLOCKED (paper, Listing 4)."""
     if state.landed_state == IN_AIR and abs(state.vertical_to_go_m) < limits.altitude_m:
         return Verdict("AT_ALTITUDE")
+    if state.landed_state == ON_GROUND and state.still_s <= limits.spool_up_s:
+        return None  # arming and spooling up take 4 s, more on a busy machine
     return _drifted(state, limits.takeoff_drift_m) or _blocked(state, limits)
 
 

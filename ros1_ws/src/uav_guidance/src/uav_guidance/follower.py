@@ -56,7 +56,7 @@ class Follower:
         self._still = StillWatch(reached_m=settings.reached_m, reached_rad=settings.reached_rad)
         self._still_s = 0.0
         self._blocked = False
-        self._seen_armed = False
+        self._seen_armed = self._was_off_ground = False
         self._last_step_s: float | None = None
         self._last_setpoint_s = -math.inf
 
@@ -88,6 +88,9 @@ class Follower:
         dt_s = 0.0 if self._last_step_s is None else min(max(now_s - self._last_step_s, 0.0), LONGEST_STEP_S)
         self._last_step_s = now_s
         self._seen_armed |= vehicle.armed
+        if vehicle.off_ground and not self._was_off_ground:
+            self._still.restart(now_s)  # spooling the motors up is no lack of progress
+        self._was_off_ground = vehicle.off_ground
         if vehicle.on_ground and not vehicle.armed:
             self.obstacles.forget_sensors()
         setpoint = self._follow(vehicle, now_s, dt_s) if commanded else None

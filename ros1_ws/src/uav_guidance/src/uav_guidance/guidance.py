@@ -5,6 +5,7 @@ Everything is in `map` (ENU, metres), times are seconds of the mission clock. No
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,8 @@ from uav_guidance.settings import Settings
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, Vehicle, mode_name, updated
 
+log = logging.getLogger(__name__)
+
 PREARM_PREFIX = "PreArm: "
 
 
@@ -57,6 +60,8 @@ class Guidance:
         self.vehicle = Vehicle()
         self._settings = settings
         self._authority = Authority()
+        self._heard_s: float | None = None
+        self._been_ready = False
         self._begun_s: float | None = None
         self._introduced = False
         self._follower = Follower(settings)
@@ -78,6 +83,7 @@ class Guidance:
     def on_message(self, message: Any, now_s: float) -> None:
         """Take a MAVLink message of the autopilot."""
         kind = message.get_type()
+        self._heard_s = now_s
         if kind == "COMMAND_ACK":
             if self._procedure is not None:
                 self._procedure.on_answer(message.command, message.result, now_s)
@@ -126,20 +132,21 @@ class Guidance:
         return [item for item in (command, setpoint) if item is not None]
 
     def link(self, now_s: float) -> bool:
-        """Return whether the autopilot's heartbeats arrive."""
-        heard_s = self.vehicle.heartbeat_s
-        return heard_s is not None and abs(now_s - heard_s) <= self._settings.link_lost_s
+        """Return whether anything arrives from the autopilot; heartbeats alone may be seconds apart on a busy machine."""
+        known = self._heard_s is not None and self.vehicle.heartbeat_s is not None
+        return known and abs(now_s - (self._heard_s or 0.0)) <= self._settings.link_lost_s
 
     def resources(self) -> dict[str, str]:
         """Return the states of navigation's resources that the hardware decides; what is not known is left out.
 
-        Nothing is known before the vehicle has introduced itself: a guidance that was started again in flight must not take away from
-        the skills what they rightly have, only because it has not heard of it yet.
+        The authority is of use once the autopilot can fly: with a position, and its checks passed, or armed already. It is not taken
+        away when these checks fail again on the ground. Nothing is known before the vehicle has introduced itself: a guidance that was
+        started again in flight must not take away from the skills what they rightly have, only because it has not heard of it yet.
         """
         if not self._introduced:
             return {}
         states = {
-            "SDK_authority": "AVAILABLE" if self._authority.held else "UNAVAILABLE",
+            "SDK_authority": "AVAILABLE" if self._authority.held and self._been_ready else "UNAVAILABLE",
             "homepoint_status": "VALID" if self.vehicle.home is not None else "INVALID",
         }
         if self.vehicle.landed is not Landed.UNDEFINED:
@@ -159,7 +166,7 @@ class Guidance:
     # ---- requests ------------------------------------------------------------------------------------------------------
 
     def _take_off(self, request: TakeoffRequest, now_s: float) -> Decision:
-        self._require_authority()
+        self._require_authority(now_s)
         check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
         check_height(request.height_m, self._settings)
         check_takeoff(self.vehicle, self._prearm_text)
@@ -167,7 +174,7 @@ class Guidance:
         return self._accept(reference, [*self._to_guided(), arm(), take_off(request.height_m)], now_s)
 
     def _set_position(self, request: PositionRequest, now_s: float) -> Decision:
-        self._require_authority()
+        self._require_authority(now_s)
         check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
         check_flying(self.vehicle)
         check_fence(request.target_enu_m, self.vehicle, self._settings)
@@ -184,7 +191,7 @@ class Guidance:
         if request.release:
             self._follower.heading.locked = False
             return Decision(accepted=True, reference_id=self._reference_id)
-        self._require_authority()
+        self._require_authority(now_s)
         require(math.isfinite(request.yaw_rad), f"yaw is {request.yaw_rad}: not a number")
         check_number("rate", request.rate_rad_s, self._settings.max_yaw_rate_rad_s)
         check_flying(self.vehicle)
@@ -200,7 +207,7 @@ class Guidance:
         return Decision(accepted=True, reference_id=self._reference_id)
 
     def _hover(self, _request: HoverRequest, now_s: float) -> Decision:
-        self._require_authority()
+        self._require_authority(now_s)
         if self.vehicle.on_ground:
             require(isinstance(self._follower.reference, Takeoff), "not in the air")
             return self._accept(Hold(self._settings), [disarm()], now_s)
@@ -209,7 +216,7 @@ class Guidance:
         return self._accept(Hold(self._settings), self._to_guided(), now_s)
 
     def _land(self, _request: LandRequest, now_s: float) -> Decision:
-        self._require_authority()
+        self._require_authority(now_s)
         require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._follower.reference, Takeoff), "on the ground already")
         self._authority.ask_land()
         self._follower.heading.locked = False
@@ -222,10 +229,10 @@ class Guidance:
         self._run(Procedure([set_mode(Mode.GUIDED)]))
         return Decision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
 
-    def _require_authority(self) -> None:
+    def _require_authority(self, now_s: float) -> None:
         if self.vehicle.heartbeat_s is None:
             raise Refusal("no authority: nothing was heard of the autopilot")
-        require(self._authority.held, f"no authority: the vehicle is in {mode_name(self.vehicle.mode)} or the link is lost")
+        require(self._authority.held, f"no authority: {self._lost_reason(now_s)}")
 
     def _to_guided(self) -> list[Command]:
         return [] if self.vehicle.mode == Mode.GUIDED else [set_mode(Mode.GUIDED)]
@@ -247,20 +254,32 @@ class Guidance:
 
     def _check_authority(self, now_s: float) -> None:
         """Drop everything when the pilot, a failsafe or a broken link takes the authority away; nothing is taken back."""
-        if self._authority.update(self.vehicle, link=self.link(now_s)) is not Change.LOST:
+        change = self._authority.update(self.vehicle, link=self.link(now_s))
+        vehicle = self.vehicle
+        able = vehicle.located and (vehicle.ready or vehicle.armed or vehicle.off_ground)
+        self._been_ready = self._authority.held and (self._been_ready or able)
+        if change is not Change.LOST:
             return
-        why = f"the vehicle went into {mode_name(self.vehicle.mode)}" if self.link(now_s) else "the link was lost"
+        why = self._lost_reason(now_s)
+        log.warning("authority lost: %s", why)
         if self._procedure is not None:
             self._procedure.abort(f"authority lost: {why}")
         self._follower.heading.locked = False
         self._follower.take(None, self.vehicle, now_s)
 
+    def _lost_reason(self, now_s: float) -> str:
+        """Return why there is no authority: nothing comes over the link, or the vehicle is in another mode than ours."""
+        if not self.link(now_s):
+            silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
+            return f"the link is lost, nothing was heard of the autopilot for {silent_s:.1f} s"
+        return f"the vehicle is in {mode_name(self.vehicle.mode)}: the pilot or a failsafe has it"
+
     def _introduce(self, now_s: float) -> None:
-        """Note that mode, landed state and home are known, or that they don't come (no home yet, no link) although there was time."""
+        """Note that mode, landed state, home and place are known, or that they don't come although there was time."""
         if self._begun_s is None or now_s < self._begun_s:  # a clock that was set back
             self._begun_s = now_s
         vehicle = self.vehicle
-        complete = self.link(now_s) and vehicle.landed is not Landed.UNDEFINED and vehicle.home is not None
+        complete = self.link(now_s) and vehicle.landed is not Landed.UNDEFINED and vehicle.home is not None and vehicle.located
         self._introduced |= complete or now_s - self._begun_s > self._settings.link_lost_s
 
     def _take_authority_at_start(self, now_s: float) -> None:
