@@ -25,12 +25,12 @@ case "$1" in
   2)
     export PATH="$ALULA_STATE/venv2/bin:$_alula_path"
     _alula_install="$ALULA_STATE/ros2/install"
-    _alula_site="lib/python3.11/site-packages"
     export ROS_VERSION=2 ROS_DISTRO=jazzy ROS_PYTHON_VERSION=3
     export AMENT_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export CMAKE_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export LD_LIBRARY_PATH="$_alula_install/lib"
-    export PYTHONPATH="$_alula_install/$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support:$ALULA_ROOT/tools"
+    _alula_site="$(echo "$_alula_install"/lib/python3*/site-packages)"
+    export PYTHONPATH="$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support:$ALULA_ROOT/tools"
     # colcon links Python packages to their sources (--symlink-install) by hooks of its setup files, which take a second to source.
     for _alula_package in "$ALULA_ROOT"/ros2_ws/src/*/setup.py "$ALULA_ROOT"/bridge/*/setup.py "$ALULA_STATE"/generated/*/setup.py; do
       PYTHONPATH="$PYTHONPATH:${_alula_package%/setup.py}"

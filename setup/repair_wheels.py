@@ -6,21 +6,18 @@ then fails to configure. Both are rewritten to this interpreter's own. Running i
 
 from __future__ import annotations
 
+import re
 import sys
 import sysconfig
 from pathlib import Path
 
 import numpy as np
 
-WHEEL_PYTHON = "/opt/python/cp311-cp311"
-
-
-def replacements() -> dict[str, str]:
-    """Map each path baked into the wheels to this machine's, longest first."""
-    return {
-        f"{WHEEL_PYTHON}/lib/python3.11/site-packages/numpy/_core/include": np.get_include(),
-        f"{WHEEL_PYTHON}/include/python3.11": sysconfig.get_path("include"),
-    }
+WHEEL_PYTHON = r"/opt/python/cp3\d+-cp3\d+"
+REPLACEMENTS = (
+    (re.compile(WHEEL_PYTHON + r"/lib/python3\.\d+/site-packages/numpy/_core/include"), np.get_include()),
+    (re.compile(WHEEL_PYTHON + r"/include/python3\.\d+"), sysconfig.get_path("include")),
+)
 
 
 def repair(prefix: Path) -> int:
@@ -29,8 +26,8 @@ def repair(prefix: Path) -> int:
     for path in sorted((prefix / "share").rglob("*.cmake")):
         text = path.read_text(encoding="utf-8")
         mended = text
-        for wrong, right in replacements().items():
-            mended = mended.replace(wrong, right)
+        for wrong, right in REPLACEMENTS:
+            mended = wrong.sub(right, mended)
         if mended != text:
             path.write_text(mended, encoding="utf-8")
             changed += 1

@@ -99,6 +99,8 @@ generate() {
 build_ros1() {
   ( . "$ALULA_ROOT/setup/env.sh" 1
     export CMAKE_PREFIX_PATH=/usr
+    # Everything in the ROS 1 world is Python.
+    export ROS_LANG_DISABLE=gencpp:geneus:genlisp:gennodejs
     # catkin wants a CMakeLists.txt beside the packages; the workspace is linked so that the checkout stays clean.
     mkdir -p "$ALULA_STATE/ros1" && ln -sfn "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE/ros1/linked_src" || exit 1
     # The interpreter of the environment goes into the shebangs of the nodes' relay scripts.
@@ -118,13 +120,7 @@ make_ros2() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
     unset PYTHONPATH LD_LIBRARY_PATH
     export AMENT_PREFIX_PATH="$ALULA_STATE/venv2" CMAKE_PREFIX_PATH="$ALULA_STATE/venv2"
-    # Only Python uses the interface packages: their C++ support is compiled because rosidl demands it, quickly rather than well. The bridge's
-    # data plane sets flags of its own.
-    cd "$ALULA_STATE/ros2" &&
-      colcon --log-base "$ALULA_STATE/ros2/log" build --merge-install --symlink-install --base-paths "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge/ros_bridge" "$ALULA_ROOT/bridge/ros_bridge_native" "$ALULA_STATE/generated" \
-        --build-base "$ALULA_STATE/ros2/build" --install-base "$ALULA_STATE/ros2/install" \
-        --event-handlers console_cohesion+ --cmake-args -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=-O0 -DCMAKE_C_FLAGS=-O1 \
-        -DPython3_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DPYTHON_EXECUTABLE="$ALULA_STATE/venv2/bin/python" -DBUILD_TESTING=OFF )
+    python "$ALULA_ROOT/setup/build_ros2.py" )
 }
 
 mkdir -p "$ALULA_STATE/stamps" "$ALULA_STATE/ros2" 2>/dev/null || fail "can't write to $ALULA_STATE" "check its owner, or set ALULA_STATE to a folder of yours"
@@ -143,5 +139,5 @@ step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_whee
 step generated "$(model_digest)" \
   generate "skillsets: interfaces, managers, bridge configuration"
 step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
-step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(cat "$ALULA_STATE/stamps/venv2")" make_ros2 "ROS 2 workspace (colcon build)"
+step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{build_ros2.py,interfaces.cmake,repair_wheels.py})-$ALULA_STATE" make_ros2 "ROS 2 workspace (colcon build)"
 [ $quiet = 1 ] || echo "Alula is ready ($((SECONDS - started)) s)"

@@ -1,0 +1,151 @@
+"""Build the ROS 2 workspace with colcon: the packages that have changed since they were last built, and those that need them.
+
+Runs in the ROS 2 world's environment. What was built from what is kept in ``$ALULA_STATE/ros2/built.json``: contents decide, not time
+stamps, so a fresh checkout may take over the state of another. A change of compiler, Python or generators builds everything anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import distributions
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+ROOT = Path(os.environ["ALULA_ROOT"])
+STATE = Path(os.environ["ALULA_STATE"])
+PLACES = ("ros2_ws/src", "bridge")
+BUILT = STATE / "ros2" / "built.json"
+BUILD, INSTALL, LOG = (STATE / "ros2" / name for name in ("build", "install", "log"))
+# Of a Python package only this is installed: its modules are found in the sources (setup/env.sh).
+BUILD_FILES = {"CMakeLists.txt", "package.xml", "setup.py", "setup.cfg"}
+BUILD_SUFFIXES = {".msg", ".srv", ".action", ".cpp", ".hpp"}
+TOOLS = re.compile(r"(ros-|colcon-|empy|catkin-pkg|numpy)", re.IGNORECASE)
+CMAKE_ARGUMENTS = (
+    "-DCMAKE_BUILD_TYPE=None",
+    # The bridge's data plane sets flags of its own; everything else in C++ is type support, compiled quickly rather than well.
+    "-DCMAKE_CXX_FLAGS=-O0",
+    "-DCMAKE_C_FLAGS=-O1",
+    f"-DPython3_EXECUTABLE={sys.executable}",
+    f"-DPYTHON_EXECUTABLE={sys.executable}",
+    "-DBUILD_TESTING=OFF",
+    f"-DCMAKE_PROJECT_INCLUDE={ROOT / 'setup' / 'interfaces.cmake'}",
+)
+
+
+@dataclass(frozen=True)
+class Package:
+    """A ROS 2 package: where it is, what it is made of, which others it needs."""
+
+    folder: Path
+    digest: str
+    needs: frozenset[str]
+
+
+def digest(*parts: str | bytes) -> str:
+    """Return a short hash of texts in their order."""
+    hashed = hashlib.sha256()
+    for part in parts:
+        hashed.update(part.encode() if isinstance(part, str) else part)
+        hashed.update(b"\0")
+    return hashed.hexdigest()[:16]
+
+
+def toolchain() -> str:
+    """Return what decides how everything is built."""
+    installed = distributions(path=[sysconfig.get_path("purelib")])
+    tools = sorted(f"{d.metadata['Name']}=={d.version}" for d in installed if TOOLS.match(d.metadata["Name"]))
+    compiler = subprocess.run(["c++", "--version"], capture_output=True, text=True, check=True).stdout
+    sources = [(ROOT / "setup" / name).read_bytes() for name in ("interfaces.cmake", "repair_wheels.py")]
+    return digest(sys.version, compiler, *CMAKE_ARGUMENTS, *tools, *sources)
+
+
+def build_files(folder: Path) -> Iterator[Path]:
+    """Yield the files of a package that decide what is built, in a fixed order."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and (path.name in BUILD_FILES or path.suffix in BUILD_SUFFIXES):
+            yield path
+
+
+def read_package(folder: Path) -> tuple[str, Package]:
+    """Read a package's name, contents and dependencies."""
+    manifest = ET.parse(folder / "package.xml").getroot()  # noqa: S314 - our own
+    needs = frozenset(str(element.text).strip() for element in manifest if element.tag.endswith("depend"))
+    contents = digest(*(part for path in build_files(folder) for part in (str(path.relative_to(folder)), path.read_bytes())))
+    return str(manifest.findtext("name")).strip(), Package(folder, contents, needs)
+
+
+def find_packages() -> dict[str, Package]:
+    """Return all packages of the workspace by name."""
+    folders = [path.parent for place in PLACES for path in sorted((ROOT / place).glob("*/package.xml"))]
+    folders += [path.parent for path in sorted((STATE / "generated").glob("*/package.xml"))]
+    return dict(read_package(folder) for folder in folders)
+
+
+def state_of(name: str, packages: Mapping[str, Package]) -> str:
+    """Return a hash of a package and of everything of the workspace that it needs."""
+    package = packages[name]
+    return digest(package.digest, *(state_of(needed, packages) for needed in sorted(package.needs & packages.keys())))
+
+
+def read_built(packages: Mapping[str, Package], states: Mapping[str, str]) -> dict[str, str]:
+    """Return what was built, state by package; nothing when the toolchain was another, and then nothing of it is kept."""
+    if not BUILT.exists():  # built by colcon itself: what is younger than its sources is taken over
+        return {name: states[name] for name, package in packages.items() if is_younger(name, package)}
+    built = json.loads(BUILT.read_text(encoding="utf-8"))
+    if built["toolchain"] != toolchain():
+        for folder in (BUILD, INSTALL):
+            shutil.rmtree(folder, ignore_errors=True)
+        return {}
+    return dict(built["packages"])
+
+
+def run_colcon(names: list[str], packages: Mapping[str, Package]) -> int:
+    """Build some packages; return colcon's exit code."""
+    paths = [str(packages[name].folder) for name in packages]
+    command = ["colcon", "--log-base", str(LOG), "build", "--merge-install", "--symlink-install", "--paths", *paths]
+    command += ["--build-base", str(BUILD), "--install-base", str(INSTALL), "--packages-select", *names]
+    command += ["--event-handlers", "console_cohesion+", "--cmake-args", *CMAKE_ARGUMENTS]
+    return subprocess.run(command, cwd=STATE / "ros2", check=False).returncode
+
+
+def succeeded(name: str) -> bool:
+    """Tell whether colcon's last build of a package went well."""
+    code = BUILD / name / "colcon_build.rc"
+    return code.exists() and code.read_text(encoding="ascii").strip() == "0"
+
+
+def is_younger(name: str, package: Package) -> bool:
+    """Tell whether a package was built after its files were last written."""
+    if not succeeded(name):
+        return False
+    built_s = (BUILD / name / "colcon_build.rc").stat().st_mtime
+    return all(path.stat().st_mtime < built_s for path in build_files(package.folder))
+
+
+def build() -> int:
+    """Build what has changed; return the exit code."""
+    packages = find_packages()
+    states = {name: state_of(name, packages) for name in packages}
+    built = read_built(packages, states)
+    changed = [name for name, state in states.items() if built.get(name) != state]
+    sys.stdout.write(f"to build: {' '.join(changed) or 'nothing'}\n")
+    sys.stdout.flush()
+    for name in changed:
+        (BUILD / name / "colcon_build.rc").unlink(missing_ok=True)
+    code = run_colcon(changed, packages) if changed else 0
+    kept = {name: state for name, state in states.items() if name not in changed or succeeded(name)}
+    BUILT.write_text(json.dumps({"toolchain": toolchain(), "packages": kept}, indent=1) + "\n", encoding="utf-8")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(build())
