@@ -31,7 +31,7 @@ def read_pins(path: Path) -> dict[str, str]:
 
 def whole(distribution: Distribution) -> bool:
     """Tell whether all files that were installed are still there; compiled ones are made again when they are needed."""
-    return all(Path(distribution.locate_file(file)).exists() for file in distribution.files or () if file.suffix != ".pyc")
+    return all(Path(str(distribution.locate_file(file))).exists() for file in distribution.files or () if file.suffix != ".pyc")
 
 
 def installed(*, own_only: bool) -> dict[str, Distribution]:
