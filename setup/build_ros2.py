@@ -98,12 +98,13 @@ def state_of(name: str, packages: Mapping[str, Package]) -> str:
 
 def read_built(packages: Mapping[str, Package], states: Mapping[str, str]) -> dict[str, str]:
     """Return what was built, state by package; nothing when the toolchain was another, and then nothing of it is kept."""
-    if not BUILT.exists():  # built by colcon itself: what is younger than its sources is taken over
+    if not BUILT.exists():  # an interrupted build, or one by colcon itself: what is younger than its sources counts
         return {name: states[name] for name, package in packages.items() if is_younger(name, package)}
     built = json.loads(BUILT.read_text(encoding="utf-8"))
     if built["toolchain"] != toolchain():
         for folder in (BUILD, INSTALL):
             shutil.rmtree(folder, ignore_errors=True)
+        BUILT.unlink()
         return {}
     return dict(built["packages"])
 

@@ -8,6 +8,7 @@ export ALULA_ROOT ALULA_STATE
 log="$ALULA_STATE/setup.log"
 disk_needed_mb=5000
 started=$SECONDS
+exec 1>&2     # standard output belongs to the results of the command that needs the set-up
 quiet=0; [ "${1:-}" = --quiet ] && quiet=1     # says nothing where nothing is to be done
 
 fail() { printf '\nalula setup: %s\n' "$1" >&2; [ -n "${2:-}" ] && printf '  to mend it: %s\n' "$2" >&2; exit 2; }
@@ -89,11 +90,26 @@ make_venv() { # WORLD OPTIONS...
 make_venv1() { make_venv 1 --system-site-packages; }
 make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup/repair_wheels.py"; }
 
+# What a robot's models generate. A robot whose models have errors is left out, and named at each command until it is mended.
 generate() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
     export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/alula_common:$ALULA_ROOT/ros2_ws/src/skill_model:$ALULA_ROOT/ros2_ws/src/skill_language"
+    rm -f "$ALULA_STATE/broken_robots"
     # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
-    python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune )
+    python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune && exit
+    local robot good=() try; try=$(mktemp -d) || exit 1
+    for robot in "$ALULA_ROOT"/skillsets/*/; do
+      if python -m skill_language.generate "$robot" --out "$try"; then good+=("$robot"); else basename "$robot" >>"$ALULA_STATE/broken_robots"; fi
+    done
+    rm -rf "$try"
+    [ ${#good[@]} -gt 0 ] && python -m skill_language.generate "${good[@]}" --out "$ALULA_STATE/generated" --prune )
+}
+
+tell_broken_robots() {
+  local robot
+  while read -r robot; do
+    echo "alula: the robot '$robot' is left out, its models have errors; './alula check skillsets/$robot/*.skill' shows them"
+  done 2>/dev/null <"$ALULA_STATE/broken_robots"
 }
 
 build_ros1() {
@@ -138,6 +154,7 @@ step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt" "$ALULA_ROOT/setup/sync_packag
 step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py" "$ALULA_ROOT/setup/sync_packages.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
 step generated "$(model_digest)" \
   generate "skillsets: interfaces, managers, bridge configuration"
+[ ! -f "$ALULA_STATE/broken_robots" ] || tell_broken_robots
 step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
 step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{build_ros2.py,interfaces.cmake,repair_wheels.py})-$ALULA_STATE" make_ros2 "ROS 2 workspace (colcon build)"
 [ $quiet = 1 ] || echo "Alula is ready ($((SECONDS - started)) s)"

@@ -26,6 +26,7 @@ from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain, f
 from alula_common.processes import RUN_ID_VARIABLE, command_line, end_run, processes_of_run
 from alula_common.shared_memory import sweep_shared_memory
 from alula_common.signals import Interrupts
+from alula_common.suggestions import nearest
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
@@ -85,7 +86,7 @@ def parse(arguments: list[str]) -> RunSpec:
     )
     given = parser.parse_args(arguments, namespace=Arguments())
     if given.scenario not in SCENARIOS:
-        raise RequestError(f"there is no scenario '{given.scenario}'; choose one of {', '.join(SCENARIOS)}")
+        raise RequestError(f"there is no scenario '{given.scenario}'; {nearest(given.scenario, SCENARIOS)}")
     if not 0 <= given.seed < 2**31:
         raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")
     if given.rate is not None and not 0 <= given.rate <= 1000:  # also refuses nan
@@ -293,8 +294,8 @@ def announce(spec: RunSpec) -> Callable[[str], None]:
     started = time.monotonic()
 
     def say(line: str) -> None:
-        sys.stdout.write(f"[{time.monotonic() - started:5.1f} s] {line}\n")
-        sys.stdout.flush()
+        sys.stderr.write(f"[{time.monotonic() - started:5.1f} s] {line}\n")
+        sys.stderr.flush()
 
     failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
     say(f"flying '{spec.scenario}'{' over mocks' if spec.mock else ''}, seed {spec.seed}{failing}; results in {spec.out_dir}")

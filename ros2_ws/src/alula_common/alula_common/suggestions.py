@@ -1,8 +1,9 @@
-"""Hints for a name that is not known."""
+"""Hints for a name that is not known; ``python -m alula_common.suggestions NAME KNOWN...`` prints one."""
 
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Iterable, Sequence
 
 _FEW = 8
@@ -28,3 +29,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def quoted(names: Sequence[str]) -> str:
     """Return names in backquotes, comma separated."""
     return ", ".join(f"`{name}`" for name in names)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(nearest(sys.argv[1], sys.argv[2:]))
