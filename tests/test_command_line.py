@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
+import json
+import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -11,13 +15,18 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 
 
 def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(ALULA_ROOT / "alula"), *arguments], capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run([str(ALULA_ROOT / "alula"), *arguments], capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
         (["nosuch"], "nosuch"),
+        (["fyl"], "did you mean `fly`?"),
+        (["fly", "maping"], "did you mean `mapping`?"),
+        (["bench", "skils"], "did you mean `skills`?"),
+        (["events", "--run", "no/such/run"], "no/such/run"),
+        (["start"], "SKILL"),
         (["fly", "nosuch"], "nosuch"),
         (["fly", "mapping", "--fail", "nosuch"], "nosuch"),
         (["fly", "mapping", "--seed", "x"], "--seed"),
@@ -56,10 +65,37 @@ def test_models_of_the_drone_have_no_errors() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_second_setup_has_nothing_to_do() -> None:
+def test_second_setup_has_nothing_to_do_and_results_only_go_to_stdout() -> None:
     done = alula("setup")
     assert done.returncode == 0
-    assert "done" not in done.stdout
+    assert "Alula is ready" in done.stderr
+    assert "done" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_a_check_waits_for_no_build_and_prints_json_only() -> None:
+    state = Path(os.environ.get("ALULA_STATE", ALULA_ROOT / ".alula"))
+    with (state / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # as long as a build of this checkout would hold it
+        done = alula("check", "--json", "--no-proofs", str(ALULA_ROOT / "skillsets/uav/mapping.skill"))
+        help_text, version = alula("help"), alula("--version")
+    assert done.returncode == 0
+    assert json.loads(done.stdout) is not None
+    assert "usage:" in help_text.stdout
+    assert re.fullmatch(r"alula \d+\.\d+\.\d+\n", version.stdout)
+
+
+def test_completion_is_a_bash_script_that_knows_commands() -> None:
+    script = alula("completion").stdout
+    complete = "COMP_WORDS=(alula ch); COMP_CWORD=1; _alula; echo ${COMPREPLY[@]}"
+    done = subprocess.run(["bash", "-c", f"{script}\n{complete}"], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["check"]
+
+
+def test_version_is_the_change_logs() -> None:
+    newest = re.search(r"^## (\S+)", (ALULA_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert newest is not None
+    assert alula("--version").stdout == f"alula {newest[1]}\n"
 
 
 def test_doctor_finds_all_well() -> None:

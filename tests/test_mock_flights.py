@@ -1,4 +1,4 @@
-"""Flights over mocks as a user makes them: the README's example, the run's folder, and what can't be."""
+"""Flights over mocks as a user makes them: the example of the page on mocks, the run's folder, and what can't be."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def example(document: str, marker: str) -> str:
     return dedent("\n".join(block))
 
 
-def test_the_readmes_behaviour_is_flown_as_it_says(tmp_path: Path) -> None:
+def test_the_behaviour_of_the_page_on_mocks_is_flown_as_it_says(tmp_path: Path) -> None:
     behaviour = tmp_path / "gust.yaml"
-    behaviour.write_text(example("README.md", "`gust.yaml`:"), encoding="utf-8")
+    behaviour.write_text(example("docs/mocks.md", "`gust.yaml`:"), encoding="utf-8")
     flight = start_flight(tmp_path / "run", "--mock", "--behaviour", str(behaviour))
     assert flight.end() == 0, flight.words()
     summary = flight.summary

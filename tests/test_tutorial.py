@@ -1,10 +1,9 @@
-"""The README's section on a robot of one's own, done as it says, command by command, and a skill more by hand."""
+"""The tutorial, done as it says, command by command, and a skill more by hand."""
 
 from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -13,8 +12,7 @@ from pathlib import Path
 import pytest
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
-README = (ALULA_ROOT / "README.md").read_text(encoding="utf-8")
-SECTION = README.split("## A robot of your own\n", 1)[1].split("\n## ", 1)[0]
+SECTION = (ALULA_ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ {4}(\./alula .*)$", SECTION, re.MULTILINE)
 BLOCKS = dict(re.findall(r"^```(\w+)\n(.*?)^```$", SECTION, re.MULTILINE | re.DOTALL))
 MODEL, HOOKS = "skillsets/rover/rover.skill", "ros2_ws/src/rover_robot/rover_robot/hooks.py"
@@ -27,22 +25,22 @@ COVER = 'mount -t overlay overlay -o "lowerdir=$1,upperdir=$2/upper,workdir=$2/w
 def checkout(tmp_path):
     """Return the words before a command that has it work on the checkout and leave the checkout as it is, also what was built.
 
-    The layer needs the rights to mount; without them it is a copy, whose build from nothing takes minutes.
+    Mounting needs a mount namespace: root's own, or one of a user namespace. A machine that allows neither skips the test: without
+    the layer everything would have to be set up anew.
     """
     layer = tmp_path / "layer"
     for name in ("upper", "work"):
         (layer / name).mkdir(parents=True)
-    cover = ["unshare", "--mount", "sh", "-c", COVER, "sh", str(ALULA_ROOT), str(layer)]
-    if subprocess.run([*cover, "true"], capture_output=True, check=False).returncode == 0:
-        return cover
-    copy = tmp_path / "alula"
-    shutil.copytree(ALULA_ROOT, copy, symlinks=True, ignore=shutil.ignore_patterns(".alula", ".git", "runs", ".hypothesis", "__pycache__"))
-    return ["env", "-u", "ALULA_STATE", "-u", "ALULA_ROOT", "-C", str(copy)]
+    for rights in ([], ["--map-root-user"]):
+        cover = ["unshare", "--mount", *rights, "sh", "-c", COVER, "sh", str(ALULA_ROOT), str(layer)]
+        if subprocess.run([*cover, "true"], capture_output=True, check=False).returncode == 0:
+            return cover
+    pytest.skip("this machine allows no overlay mount, not even in a user namespace")
 
 
 def run(checkout, *command) -> str:
     environment = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "PYTEST_ADDOPTS", "ROS_DOMAIN_ID"}}
-    done = subprocess.run([*checkout, *command], capture_output=True, text=True, timeout=900, check=False, env=environment)
+    done = subprocess.run([*checkout, *command], capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout[-4000:]}\n{done.stderr[-2000:]}"
     return done.stdout
 
@@ -66,8 +64,8 @@ def passed(output: str) -> int:
     return sum(int(number) for number in re.findall(r"^(\d+) passed", output, re.MULTILINE))
 
 
-@pytest.mark.timeout(1800)
-def test_the_tutorial_of_the_readme_works(checkout):
+@pytest.mark.timeout(0)  # builds a robot's interfaces: as long as the machine needs
+def test_the_tutorial_works(checkout):
     new, check, test, check_again, test_again = (command.split() for command in COMMANDS)
     assert "skillsets/rover/mock.yaml" in run(checkout, *new)
     run(checkout, *check)

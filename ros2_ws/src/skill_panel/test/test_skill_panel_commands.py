@@ -1,0 +1,94 @@
+"""The commands that drive skillsets from a shell, over mocks in virtual time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import navigation_managers.model as navigation
+import pytest
+
+from skill_panel.commands import COMMANDS, CommandError, main, parse
+from skill_runtime.mock import load_behaviour, mock_world
+
+
+class Shell:
+    """Does commands as `./alula` does, on clients that are there already."""
+
+    def __init__(self) -> None:
+        self.world, _ = mock_world([navigation.SKILLSET], load_behaviour([], [navigation.SKILLSET]))
+        self.clients = {"navigation": self.world.client("navigation")}
+        assert self.clients["navigation"].wait_ready(5.0)
+        self.said: list[tuple[Any, str]] = []
+
+    def __call__(self, *words: str) -> int:
+        options = parse(words)
+        self.said.clear()
+        return COMMANDS[options.command](self.clients, options, lambda value, text: self.said.append((value, text)))
+
+    @property
+    def value(self) -> Any:
+        (said,) = self.said
+        json.dumps(said[0])
+        return said[0]
+
+
+@pytest.fixture
+def shell() -> Shell:
+    return Shell()
+
+
+def test_a_skill_is_asked_for_and_refused_until_it_can_start(shell: Shell) -> None:
+    assert shell("why", "takeoff") == 1
+    assert "SDK_authority" in json.dumps(shell.value)
+    assert shell("start", "takeoff", "height=3", "speed=1") == 1
+    assert (shell.value["outcome"], shell.value["result"]) == ("NOT_READY", "sdk_authority")
+    assert shell("transition", "navigation.SDK_authority", "AVAILABLE") == 0
+    assert shell("transition", "navigation.homepoint_status", "VALID") == 0
+    assert shell("why", "navigation.takeoff") == 0
+    assert shell("start", "takeoff", "height=3", "speed=1") == 0
+    assert shell.value["outcome"] == "TERMINATED"
+
+
+def test_what_is_refused_or_not_there_is_exit_code_1(shell: Shell) -> None:
+    assert shell("transition", "navigation.axes_authority", "USED") == 1
+    assert shell.value["accepted"] is False
+    assert shell("interrupt", "goto") == 1
+    assert shell.value == {"skill": "goto", "interrupted": 0}
+
+
+def test_the_list_has_inputs_resources_and_data(shell: Shell) -> None:
+    assert shell("skills") == 0
+    assert set(shell.value["skills"]["takeoff"]["inputs"]) == {"height", "speed"}
+    assert shell.value["resources"]["flight_status"] == "ON_GROUND"
+    assert "  flight_status = ON_GROUND" in shell.said[0][1].splitlines()
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("start", "takeof"), "there is no skill takeof; did you mean `takeoff`"),
+        (("start", "takeoff", "heigth=3"), "takeoff has no input heigth; did you mean `height`"),
+        (("start", "takeoff", "3"), "3: write an input as key=value"),
+        (("start", "takeoff", "height=[1"), "height: '[1' can't be read"),
+        (("transition", "flight_status", "IN_AIR"), "there is no resource flight_status; write SKILLSET.NAME"),
+    ],
+)
+def test_wrong_words_are_named_with_what_is_meant(shell: Shell, words: tuple[str, ...], complaint: str) -> None:
+    with pytest.raises(CommandError) as error:
+        shell(*words)
+    assert complaint in str(error.value)
+
+
+def test_events_of_a_run_are_read_from_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "run.json").write_text('{"domain": 5}')
+    record = {"stamp_s": 3.5, "sequence": 1, "skillset": "navigation", "kind": "TRANSITION"}
+    record |= {"resource": "flight_status", "from_state": "ON_GROUND", "to_state": "IN_AIR", "cause": "extern"}
+    (tmp_path / "events.jsonl").write_text(json.dumps(record) + "\n")
+    assert main(["events", "--run", str(tmp_path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == record
+    assert main(["events", "--run", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == "    3.50 s  navigation.flight_status: ON_GROUND -> IN_AIR (extern)\n"
+    assert main(["events", "--run", str(tmp_path / "none")]) == 2
+    assert "is no run's folder" in capsys.readouterr().err
