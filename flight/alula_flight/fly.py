@@ -229,7 +229,8 @@ class Front:
 def finish(spec: RunSpec, mission_exit: int | None) -> int:
     """Make the report from the run's folder, say how it went, and return the exit code."""
     # Late, because a wrong command line should not have to wait for matplotlib and Open3D.
-    from alula_flight.report import RunFacts, make_report
+    from alula_flight.report.facts import RunFacts
+    from alula_flight.report.making import make_report
     from alula_flight.verdict import verdict_lines
 
     out = Path(spec.out_dir)

@@ -14,7 +14,8 @@ import matplotlib.image as mpl_image
 import numpy as np
 import pytest
 
-from alula_flight.report import RunFacts, make_report
+from alula_flight.report.facts import RunFacts
+from alula_flight.report.making import make_report
 from alula_flight.verdict import verdict_lines
 
 sys.path.insert(0, str(Path(__file__).parent))

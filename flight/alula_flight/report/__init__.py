@@ -1,7 +1,4 @@
-"""What a run was: `make_report` reads the run's folder and writes its summary, timeline and map picture there."""
+"""What a run was: `making.make_report` reads the run's folder and writes its summary, timeline and map picture there.
 
-from alula_flight.report.facts import Death, RunFacts
-from alula_flight.report.making import make_report
-from alula_flight.report.summary import Summary
-
-__all__ = ["Death", "RunFacts", "Summary", "make_report"]
+Imports nothing: who only reads events must not wait for matplotlib and Open3D.
+"""
