@@ -1,168 +1,118 @@
-"""What an editor asks about a file: the names that may come next, what a name stands for, and where it is defined.
-
-The file may be broken at the cursor, as it is while somebody writes: names are then taken from what could be read, and from the
-words around the cursor.
-"""
+"""What an editor asks about a name: what it stands for, where it is defined, where else it stands, and under which other name."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from skill_language.lexer import Kind, Source, Token, tokenize
+from skill_language.lexer import MAX_CHARACTERS
 from skill_language.models import ModelFile
-from skill_language.notation import Notation, notation_of
-from skill_language.paper import skill as paper_skill
-from skill_language.rl import skill as rl_skill
-from skill_language.syntax.document import MEMBERS
-from skill_language.syntax.resources import occurring
+from skill_language.occurrences import Entity, Occurrence, at, occurrences
+from skill_language.syntax.cursor import OPERATOR_WORDS
 from skill_model.model import Data, Effect, Parameter, Resource, Skill, Skillset, Span, Transition
 
-Element = Resource | Skill | Effect | Data | Parameter
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class RenameError(Exception):
+    """A name can't be changed so; the message says why."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """A place between two characters: 1-based line, and 1-based column of the character behind it."""
+class Symbol:
+    """An element of a file for an outline; ``kind`` as in ``Entity``."""
 
-    line: int
-    column: int
-
-
-@dataclass(frozen=True)
-class Word:
-    """A name in the text; ``resource`` is what stands before `==`, `!=` or `->` on its left, or is empty."""
-
-    text: str
-    line: int
-    column: int
-    resource: str = ""
-
-
-@dataclass(frozen=True)
-class Completion:
-    """A name that may be put in; ``kind`` is state, resource, skill, effect, data, type or keyword."""
-
-    label: str
+    name: str
     kind: str
+    span: Span
     detail: str = ""
+    children: tuple[Symbol, ...] = ()
 
 
-def completions(file: ModelFile, place: Place) -> list[Completion]:
-    """Return what may stand at a place: states behind `resource ==` and `resource ->`, else names and the words of the notation."""
-    before = _tokens_before(file, place)
-    if before and _touches(before[-1], place) and before[-1].kind is Kind.NAME:
-        before.pop()
-    known = _Names(file)
-    if len(before) > 1 and before[-1].text in {"==", "!=", "->"}:
-        resource = known.resources.get(before[-2].text)
-        return [Completion(state, "state", f"state of {resource.name}") for state in resource.states] if resource else []
-    if before and before[-1].text == ":":
-        return [Completion(name, "type") for name in known.types] + known.named()
-    return known.named() + [Completion(word, "keyword") for word in _keywords(file)]
+def occurrence_at(file: ModelFile, line: int, column: int) -> Occurrence | None:
+    """Return the name at a place, 1-based, if there is one that leads somewhere."""
+    return at(file, line, column)
 
 
-def word_at(file: ModelFile, place: Place) -> Word | None:
-    """Return the name at a place, if there is one."""
-    tokens = tokenize(Source(file.path, file.text))
-    for index, token in enumerate(tokens):
-        if token.kind is Kind.NAME and token.line == place.line and token.column <= place.column <= token.column + len(token.text):
-            related = index > 1 and tokens[index - 1].text in {"==", "!=", "->"}
-            return Word(token.text, token.line, token.column, tokens[index - 2].text if related else "")
-    return None
+def references(file: ModelFile, entity: Entity) -> list[Occurrence]:
+    """Return all places of what a name stands for."""
+    return [one for one in occurrences(file) if one.entity == entity]
 
 
-def description(file: ModelFile, word: Word) -> str:
+def definition(file: ModelFile, entity: Entity) -> Span | None:
+    """Return where it is defined; a state where its resource names it first."""
+    return next((one.span for one in references(file, entity) if one.defining), None)
+
+
+def renamed(file: ModelFile, entity: Entity, name: str) -> list[Span]:
+    """Return the places that a new name has to be put in; raise RenameError where that can't be or would change the meaning."""
+    if not NAME.fullmatch(name) or name in OPERATOR_WORDS or len(name) > MAX_CHARACTERS:
+        raise RenameError(f"`{name[:40]}` is no name: names are made of a-z, A-Z, 0-9 and _, and are not and, or, not, true, false")
+    if file.damaged:
+        raise RenameError("the file has errors of syntax: what could not be read may have the name, too")
+    if entity.kind == "skillset":
+        raise RenameError("other files may use a skillset by its name")
+    found = occurrences(file)
+    if any(one.entity.name == name and one.entity.owner == entity.owner for one in found):
+        raise RenameError(f"`{name}` is there already")
+    return [one.span for one in found if one.entity == entity]
+
+
+def symbols(file: ModelFile) -> list[Symbol]:
+    """Return the outline of a file."""
+    return [_outline(skillset) for skillset in file.skillsets]
+
+
+def _outline(skillset: Skillset) -> Symbol:
+    parts = [Symbol(one.name, "data", one.span, one.type) for one in skillset.data]
+    parts += [Symbol(one.name, "resource", one.span, " ".join(one.states)[:80]) for one in skillset.resources]
+    parts += [Symbol(one.name, "event", one.span) for one in skillset.events]
+    for skill in skillset.skills:
+        inside = [Symbol(one.name, "input", one.span, one.type) for one in skill.inputs]
+        inside += [Symbol(one.name, "invariant", one.span) for one in skill.invariants]
+        inside += [Symbol(one.name, "result", one.span, one.kind.value) for one in skill.results]
+        parts.append(Symbol(skill.name, "skill", skill.span, children=tuple(inside)))
+    parts += [Symbol(one.name, "property", one.span, one.kind.value) for one in skillset.properties]
+    return Symbol(skillset.name, "skillset", skillset.span, children=tuple(parts))
+
+
+def description(file: ModelFile, entity: Entity) -> str:
     """Return a resource with its states and arrows, a skill with its inputs, outputs and results, or another name's definition."""
-    known = _Names(file)
-    if word.resource in known.resources and word.text in known.resources[word.resource].states:
-        return _state(known.resources[word.resource], word.text)
-    match known.find(word):
-        case Resource() as resource:
-            return _resource(resource)
-        case Skill() as skill:
-            return _skill(skill)
-        case Effect() as effect:
-            return f"effect {effect.name} {{ {'  '.join(f'{c.resource} -> {c.target}' for c in effect.assignments)} }}"
-        case Data() as data:
-            return f"data {data.name}: {data.type}" + (f" period {data.period_s:g} s" if data.period_s is not None else "")
-        case Parameter() as parameter:
-            return f"{parameter.name}: {parameter.type}" + (f" // {parameter.comment}" if parameter.comment else "")
+    skillset = next((one for one in file.skillsets if entity.owner and one.name == entity.owner[0]), None)
+    if skillset is None:
+        return ""
+    match entity.kind:
+        case "resource" if entity.name in skillset.resource_index:
+            return _resource(skillset.resource_index[entity.name])
+        case "state" if entity.owner[1] in skillset.resource_index:
+            return _state(skillset.resource_index[entity.owner[1]], entity.name)
+        case "skill" if entity.name in skillset.skill_index:
+            return _skill(skillset.skill_index[entity.name])
+        case "data" if entity.name in skillset.data_index:
+            return _data(skillset.data_index[entity.name])
+        case "effect" | "input" | "output" | "parameter":
+            return _of_skill(skillset.skill_index.get(entity.owner[1]), entity)
         case _:
             return ""
 
 
-def definition(file: ModelFile, word: Word) -> Span | None:
-    """Return where a name is defined; a state where its resource names it first."""
-    known = _Names(file)
-    if word.resource in known.resources:
-        return _state_place(file, known.resources[word.resource], word.text)
-    found = known.find(word)
-    if found is not None:
-        return found.span
-    return known.type_place(word.text)
+def _of_skill(skill: Skill | None, entity: Entity) -> str:
+    if skill is None:
+        return ""
+    several: dict[str, tuple[Effect | Parameter, ...]] = {
+        "effect": skill.effects,
+        "input": skill.inputs,
+        "output": skill.outputs,
+        "parameter": skill.parameters,
+    }
+    found = next((one for one in several[entity.kind] if one.name == entity.name), None)
+    if isinstance(found, Effect):
+        return f"effect {found.name} {{ {'  '.join(f'{c.resource} -> {c.target}' for c in found.assignments)} }}"
+    return "" if found is None else f"{found.name}: {found.type}" + (f" // {found.comment}" if found.comment else "")
 
 
-class _Names:
-    """The names of a file, of all its skillsets together."""
-
-    def __init__(self, file: ModelFile) -> None:
-        self.file = file
-        self.skillsets: tuple[Skillset, ...] = file.skillsets
-        self.resources = {resource.name: resource for skillset in self.skillsets for resource in skillset.resources}
-        self.skills = {skill.name: skill for skillset in self.skillsets for skill in skillset.skills}
-        self.data = {data.name: data for skillset in self.skillsets for data in skillset.data}
-        self.types = list(dict.fromkeys(name for skillset in self.skillsets for name in skillset.types))
-
-    def named(self) -> list[Completion]:
-        """Return resources, data, skills and the effects of all skills."""
-        found = [Completion(r.name, "resource", " ".join(r.states)) for r in self.resources.values()]
-        found += [Completion(d.name, "data", d.type) for d in self.data.values()]
-        found += [Completion(s.name, "skill") for s in self.skills.values()]
-        effects = {effect.name: skill.name for skill in self.skills.values() for effect in skill.effects}
-        return found + [Completion(name, "effect", f"effect of {skill}") for name, skill in effects.items()]
-
-    def find(self, word: Word) -> Element | None:
-        """Return what a name stands for: in the skill that it stands in first, then in the skillset."""
-        skill = self._skill_around(word.line)
-        for element in self._of_skill(skill) if skill else ():
-            if element.name == word.text:
-                return element
-        return self.resources.get(word.text) or self.skills.get(word.text) or self.data.get(word.text)
-
-    def type_place(self, name: str) -> Span | None:
-        """Return where a type is declared."""
-        for match in re.finditer(rf"\btype\s*(?:\{{[^}}]*?)?\b({re.escape(name)})\b", self.file.text):
-            line = self.file.text.count("\n", 0, match.start(1)) + 1
-            column = match.start(1) - self.file.text.rfind("\n", 0, match.start(1))
-            return Span(self.file.path, line, column, column + len(name))
-        return None
-
-    def _skill_around(self, line: int) -> Skill | None:
-        before = [skill for skill in self.skills.values() if skill.span.line <= line]
-        return max(before, key=lambda skill: skill.span.line, default=None)
-
-    @staticmethod
-    def _of_skill(skill: Skill) -> Iterator[Element]:
-        yield from skill.effects
-        yield from (*skill.inputs, *skill.outputs, *skill.parameters)
-
-
-def _tokens_before(file: ModelFile, place: Place) -> list[Token]:
-    tokens = tokenize(Source(file.path, file.text))
-    return [t for t in tokens if t.kind is not Kind.END and (t.line, t.column) < (place.line, place.column)]
-
-
-def _touches(token: Token, place: Place) -> bool:
-    return token.line == place.line and token.column + len(token.text) >= place.column
-
-
-def _keywords(file: ModelFile) -> list[str]:
-    paper = notation_of(file.path, file.text) is Notation.PAPER
-    own = (*paper_skill.BLOCKS, "violation", "apply", "post") if paper else (*rl_skill.BLOCKS, "guard", "postcondition", "interrupting")
-    words = ("skillset", *MEMBERS, *own, "state", "initial", "transition", "extern", "and", "or", "not", "true", "false")
-    return list(dict.fromkeys(words))
+def _data(data: Data) -> str:
+    return f"data {data.name}: {data.type}" + (f" period {data.period_s:g} s" if data.period_s is not None else "")
 
 
 def _resource(resource: Resource) -> str:
@@ -188,14 +138,3 @@ def _skill(skill: Skill) -> str:
     lines = [f"skill {skill.name}({inputs})" + (f" -> ({outputs})" if outputs else "")]
     lines += [f"  {result.kind.value} {result.name}" for result in skill.results]
     return "\n".join(lines)
-
-
-def _state_place(file: ModelFile, resource: Resource, state: str) -> Span | None:
-    """Return the first place behind the resource's name that names the state: `state { ... }`, `initial` or an arrow."""
-    if state not in resource.states and state not in occurring(resource.initial, resource.transitions):
-        return None
-    for token in tokenize(Source(file.path, file.text)):
-        behind = (token.line, token.column) > (resource.span.line, resource.span.column)
-        if behind and token.kind is Kind.NAME and token.text == state:
-            return Span(file.path, token.line, token.column, token.column + len(state))
-    return None

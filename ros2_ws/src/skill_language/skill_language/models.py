@@ -50,6 +50,10 @@ class ModelFile:
     def _lines(self) -> list[str]:
         return self.text.split("\n")
 
+    def line(self, number: int) -> str:
+        """Return a line of the text, 1-based; empty when there is none."""
+        return self._lines[number - 1] if 0 < number <= len(self._lines) else ""
+
     def add(self, findings: Iterable[Diagnostic]) -> None:
         """Add findings (at most ``MAX_FINDINGS`` at a time), in the order of the source, each with the line that it is about."""
         found = [_with_line(finding, self._lines) for finding in islice(findings, MAX_FINDINGS)]

@@ -57,9 +57,17 @@ class Editor:
         self.process.stdin.flush()
 
     def ask(self, method, params):
+        return self.answer(method, params)["result"]
+
+    def answer(self, method, params):
         self.number += 1
         self.send(method, params, id=self.number)
-        return self.wait(lambda m: m.get("id") == self.number and "method" not in m)["result"]
+        return self.wait(lambda m: m.get("id") == self.number and "method" not in m)
+
+    def refused(self, method, line, text, **more):
+        column = TEXT.split("\n")[line].index(text)
+        where = {"textDocument": {"uri": URI}, "position": {"line": line, "character": column}}
+        return self.answer(method, {**where, **more})["error"]["message"]
 
     def told(self):
         return self.wait(lambda m: m.get("method") == "textDocument/publishDiagnostics")["params"]
@@ -70,10 +78,10 @@ class Editor:
             if wanted(message):
                 return message
 
-    def at(self, method, line, text, offset=0):
+    def at(self, method, line, text, offset=0, **more):
         """Ask about the place of a text in a line of TEXT, counted as editors do."""
         column = TEXT.split("\n")[line].index(text) + offset
-        return self.ask(method, {"textDocument": {"uri": URI}, "position": {"line": line, "character": column}})
+        return self.ask(method, {"textDocument": {"uri": URI}, "position": {"line": line, "character": column}, **more})
 
     def change(self, text, version):
         document = {"uri": URI, "version": version}
@@ -111,7 +119,7 @@ def test_an_editing_session(editor):
     # Completion: states behind a resource, names and words elsewhere, types behind a colon.
     labels = {c["label"] for c in editor.at("textDocument/completion", 12, "FREE", 2)["items"]}
     assert labels == {"FREE", "USED"}
-    labels = {c["label"]: c.get("detail") for c in editor.at("textDocument/completion", 13, "take")["items"]}
+    labels = {c["label"]: c.get("detail") for c in editor.at("textDocument/completion", 13, "start")["items"]}
     assert {"axes", "battery", "goto", "take", "precondition", "guard"} <= set(labels)
     assert labels["axes"] == "FREE USED"
     assert labels["take"] == "effect of goto"
@@ -149,6 +157,69 @@ def test_an_editing_session(editor):
     assert editor.change("a" * 400_000, 6)[0]["code"] == "ALU003"
     editor.send("textDocument/didClose", {"textDocument": {"uri": URI}})
     assert editor.told() == {"uri": URI, "diagnostics": []}
+
+    # A document that is not open has nothing to tell.
+    nowhere = {"textDocument": {"uri": "file:///tmp/never_opened.rl"}}
+    where = {**nowhere, "position": {"line": 3, "character": 5}}
+    assert editor.ask("textDocument/completion", where)["items"] == []
+    assert editor.ask("textDocument/hover", where) is None
+    assert editor.ask("textDocument/definition", where) is None
+    assert not editor.ask("textDocument/documentSymbol", nowhere)
+    assert not editor.ask("textDocument/references", {**where, "context": {"includeDeclaration": True}})
+    assert editor.ask("textDocument/rename", {**where, "newName": "x"}) is None
+
+
+def test_names_and_outline(editor):
+    document = {"uri": URI, "languageId": "alula", "version": 1, "text": TEXT}
+    editor.send("textDocument/didOpen", {"textDocument": document})
+    assert editor.told() == {"uri": URI, "diagnostics": []}
+
+    # References and a new name: of the resource, and of a state where another resource has one of that name.
+    found = editor.at("textDocument/references", 12, "axes", context={"includeDeclaration": True})
+    assert [(one["range"]["start"]["line"], one["range"]["start"]["character"]) for one in found] == [(4, 11), (11, 17), (12, 23), (14, 24)]
+    edit = editor.at("textDocument/rename", 12, "FREE", newName="IDLE")
+    places = [(one["range"]["start"]["line"], one["newText"]) for one in edit["changes"][URI]]
+    assert places == [(5, "IDLE"), (6, "IDLE"), (7, "IDLE"), (7, "IDLE"), (12, "IDLE"), (14, "IDLE")]
+    assert "is there already" in editor.refused("textDocument/rename", 12, "FREE", newName="USED")
+    assert "is no name" in editor.refused("textDocument/rename", 12, "FREE", newName="a b")
+
+    # The outline.
+    (outline,) = editor.ask("textDocument/documentSymbol", {"textDocument": {"uri": URI}})
+    assert [(one["name"], [child["name"] for child in one.get("children", [])]) for one in outline["children"]] == [
+        ("battery", []),
+        ("axes", []),
+        ("goto", ["target", "ok", "ko"]),
+    ]
+
+
+def test_changes_and_proofs(editor):
+    document = {"uri": URI, "languageId": "alula", "version": 1, "text": TEXT}
+    editor.send("textDocument/didOpen", {"textDocument": document})
+    assert editor.told() == {"uri": URI, "diagnostics": []}
+
+    # A part of the text that changes; a hint as a change.
+    change = {"range": place(12, 31, 35), "text": "FREI"}
+    editor.send("textDocument/didChange", {"textDocument": {"uri": URI, "version": 5}, "contentChanges": [change]})
+    (finding,) = editor.told()["diagnostics"]
+    assert finding["code"] == "ALU203"
+    document = {"textDocument": {"uri": URI}}
+    (action,) = editor.ask("textDocument/codeAction", {**document, "range": finding["range"], "context": {"diagnostics": []}})
+    assert action["title"] == "Change `FREI` to `FREE`"
+    assert action["edit"]["changes"][URI] == [{"range": place(12, 31, 35), "newText": "FREE"}]
+    assert editor.change(TEXT, 6) == []
+
+    # Indentation.
+    assert editor.ask("textDocument/formatting", {**document, "options": {"tabSize": 2, "insertSpaces": True}}) in ([], None)
+    editor.change(TEXT.replace("    input", "input"), 7)
+    (edit,) = editor.ask("textDocument/formatting", {**document, "options": {"tabSize": 2, "insertSpaces": True}})
+    assert edit["newText"] == TEXT
+
+    # What is proved is told when the file is saved.
+    faulty = TEXT.replace("start take", "start take\n    invariant mine: axes == FREE")
+    editor.change(faulty, 8)
+    editor.send("textDocument/didSave", document)
+    told = {finding["code"]: finding["message"] for finding in editor.told()["diagnostics"]}
+    assert "1. initially axes == FREE\n2. goto starts: axes FREE -> USED; `mine` of goto is false and ends it" in told["ALU510"]
 
 
 def test_completion_in_a_file_that_is_broken_at_the_cursor(editor):

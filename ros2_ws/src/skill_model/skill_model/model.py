@@ -415,20 +415,27 @@ class Skillset:
 
     def resource(self, name: str) -> Resource:
         """Return the resource of this name; raise KeyError."""
-        if name in self._resources:
-            return self._resources[name]
+        if name in self.resource_index:
+            return self.resource_index[name]
         raise KeyError(f"skillset {self.name} has no resource {name}; it has {', '.join(r.name for r in self.resources)}")
 
     def skill(self, name: str) -> Skill:
         """Return the skill of this name; raise KeyError."""
-        if name in self._skills:
-            return self._skills[name]
+        if name in self.skill_index:
+            return self.skill_index[name]
         raise KeyError(f"skillset {self.name} has no skill {name}; it has {', '.join(s.name for s in self.skills)}")
 
     @cached_property
-    def _resources(self) -> Mapping[str, Resource]:
+    def resource_index(self) -> Mapping[str, Resource]:
+        """The resources by name; of two of one name the first."""
         return {resource.name: resource for resource in reversed(self.resources)}
 
     @cached_property
-    def _skills(self) -> Mapping[str, Skill]:
+    def skill_index(self) -> Mapping[str, Skill]:
+        """The skills by name; of two of one name the first."""
         return {skill.name: skill for skill in reversed(self.skills)}
+
+    @cached_property
+    def data_index(self) -> Mapping[str, Data]:
+        """The data by name; of two of one name the first."""
+        return {data.name: data for data in reversed(self.data)}

@@ -29,7 +29,7 @@ def condition_findings(
     skillset: Skillset, condition: Expression, where: str, *, data_allowed: bool, executions_allowed: bool = False
 ) -> Iterator[Diagnostic]:
     """Yield what is wrong with the resources, states, data and skills that a condition asks; ``where`` names the condition."""
-    resources = {resource.name: resource for resource in skillset.resources}
+    resources = skillset.resource_index
     for atom in atoms(condition):
         if isinstance(atom, ResourceIs):
             yield from _resource_atom(skillset, resources, atom)
@@ -52,7 +52,7 @@ def _resource_atom(skillset: Skillset, resources: Mapping[str, Resource], atom: 
     if atom.resource in resources:
         if atom.state not in resources[atom.resource].states:
             yield unknown_state(resources[atom.resource], atom.state, atom.span)
-    elif any(data.name == atom.resource for data in skillset.data):
+    elif atom.resource in skillset.data_index:
         message = f"skillset `{skillset.name}` has no resource `{atom.resource}`, it is data"
         hint = f'data is compared with a number, true, false or a text: `{atom.resource} == "{atom.state}"`'
         yield error("ALU202", message, atom.span, hint=hint)
@@ -61,23 +61,23 @@ def _resource_atom(skillset: Skillset, resources: Mapping[str, Resource], atom: 
 
 
 def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
-    types = {data.name: data.type for data in skillset.data}
-    if atom.data not in types:
+    data = skillset.data_index.get(atom.data)
+    if data is None:
         message = f"skillset `{skillset.name}` has no data `{atom.data}`"
-        yield error("ALU206", message, atom.span, hint=nearest(atom.data, types))
+        yield error("ALU206", message, atom.span, hint=nearest(atom.data, skillset.data_index))
         return
     if isinstance(atom.value, bool | str) and atom.comparison not in {Comparison.EQ, Comparison.NE}:
         kind = "a truth value" if isinstance(atom.value, bool) else "a text"
         yield error("ALU214", f"`{atom.comparison.value}` doesn't compare {kind}; use == or !=", atom.span)
     yield from unit_findings(atom.unit, atom.span)
-    python = ros_types.PRIMITIVES.get(types[atom.data])
+    python = ros_types.PRIMITIVES.get(data.type)
     if python is None:
         return
     if atom.path:
-        message = f"data `{atom.data}` is a {types[atom.data]} and has no field `{'.'.join(atom.path)}`"
+        message = f"data `{atom.data}` is a {data.type} and has no field `{'.'.join(atom.path)}`"
         yield error("ALU214", message, atom.span)
     elif (python in {"int", "float"}) != isinstance(atom.value, float) or (python == "str") != isinstance(atom.value, str):
-        yield error("ALU214", f"data `{atom.data}` is a {types[atom.data]} and can't be compared with {atom.value!r}", atom.span)
+        yield error("ALU214", f"data `{atom.data}` is a {data.type} and can't be compared with {atom.value!r}", atom.span)
 
 
 def unit_findings(unit: str, span: Span) -> Iterator[Diagnostic]:
@@ -89,7 +89,7 @@ def unit_findings(unit: str, span: Span) -> Iterator[Diagnostic]:
 
 def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> Iterator[Diagnostic]:
     """Yield what is wrong with an effect; with ``any_arrow`` it may take extern arrows, too."""
-    resources = {resource.name: resource for resource in skillset.resources}
+    resources = skillset.resource_index
     seen: set[str] = set()
     for change in effect.assignments:
         if change.resource in seen:
