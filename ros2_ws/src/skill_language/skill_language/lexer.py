@@ -17,6 +17,7 @@ MAX_CHARACTERS = 300_000
 """Models are a few kilobytes; whatever is larger than this is no model, and is refused before it costs time."""
 
 MAX_ERRORS = 40
+MAX_NAME = 200
 
 
 class Kind(Enum):
@@ -131,9 +132,18 @@ def tokenize(source: Source) -> list[Token]:
             if source.full:
                 break
         else:
-            tokens.append(Token(Kind[str(group)], match.group(), line, column))
+            tokens.append(_shortened(source, Token(Kind[str(group)], match.group(), line, column)))
     tokens.append(Token(Kind.END, "", line, len(text) - line_start + 1))
     return tokens
+
+
+def _shortened(source: Source, token: Token) -> Token:
+    """Return a token as it is, or a name that is too long cut, for messages that people can read."""
+    if token.kind is not Kind.NAME or len(token.text) <= MAX_NAME:
+        return token
+    length, token.text = len(token.text), token.text[:MAX_NAME]
+    source.report("ALU110", f"a name of {length} characters; there may be {MAX_NAME}", source.span(token))
+    return token
 
 
 def number(source: Source, token: Token) -> float:

@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from skill_language.check import MAX_FINDINGS, check
 from skill_language.errors import Diagnostic, LanguageError, Severity, nearest
-from skill_language.lexer import MAX_CHARACTERS
+from skill_language.lexer import MAX_CHARACTERS, Source, tokenize
 from skill_language.notation import SUFFIXES, Notation, read
 from skill_language.syntax.document import Document, typed_elements, with_known_types
 from skill_model.model import Skillset, Span
@@ -192,9 +192,21 @@ def _resolved(file: ModelFile, skillset: Skillset, known: Mapping[str, Skillset]
         if types is None:
             message = f"`{skillset.name}` uses `{use}`, which is no skillset of these files, nor a file beside this one"
             hint = nearest(use, set(known) - {skillset.name})
-            file.add([Diagnostic("ALU224", message, skillset.span, hint=hint)])
+            file.add([Diagnostic("ALU224", message, _use_place(file, skillset, use), hint=hint)])
         names += types or ()
     return with_known_types(skillset, names)
+
+
+def _use_place(file: ModelFile, skillset: Skillset, name: str) -> Span:
+    """Return where a skillset says that it uses another one."""
+    source, using = Source(file.path, file.text), False
+    for token in tokenize(source):
+        if (token.line, token.column) <= (skillset.span.line, skillset.span.column):
+            continue
+        if using and token.text == name:
+            return source.span(token)
+        using = token.text == "use" or (using and token.text in {"{", ","})
+    return skillset.span
 
 
 def _beside(file: ModelFile, name: str) -> tuple[str, ...] | None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from enum import Enum
 from itertools import pairwise
 from pathlib import PurePath
 
-from skill_language.lexer import Kind, Source, Token, tokenize
+from skill_language.lexer import MAX_CHARACTERS, Kind, Source, Token, tokenize
 from skill_language.paper import PAPER
 from skill_language.rl import ROBOT_LANGUAGE
 from skill_language.syntax.document import Dialect, Document, read_document
@@ -23,6 +24,7 @@ class Notation(Enum):
 SUFFIXES: Mapping[str, Notation] = {".skill": Notation.PAPER, ".rl": Notation.ROBOT_LANGUAGE}
 _DIALECTS: Mapping[Notation, Dialect] = {Notation.PAPER: PAPER, Notation.ROBOT_LANGUAGE: ROBOT_LANGUAGE}
 
+_CALLED: Mapping[Notation, str] = {Notation.PAPER: "the paper's notation", Notation.ROBOT_LANGUAGE: "the Robot Language"}
 _PAPER_ROWS = frozenset(
     {("progress", "="), ("resource", "="), ("data", "="), ("violation", "="), ("apply", "="), ("period", "="), ("result", "{")}
 )
@@ -50,11 +52,23 @@ def read(text: str, file: str = "", notation: Notation | None = None) -> tuple[D
     """Return what could be read of a text, and the source with what is wrong with it (the notation only, not the meaning)."""
     told = notation or SUFFIXES.get(PurePath(file).suffix.lower())
     if told is not None:
-        return _read_in(text, file, told)
+        document, source = _read_in(text, file, told)
+        return document, _hinted(source, told)
     likely = notation_of(file, text)
     other = next(one for one in Notation if one is not likely)
     # A few words may not tell; then the notation in which it reads well does.
     return min((_read_in(text, file, one) for one in (likely, other)), key=lambda found: len(found[1].diagnostics))
+
+
+def _hinted(source: Source, told: Notation) -> Source:
+    """Say in the first finding of a text that it reads well in the other notation, if it does."""
+    if source.diagnostics and len(source.text) <= MAX_CHARACTERS:
+        other = next(one for one in Notation if one is not told)
+        if not _read_in(source.text, source.file, other)[1].diagnostics:
+            suffix = next(suffix for suffix, notation in SUFFIXES.items() if notation is other)
+            hint = f"the text reads well in {_CALLED[other]}: name the file *{suffix}"
+            source.diagnostics[0] = replace(source.diagnostics[0], hint=hint)
+    return source
 
 
 def _read_in(text: str, file: str, notation: Notation) -> tuple[Document, Source]:

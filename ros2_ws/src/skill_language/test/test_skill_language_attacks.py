@@ -290,3 +290,64 @@ def test_steps_are_in_the_json(tmp_path, capsys):
     assert last["ended"] == [{"skill": "watch", "execution": 1, "state": "RESOURCE_INVARIANT_VIOLATED", "name": "sees"}]
     assert [set(step["data"]) for step in finding["steps"]] == [set(), {"fps"}, {"fps"}, set()]
     assert [f"{number}. {step['text']}" for number, step in enumerate(finding["steps"], 1)] == finding["counterexample"][1:]
+
+
+# --- places and messages ------------------------------------------------------------------------------------------------
+
+PLACES = [
+    ("skillset s {\n  use other\n}", "ALU224", (2, 7, 12), "uses `other`"),
+    (
+        "skillset s { resource r { state { A B } initial A transition all }\nskill f { start r -> C success OK } }",
+        "ALU203",
+        (2, 22, 23),
+        "`C`",
+    ),
+    (
+        "skillset s { resource r { state { A B } initial A transition all }\nskill f { start q -> A success OK } }",
+        "ALU202",
+        (2, 17, 18),
+        "`q`",
+    ),
+    ("skillset s { resource r { state { A B } initial A transition { A -> B  B -> Ce } } }", "ALU203", (1, 77, 79), "`Ce`"),
+    (
+        "skillset s { resource r { state { A B } initial A transition all }\nskill f { start { r -> A r -> B } success OK } }",
+        "ALU212",
+        (2, 26, 32),
+        "the effect sets `r` twice",
+    ),
+    (
+        "skillset s { resource r { state { A B } initial A transition all }\n"
+        "skill f {\nprecondition { p: r == A\nstart r -> B\nsuccess OK } }",
+        "ALU104",
+        (4, 1, 6),
+        "the block opened in line 3 has no `}` before `start` begins",
+    ),
+    (f"skillset s {{ data {'a' * 5000}: bool }}", "ALU110", (1, 19, 219), "a name of 5000 characters"),
+]
+
+
+@pytest.mark.parametrize(("text", "code", "place", "told"), PLACES, ids=[f"{code} {told[:20]}" for _, code, _, told in PLACES])
+def test_a_finding_is_where_the_fault_is(text, code, place, told, tmp_path):
+    (tmp_path / "s.rl").write_text(text)
+    (file,) = check_files([tmp_path / "s.rl"])
+    finding = next(one for one in file.findings if one.code == code)
+    assert (finding.span.line, finding.span.column, finding.span.end_column) == place
+    assert told in finding.message
+    assert "``" not in finding.render()
+    assert len(finding.render()) < 1500
+
+
+def test_hints_name_the_notation_and_what_can_be_asked(tmp_path):
+    paper = "skillset s { resource r { initial A  A -> B  B -> A } skill f { precondition { p: resource = (r == A) } result { R } } }"
+    (tmp_path / "s.rl").write_text(paper.replace("result { R }", "effect { e: r -> A } result { R: apply = e }"))
+    (file,) = check_files([tmp_path / "s.rl"])
+    assert file.findings[0].hint == "the text reads well in the paper's notation: name the file *.skill"
+    (tmp_path / "s.rl").write_text("skillset s { skill f { precondition { p: a.r == A } success OK } }")
+    (file,) = check_files([tmp_path / "s.rl"])
+    assert "those of another skillset can't be asked" in file.findings[0].hint
+
+
+def test_a_wait_that_is_shorter_than_the_period_of_its_data_is_told(tmp_path):
+    text = "skillset s { data fps: float64 period 5 s skill f { invariant { i { guard fps > 10 for 1 ms } } success OK } }"
+    assert checked(tmp_path, text) == [[("ALU305", 1)]]
+    assert checked(tmp_path, text.replace("1 ms", "6 s")) == [[]]

@@ -148,7 +148,7 @@ def test_an_editing_session(editor):
     assert (first["code"], first["severity"], first["range"]) == ("ALU103", 1, place(10, 17, 22))
     (finding,) = editor.change(wrong.replace("target Point", "target: Point"), 3)
     assert finding["code"] == "ALU203"
-    assert finding["range"] == place(12, 32, 43)
+    assert finding["range"] == place(12, 40, 43)
     assert "did you mean `FREE`?" in finding["message"]
     assert editor.change(TEXT, 4) == []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from skill_language.errors import Diagnostic, Severity, nearest, quoted
@@ -51,13 +52,13 @@ def condition_findings(
 def _resource_atom(skillset: Skillset, resources: Mapping[str, Resource], atom: ResourceIs) -> Iterator[Diagnostic]:
     if atom.resource in resources:
         if atom.state not in resources[atom.resource].states:
-            yield unknown_state(resources[atom.resource], atom.state, atom.span)
+            yield unknown_state(resources[atom.resource], atom.state, last_word(atom.span, atom.state))
     elif atom.resource in skillset.data_index:
         message = f"skillset `{skillset.name}` has no resource `{atom.resource}`, it is data"
         hint = f'data is compared with a number, true, false or a text: `{atom.resource} == "{atom.state}"`'
         yield error("ALU202", message, atom.span, hint=hint)
     else:
-        yield _unknown_resource(skillset, atom.resource, atom.span)
+        yield _unknown_resource(skillset, atom.resource, first_word(atom.span, atom.resource))
 
 
 def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
@@ -93,15 +94,13 @@ def effect_findings(skillset: Skillset, effect: Effect, *, any_arrow: bool) -> I
     seen: set[str] = set()
     for change in effect.assignments:
         if change.resource in seen:
-            yield warning(
-                "ALU212", f"effect `{effect.name}` sets `{change.resource}` twice", change.span, hint="one change follows the other"
-            )
+            yield warning("ALU212", f"{_called(effect)} sets `{change.resource}` twice", change.span, hint="one change follows the other")
         seen.add(change.resource)
         resource = resources.get(change.resource)
         if resource is None:
-            yield _unknown_resource(skillset, change.resource, change.span)
+            yield _unknown_resource(skillset, change.resource, first_word(change.span, change.resource))
         elif change.target not in resource.states:
-            yield unknown_state(resource, change.target, change.span)
+            yield unknown_state(resource, change.target, last_word(change.span, change.target))
         else:
             yield from _arrow(effect, resource, change.target, change.span, any_arrow=any_arrow)
 
@@ -135,6 +134,16 @@ def _unknown_resource(skillset: Skillset, name: str, span: Span) -> Diagnostic:
 def unknown_state(resource: Resource, state: str, span: Span) -> Diagnostic:
     """Return the finding that a resource has no such state."""
     return error("ALU203", f"resource `{resource.name}` has no state `{state}`", span, hint=nearest(state, resource.states))
+
+
+def first_word(span: Span, word: str) -> Span:
+    """Return the place of the word that a place begins with."""
+    return replace(span, end_column=min(span.end_column, span.column + len(word)))
+
+
+def last_word(span: Span, word: str) -> Span:
+    """Return the place of the word that a place ends with."""
+    return replace(span, column=max(span.column, span.end_column - len(word)))
 
 
 def duplicates(what: str, elements: Sequence[Named]) -> Iterator[Diagnostic]:

@@ -19,7 +19,7 @@ from skill_language.check.references import (
     warning,
 )
 from skill_language.errors import Diagnostic
-from skill_model.model import NO_EFFECT, Comparison, DataIs, Effect, Hold, Invariant, Skill, Skillset
+from skill_model.model import NO_EFFECT, Comparison, DataIs, Effect, Hold, Invariant, Skill, Skillset, atoms
 from skill_model.units import UNIT_IN_SI
 
 
@@ -69,10 +69,11 @@ def _conditions(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
         yield from condition_findings(skillset, result.postcondition, f"the postcondition of `{result.name}`", data_allowed=False)
 
 
-def _patience(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+def _patience(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     for invariant in skill.invariants:
         if invariant.hold is not None:
             yield from _hold(invariant, invariant.hold)
+            yield from _short(skillset, invariant, invariant.hold)
 
 
 def _hold(invariant: Invariant, hold: Hold) -> Iterator[Diagnostic]:
@@ -93,6 +94,15 @@ def _hold(invariant: Invariant, hold: Hold) -> Iterator[Diagnostic]:
         side = "below" if below[condition.comparison] else "above"
         message = f"invariant `{invariant.name}` recovers at a value that is not {side} its threshold"
         yield error("ALU221", message, hold.span, hint="it recovers where the condition holds with something to spare")
+
+
+def _short(skillset: Skillset, invariant: Invariant, hold: Hold) -> Iterator[Diagnostic]:
+    """Warn of a duration within which no second value of its data comes."""
+    asked = {atom.data for atom in atoms(invariant.condition) if isinstance(atom, DataIs)}
+    for data in skillset.data:
+        if data.name in asked and data.period_s is not None and 0 < hold.for_s < data.period_s:
+            message = f"invariant `{invariant.name}` waits for {hold.for_s:g} s, and `{data.name}` comes every {data.period_s:g} s"
+            yield warning("ALU305", message, hold.span, hint="within that time no better value can come: one bad value ends the skill")
 
 
 def _effects(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:

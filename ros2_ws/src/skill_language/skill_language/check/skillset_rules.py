@@ -11,7 +11,9 @@ from skill_language.check.references import (
     duplicates,
     effect_findings,
     error,
+    first_word,
     for_generator,
+    last_word,
     names_of_types,
     one_in_code,
     ros_name,
@@ -60,7 +62,8 @@ def _states(resource: Resource) -> Iterator[Diagnostic]:
     for arrow in resource.transitions:
         for state in dict.fromkeys((arrow.source, arrow.target)):
             if state not in resource.states:
-                yield unknown_state(resource, state, arrow.span)
+                word = first_word if state == arrow.source else last_word
+                yield unknown_state(resource, state, word(arrow.span, state))
         key = (arrow.source, arrow.target, arrow.extern)
         if key in seen:
             yield error("ALU201", f"the arrow `{arrow.source} -> {arrow.target}` of `{resource.name}` is given twice", arrow.span)

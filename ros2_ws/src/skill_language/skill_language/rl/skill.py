@@ -55,6 +55,12 @@ def read_skill(cursor: Cursor) -> Skill:
     return reader.parts.build(name, cursor.source)
 
 
+def _begins_block(cursor: Cursor) -> bool:
+    """Tell whether a line begins with `start r -> S`, `success ok {` or `input x: T`: an entry of no block begins with two names."""
+    begins = cursor.here.text in BLOCKS and cursor.here.kind is Kind.NAME and cursor.here.line > cursor.previous.line
+    return begins and cursor.ahead().kind is Kind.NAME and cursor.ahead(2).text in {"->", "{", ":"} and cursor.ahead().text != "guard"
+
+
 class _SkillReader(SkillReader):
     """Reads the blocks of one skill in any order."""
 
@@ -93,7 +99,7 @@ class _SkillReader(SkillReader):
                 raise self.unknown(word, BLOCKS)
 
     def _several(self, entry: Callable[[], None]) -> None:
-        one_or_block(self.cursor, entry, self.outside)
+        one_or_block(self.cursor, entry, lambda: self.outside() or _begins_block(self.cursor))
 
     # --- blocks ---------------------------------------------------------------------------------------------------
 

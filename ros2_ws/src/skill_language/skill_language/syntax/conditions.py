@@ -160,7 +160,9 @@ class _Reader:
         if cursor.here.kind is Kind.STRING:
             return string_value(cursor.advance()), ""
         if cursor.here.kind is not Kind.NUMBER:
-            raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`")
+            other = cursor.here.kind is Kind.NAME and cursor.previous.text in _EQUALITIES
+            hint = "states are compared with a resource's name alone; those of another skillset can't be asked" if other else ""
+            raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`", hint=hint)
         return quantity(cursor, enclosed=self._enclosed > 0)
 
     def _too_deep(self) -> NoReturn:
