@@ -20,6 +20,7 @@ from skill_runtime.core.execution import Execution as Running
 from skill_runtime.handle import SkillHandle
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.local import LocalManagers, LocalWorld
+from skill_runtime.local.values import complete
 
 READY_S = 1.0
 
@@ -136,7 +137,9 @@ class _Player:
 
     def _start(self, step: StoryStep) -> str:
         assert step.execution is not None  # noqa: S101 - a start has one
-        handle = self._client.start(step.execution.skill)
+        # A story knows nothing of inputs: each is what an empty message has.
+        inputs = complete(self._skillset.skill(step.execution.skill).inputs, {}, {})
+        handle = self._client.start(step.execution.skill, **inputs)
         if step.refused:
             self._world.run_for(0.0)
             return "" if handle.done else f"{step.execution.skill} starts"

@@ -41,7 +41,14 @@ skillset watch {
 OUTSIDE = """
 skillset uav {
   resource authority { state { Pilot Drone } initial Pilot transition { Pilot -> Drone  Drone -> Pilot } }
-  skill goto { precondition { a: authority == Drone } success arrived }
+  type Point
+  skill goto {
+    input { target: Point  speed: float64  fast: bool }
+    output { reached: float64 }
+    precondition { a: authority == Drone }
+    success arrived
+  }
+  property ends: goto running leads to authority == Pilot
   property no: never goto running
 }
 """
