@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from alula_testing.attacks import ATTACKS, LocalGraph
+from alula_testing.attacks.rampage import Rampage
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 END_S = 60.0
@@ -105,3 +106,17 @@ def test_second_managers_of_a_skillset_refuse_to_start(attack):
     assert found["code"] == 2, found
     assert "navigation" in found["said"], found
     assert found["unanswered"] == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whatever_clients_and_hooks_do_each_execution_ends_once_and_nothing_runs_on(seed):
+    found = Rampage(seed).run(600)
+    assert {what: found[what] for what in ("open", "ended twice", "running on", "unanswered", "not told", "held")} == {
+        "open": [],
+        "ended twice": [],
+        "running on": [],
+        "unanswered": 0,
+        "not told": [],
+        "held": {},
+    }
+    assert len(found["outcomes"]) >= 5, found

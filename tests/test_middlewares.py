@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from alula_testing.misbehaviours import MISBEHAVIOURS
 from alula_testing.traces import Behaviour, Script, Step, play
 from alula_testing.traces.stage_none import NoneStage
 
@@ -244,6 +245,33 @@ def test_hooks_that_raise(players, hook):
     else:
         assert trace["ends"]["one"][::2] == ["FAILED", f"{hook} raised RuntimeError: {hook} was told to"]
     assert states(trace, "two") == ["REQUESTED", "RUNNING"]
+
+
+def provoked(name: str, hook: str) -> list[Step]:
+    """Return a start, and what has the hook of its execution called; each leaves the vehicle as it was."""
+    start = Step("start", name, "hover", {"duration": 1})
+    lost, back = (Step("transition", resource="SDK_authority", state=state) for state in ("UNAVAILABLE", "AVAILABLE"))
+    following = {
+        "on_interrupt": [Step("interrupt", name)],
+        "on_pause": [Step("pause", name)],
+        "on_resume": [Step("pause", name), Step("resume", name)],
+        "on_violation": [lost, back],
+        "on_failure": [Step("fail", name)],
+    }
+    return [start, *following.get(hook, [])]
+
+
+def test_hooks_that_misbehave_end_their_own_execution_only(players):
+    steps = [step for name, misbehaviour in MISBEHAVIOURS.items() for step in provoked(name, misbehaviour.hook)]
+    behaviours = tuple(Behaviour(misbehaves=name, pauses=True) for name in MISBEHAVIOURS)
+    trace = compare(players, Script((*FLYING, *steps, Step("start", "as ever", "hover", {"duration": 1})), {"hover": behaviours}))
+    for name, misbehaviour in MISBEHAVIOURS.items():
+        outcome, _, message, done = trace["ends"][name]
+        assert (name, outcome, done) == (name, misbehaviour.outcome, True), message
+        assert misbehaviour.says in message
+        assert states(trace, name)[-1] == outcome
+        assert len([state for state in states(trace, name) if state == outcome]) == 1
+    assert states(trace, "as ever") == ["REQUESTED", "RUNNING"]
 
 
 INPUTS = {

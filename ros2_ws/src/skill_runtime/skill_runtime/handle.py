@@ -54,7 +54,9 @@ class Ended(Generic[OutputsT, ResultT]):
         raise SkillFailedError(f"{self.skill} was to end with {wanted}, but {self}")
 
     def __str__(self) -> str:
-        why = ": ".join(part for part in (self.result, self.message) if part)
+        # The message of a precondition or an invariant begins with its name.
+        named = self.message.startswith(f"{self.result}: ")
+        why = self.message if named else ": ".join(part for part in (self.result, self.message) if part)
         return f"{self.outcome}{f' ({why})' if why else ''}"
 
 

@@ -26,7 +26,8 @@ class SkillHooks:
     at most one of ``on_interrupt``, ``on_violation``, ``on_failure``. The last never overtakes ``on_dispatch``, ``on_pause`` or
     ``on_resume``, and none of them is called after ``execution.terminate`` was accepted. ``on_emergency`` may come while any of
     them still waits. Hooks of different executions may run at the same time in different threads.
-    A hook that raises ends its execution as FAILED.
+    A hook that raises, whatever it raises, or takes longer than the managers' ``hook_timeout_s`` to return ends its execution as
+    FAILED, and no other. Texts and outputs that it hands over are made fit for every middleware.
     """
 
     inputs_type: ClassVar[type | None] = None
@@ -38,7 +39,10 @@ class SkillHooks:
 
     @unwritten
     def validate(self, inputs: object) -> str:  # noqa: ARG002
-        """Return "" to accept the request, or why it is refused. Called first; changes nothing; may wait a bounded time."""
+        """Return "" to accept the request, or why it is refused. Called first; changes nothing; may wait a bounded time.
+
+        What is no text ends the execution as FAILED.
+        """
         return ""
 
     @unwritten
@@ -46,7 +50,7 @@ class SkillHooks:
         """Start the function. Called once, after the start effect was applied; returns soon."""
 
     def progress(self, execution: Execution) -> float:
-        """Return how far the function is, 0 to 1. Called every period of the model while RUNNING; must not wait."""
+        """Return how far the function is, 0 to 1. Called every period of the model while RUNNING."""
         return execution.progress
 
     def on_interrupt(self, execution: Execution) -> bool | None:

@@ -156,10 +156,24 @@ def test_inputs_that_cannot_be_made_end_their_request_only(anyhow):
     assert running.state is S.RUNNING
 
 
-def test_a_limit_that_is_none_is_refused(ros2_domain):
+@pytest.mark.parametrize("hook", ["validate", "progress"])
+def test_a_hook_that_does_not_return_is_given_up_with_the_reason(spinning, hook):
+    navigation = Navigation(spinning, parameter_overrides=[Parameter("hook_timeout_s", value=0.5)])
+    navigation.bring(FLYING)
+    release = threading.Event()
+    navigation.hooks["hover"].acts[hook] = lambda _: release.wait(60.0)
+    hung = navigation.client.start("hover", duration=1)
+    assert hung.wait(SOON_S)
+    assert (hung.state, hung.message) == (S.FAILED, f"{hook} has not returned within 0.5 s")
+    assert navigation.fly().state is S.RUNNING
+    release.set()
+
+
+@pytest.mark.parametrize("name", ["interrupt_timeout_s", "hook_timeout_s"])
+def test_a_limit_that_is_none_is_refused(ros2_domain, name):
     hooks = {skill.name: SkillHooks() for skill in SKILLSET.skills}
-    with pytest.raises(SkillRuntimeError, match="interrupt_timeout_s is 0"):
-        SkillsetNode(SKILLSET, navigation_actions, lambda _: hooks, parameter_overrides=[Parameter("interrupt_timeout_s", value=0.0)])
+    with pytest.raises(SkillRuntimeError, match=f"{name} is 0"):
+        SkillsetNode(SKILLSET, navigation_actions, lambda _: hooks, parameter_overrides=[Parameter(name, value=0.0)])
 
 
 def test_workers_never_wait_for_each_other_and_end():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import threading
 
 import pytest
@@ -16,6 +17,8 @@ from alula_testing.misbehaviours import CIRCLE, MISBEHAVIOURS, Misbehaviour, Unp
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Interrupt, Invariant, Parameter, Result, Skill
 from skill_runtime.core.events import ExecutionEvent, event_record, read_event
+from skill_runtime.core.execution import Execution
+from skill_runtime.core.hook_calls import call_hook
 from skill_runtime.core.watchdog import TICK_S, Watchdog
 from skill_runtime.core.wire import TEXT_LIMIT, as_text
 from skill_runtime.workers import Workers
@@ -144,6 +147,21 @@ def test_an_output_that_fits_is_kept_as_its_type_holds_it(kind, value, kept):
     assert execution.state is S.TERMINATED
     assert execution.outputs == {"reached": kept}
     assert type(execution.outputs["reached"]) is type(kept)
+
+
+@pytest.mark.parametrize("misbehaviour", MISBEHAVIOURS.values(), ids=MISBEHAVIOURS.keys())
+def test_what_comes_of_a_hook_can_be_sent_to_another_process(misbehaviour):
+    hooks = Bench().hooks["takeoff"]
+    hooks.acts[misbehaviour.hook] = misbehaviour.act
+    answer = call_hook(hooks, Execution(NoEngine(), "1", "takeoff", {}), misbehaviour.hook)
+    assert pickle.loads(pickle.dumps(answer)) == answer  # noqa: S301 - our own
+
+
+class NoEngine:
+    """Knows no execution any more."""
+
+    def __getattr__(self, name: str):
+        return lambda *_: False
 
 
 def test_an_end_that_cannot_be_told_with_its_values_is_told_without_them():

@@ -50,6 +50,12 @@ def test_an_execution_has_one_end():
         ended.expect("HIGH", "HIGHER")
 
 
+def test_a_message_that_begins_with_the_name_of_its_reason_does_not_get_it_twice():
+    one = handle()
+    one.end(S.NOT_READY, "idle", "idle: mapping_process is RUNNING")
+    assert str(one.ended) == "NOT_READY (idle: mapping_process is RUNNING)"
+
+
 def test_an_end_that_is_no_result_is_never_expected():
     one = handle()
     one.fail("gone")

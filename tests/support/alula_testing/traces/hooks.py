@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
+from alula_testing.misbehaviours import MISBEHAVIOURS
 from alula_testing.traces.script import Behaviour
 from skill_runtime.core.execution import Execution
 from skill_runtime.hooks import SkillHooks
@@ -32,30 +34,40 @@ class ScriptedHooks(SkillHooks):
         self.validated += 1
         if self._next.raises == "validate":
             raise RuntimeError("validate was told to")
+        if self._next.misbehaves and MISBEHAVIOURS[self._next.misbehaves].hook == "validate":
+            return MISBEHAVIOURS[self._next.misbehaves].act(inputs)  # type: ignore[no-any-return]  # no text, perhaps
         return self._next.refuse
 
     def on_dispatch(self, execution: Execution) -> None:
         """Start the function, which may end by itself."""
         now = self._of[execution.id] = self._next
+        if now.misbehaves and MISBEHAVIOURS[now.misbehaves].hook == "progress":
+            self.ending.add(execution.id)
         self._do("on_dispatch", execution)
         if now.ends:
             self.ending.add(execution.id)
             self._after(now.after_s, lambda: execution.terminate(now.ends, now.message))
         self.dispatched.add(execution.id)
 
+    def progress(self, execution: Execution) -> float:
+        """Tell of no progress."""
+        misbehaviour = MISBEHAVIOURS.get(self._of[execution.id].misbehaves)
+        return misbehaviour.act(execution) if misbehaviour is not None and misbehaviour.hook == "progress" else super().progress(execution)
+
     def on_pause(self, execution: Execution) -> str | None:
         """Have the function rest, where it can."""
-        self._do("on_pause", execution)
-        return "" if self._of[execution.id].pauses else super().on_pause(execution)
+        answer: str | None = self._do("on_pause", execution)
+        return answer or ("" if self._of[execution.id].pauses else super().on_pause(execution))
 
     def on_resume(self, execution: Execution) -> str | None:
         """Have the function go on."""
-        self._do("on_resume", execution)
-        return ""
+        answer: str | None = self._do("on_resume", execution)
+        return answer or ""
 
-    def on_interrupt(self, execution: Execution) -> None:
+    def on_interrupt(self, execution: Execution) -> bool | None:
         """Stop the function."""
-        self._do("on_interrupt", execution)
+        answer: bool | None = self._do("on_interrupt", execution)
+        return answer
 
     def on_violation(self, execution: Execution) -> None:
         """Stop the function."""
@@ -65,7 +77,11 @@ class ScriptedHooks(SkillHooks):
         """Stop the function."""
         self._do("on_failure", execution)
 
-    def _do(self, hook: str, execution: Execution) -> None:
+    def _do(self, hook: str, execution: Execution) -> Any:
         self.calls.setdefault(execution.id, []).append(hook)
-        if self._of[execution.id].raises == hook:
+        behaviour = self._of[execution.id]
+        if behaviour.raises == hook:
             raise RuntimeError(f"{hook} was told to")
+        if behaviour.misbehaves and MISBEHAVIOURS[behaviour.misbehaves].hook == hook:
+            return MISBEHAVIOURS[behaviour.misbehaves].act(execution)
+        return None

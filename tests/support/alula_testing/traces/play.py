@@ -37,6 +37,7 @@ class Player:
             "start": self._start,
             "interrupt": self._interrupt,
             "finish": self._finish,
+            "fail": self._fail,
             "transition": self._transition,
             "pause": lambda step: self._set_paused(step, paused=True),
             "resume": lambda step: self._set_paused(step, paused=False),
@@ -77,6 +78,11 @@ class Player:
     def _finish(self, step: Step) -> None:
         handle = self._handles[step.label]
         self._replies.append([self._stage.engine.terminate(handle.id, step.result)])
+        self._stage.until(lambda: handle.done, f"{handle} ends")
+
+    def _fail(self, step: Step) -> None:
+        handle = self._handles[step.label]
+        self._replies.append([self._stage.engine.fail(handle.id, "asked to")])
         self._stage.until(lambda: handle.done, f"{handle} ends")
 
     def _transition(self, step: Step) -> None:

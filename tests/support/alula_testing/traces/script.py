@@ -23,14 +23,17 @@ class Behaviour:
     """Goes with the result."""
     pauses: bool = False
     """Whether it can be paused."""
+    misbehaves: str = ""
+    """Name of the misbehaviour of ``alula_testing.misbehaviours`` that it shows."""
 
 
 @dataclass(frozen=True)
 class Step:
     """One stimulus; the next comes when nothing more follows from it.
 
-    ``start`` (label, skill, inputs, client), ``interrupt`` (label), ``finish`` (label, result), ``transition`` (resource, state),
-    ``pause`` and ``resume`` (label), ``why`` (skill, inputs), ``late``: a client that comes now and tells what it sees.
+    ``start`` (label, skill, inputs, client), ``interrupt`` (label), ``finish`` (label, result), ``fail`` (label), ``transition``
+    (resource, state), ``pause`` and ``resume`` (label), ``why`` (skill, inputs), ``late``: a client that comes now and tells what
+    it sees.
     """
 
     do: str

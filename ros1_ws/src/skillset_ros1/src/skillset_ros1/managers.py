@@ -10,7 +10,7 @@ import rosgraph
 import rospy
 
 from skill_model.model import Skillset
-from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, SkillsetEngine
+from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.managers import DataBindings, Managers, generated_bindings
@@ -23,7 +23,8 @@ CONNECT_S = 1.0
 class SkillsetManagers:
     """The data manager, the resource manager and the skill managers of a skillset, in this process's rospy node.
 
-    Hooks are called on threads of their own; nothing of the node waits for one. Parameter of the node: ``~interrupt_timeout_s``.
+    Hooks are called on threads of their own; nothing of the node waits for one.
+    Parameters of the node: ``~interrupt_timeout_s``, ``~hook_timeout_s``.
 
     Args:
         skillset: the model.
@@ -57,6 +58,7 @@ class SkillsetManagers:
             hooks_factory(self),
             bindings=generated_bindings(skillset) if data_bindings is None else data_bindings,
             interrupt_timeout_s=float(rospy.get_param("~interrupt_timeout_s", DEFAULT_TIMEOUT_S)),
+            hook_timeout_s=float(rospy.get_param("~hook_timeout_s", HOOK_TIMEOUT_S)),
         )
         self.skills = self._managers.skills
 

@@ -35,7 +35,7 @@ from skill_runtime.core.outbox import Outbox
 from skill_runtime.core.records import SkillRecord
 from skill_runtime.core.watchdog import WATCHDOG
 from skill_runtime.core.why import Why, resources_of, sentence, unmet
-from skill_runtime.core.wire import as_text, fitted_outputs, wrong_return
+from skill_runtime.core.wire import as_text, fitted_outputs, fitted_return
 from skill_runtime.hooks import SkillHooks
 
 _LOG = logging.getLogger(__name__)
@@ -182,7 +182,7 @@ class SkillsetEngine:
     def _start(self, entry: Entry, validated: HookAnswer, submit: Submit) -> None:
         """Refuse the request or take its start step and call ``on_dispatch``."""
         self.tick()
-        refusal = as_text(validated.value)
+        refusal = str(validated.value or "")
         dispatch = self._hooks.written(entry.execution.skill, "on_dispatch")
         stops: list[Entry] = []
         with self._lock:
@@ -334,7 +334,7 @@ class SkillsetEngine:
     def _paused(self, entry: Entry, answer: HookAnswer, reply: Reply, *, paused: bool) -> None:
         """Enter the phase unless the hook refused or something else has come between."""
         verb, phase = ("paused", ExecutionState.PAUSED) if paused else ("resumed", ExecutionState.RUNNING)
-        reason = as_text(answer.value or "")
+        reason = str(answer.value or "")
         with self._lock:
             state = entry.execution.state
             if state.terminal or state is ExecutionState.INTERRUPTING:
@@ -427,11 +427,11 @@ class SkillsetEngine:
 
     def report_progress(self, execution_id: str, value: object) -> float | None:
         """Keep an execution's progress, held within 0 to 1; what is no number ends it as FAILED."""
-        wrong = wrong_return("progress", value)
-        if wrong:
-            self._fail(execution_id, wrong)
+        try:
+            told = float(str(fitted_return("progress", value)))
+        except ValueError as error:
+            self._fail(execution_id, str(error))
             return None
-        told = min(1.0, max(0.0, float(value)))  # type: ignore[arg-type]  # checked above
         with self._lock:
             entry = self._context.active(execution_id)
             if entry is None:
@@ -490,7 +490,7 @@ class SkillsetEngine:
         watch = None if limit_s is None else WATCHDOG.watch(limit_s, functools.partial(self._overdue, entry, hook, limit_s, then))
 
         def answered(answer: HookAnswer) -> None:
-            problem = f"{hook} raised {answer.error}" if answer.error else wrong_return(hook, answer.value)
+            problem = f"{hook} raised {answer.error}" if answer.error else answer.wrong
             if problem:
                 self._on_error(as_text(f"{entry.execution}: {problem}\n{answer.trace}".strip()))
             if watch is None or watch.end():
@@ -583,7 +583,7 @@ class SkillsetEngine:
     def ask_validate(self, skill: str, inputs: object, then: Callable[[str], None]) -> None:
         """Ask ``validate`` without an execution; ``then`` gets its refusal or "", or what is wrong with it, once, perhaps later."""
         entry = Entry(Execution(self, "", skill, inputs), Running("", skill))
-        self._call(entry, "validate", lambda answer: then(answer.error or as_text(answer.value)))
+        self._call(entry, "validate", lambda answer: then(answer.error or str(answer.value)))
 
     def explain(self, skill: str, refusal: str = "") -> Why:
         """Answer as ``why``, with what ``validate`` has said already."""

@@ -10,17 +10,18 @@ from typing import Protocol
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.execution import Execution
-from skill_runtime.core.wire import as_text, error_line
+from skill_runtime.core.wire import as_text, error_line, fitted_return
 from skill_runtime.hooks import SkillHooks
 
 
 @dataclass(frozen=True)
 class HookAnswer:
-    """What a hook returned, or type and first line (``error``) and the whole (``trace``) of what it raised."""
+    """What a hook returned, as its type; or what is wrong with that; or what it raised, as a line (``error``) and as a whole."""
 
     value: object = None
     error: str = ""
     trace: str = ""
+    wrong: str = ""
 
 
 Then = Callable[[HookAnswer], None]
@@ -60,9 +61,13 @@ class LocalHooks:
 def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookAnswer:
     """Call one hook and return what came of it."""
     try:
-        return HookAnswer(getattr(hooks, hook)(execution.inputs if hook == "validate" else execution))
+        value = getattr(hooks, hook)(execution.inputs if hook == "validate" else execution)
     except BaseException as error:  # noqa: BLE001 - whatever a hook raises, also SystemExit, ends its execution only
         return HookAnswer(error=error_line(error), trace=as_text(_trace(error)))
+    try:
+        return HookAnswer(fitted_return(hook, value))
+    except ValueError as error:
+        return HookAnswer(wrong=str(error))
 
 
 def _trace(error: BaseException) -> str:

@@ -78,25 +78,49 @@ _SCALARS: Mapping[str, Callable[[str, Any, str], object]] = {
 # --- what hooks return --------------------------------------------------------------------------------------------------
 
 
-def wrong_return(hook: str, value: object) -> str:
-    """Return what is wrong with what a hook has returned, or ""."""
-    expected = _EXPECTED.get(hook)
-    if expected is None or expected[1](value):
-        return ""
-    return f"{hook} returned {as_short_text(value)}; it has to return {expected[0]}"
+def fitted_return(hook: str, value: object) -> object:
+    """Return what a hook has returned as its type: a text, a number, False or None.
+
+    Raises:
+        ValueError: it is none of what the hook may return.
+    """
+    expected, fit = _RETURNS.get(hook, ("", _nothing))
+    try:
+        return fit(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{hook} returned {as_short_text(value)}; it has to return {expected}") from error
 
 
-def _is_finite(value: Any) -> bool:
-    return fitting.is_number(value) and math.isfinite(value)
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return as_text(value)
 
 
-def _is_answer(value: object) -> bool:
-    return value is None or isinstance(value, str)
+def _answer(value: object) -> str:
+    return "" if value is None else _text(value)
 
 
-_EXPECTED: Mapping[str, tuple[str, Callable[[object], bool]]] = {
-    "validate": ('a text, "" to accept the request', lambda value: isinstance(value, str)),
-    "progress": ("a number from 0 to 1", _is_finite),
-    "on_pause": ('why it can\'t, or ""', _is_answer),
-    "on_resume": ('why it can\'t, or ""', _is_answer),
+def _progress(value: Any) -> float:
+    """Return a progress, held within 0 to 1."""
+    if not fitting.is_number(value) or not math.isfinite(value):
+        raise ValueError
+    return min(1.0, max(0.0, float(value)))
+
+
+def _stopped(value: object) -> object:
+    """Return False where the stop is only under way."""
+    return False if value is False else None
+
+
+def _nothing(_: object) -> None:
+    """Drop what nobody asks for."""
+
+
+_RETURNS: Mapping[str, tuple[str, Callable[[Any], object]]] = {
+    "validate": ('a text, "" to accept the request', _text),
+    "progress": ("a number from 0 to 1", _progress),
+    "on_pause": ('why it can\'t, or ""', _answer),
+    "on_resume": ('why it can\'t, or ""', _answer),
+    "on_interrupt": ("False or nothing", _stopped),
 }

@@ -13,6 +13,7 @@ from typing import Any
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.execution import Execution
 from skill_runtime.core.hook_calls import HookAnswer, call_hook
+from skill_runtime.core.wire import as_text, error_line
 from skill_runtime.hook_processes.place import HOOKS, Snapshot
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.workers import Workers
@@ -64,24 +65,27 @@ class HookServer:
 
     def terminate(self, execution_id: str, result: str, message: str, outputs: Mapping[str, object]) -> bool:
         """End a running execution with a result of the model."""
-        return self._ask("terminate", execution_id, result, message, dict(outputs))
+        return self._ask("terminate", execution_id, as_text(result), as_text(message), dict(outputs))
 
     def fail(self, execution_id: str, message: str) -> bool:
         """End an execution as FAILED."""
-        return self._ask("fail", execution_id, message)
+        return self._ask("fail", execution_id, as_text(message))
 
     def interrupted(self, execution_id: str, message: str) -> bool:
         """End an execution that is being interrupted."""
-        return self._ask("interrupted", execution_id, message)
+        return self._ask("interrupted", execution_id, as_text(message))
 
     def set_outputs(self, execution_id: str, outputs: Mapping[str, object]) -> None:
         """Keep outputs of a running execution."""
         self._ask("set_outputs", execution_id, dict(outputs))
 
-    def _ask(self, method: str, *arguments: object) -> bool:
+    def _ask(self, method: str, execution_id: str, *arguments: object) -> bool:
         number = next(self._numbers)
         arrived, value = self._replies.setdefault(number, (threading.Event(), []))
-        self._send(("ask", number, method, arguments))
+        try:
+            self._send(("ask", number, method, (execution_id, *arguments)))
+        except Exception as error:  # noqa: BLE001 - of pickle, for whatever a hook hands over
+            return self._ask("fail", execution_id, f"what {self._skill} handed over can't be sent: {error_line(error)}")
         arrived.wait(REPLY_S if self._pipe is not None else 0.0)
         self._replies.pop(number, None)
         return bool(value and value[0])

@@ -6,7 +6,7 @@ import uuid
 from collections.abc import Callable, Mapping, Sequence
 
 from skill_model.model import Skillset
-from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, SkillsetEngine
+from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.hook_calls import HookCaller
@@ -39,6 +39,7 @@ class Managers:
         bindings: where each data comes from; None: nowhere but by ``data.receive``.
         make_inputs: by default the hooks' own ``make_inputs``; the plain values where the hooks are elsewhere.
         interrupt_timeout_s: how long a stop may take where the model does not say.
+        hook_timeout_s: how long a hook may take to return, in time that this process could run.
         on_rival: called with the reason when other managers of this skillset are there.
 
     Raises:
@@ -54,10 +55,13 @@ class Managers:
         bindings: DataBindings | None,
         make_inputs: MakeInputs | None = None,
         interrupt_timeout_s: float = DEFAULT_TIMEOUT_S,
+        hook_timeout_s: float = HOOK_TIMEOUT_S,
         on_rival: Callable[[str], None] | None = None,
     ) -> None:
         if not interrupt_timeout_s > 0:
             raise SkillRuntimeError(f"parameter interrupt_timeout_s is {interrupt_timeout_s:g}; a stop needs a positive time")
+        if not hook_timeout_s > 0:
+            raise SkillRuntimeError(f"parameter hook_timeout_s is {hook_timeout_s:g}; a hook needs a positive time")
         self.skillset = skillset
         self.middleware = middleware
         self.life = uuid.uuid4().hex[:12]
@@ -72,6 +76,7 @@ class Managers:
             defer=middleware.defer,
             on_error=middleware.log,
             interrupt_timeout_s=interrupt_timeout_s,
+            hook_timeout_s=hook_timeout_s,
         )
         self._alarm = EngineAlarm(middleware, self.engine)
         self.data = DataManager(middleware, skillset, bindings, self._update_data)

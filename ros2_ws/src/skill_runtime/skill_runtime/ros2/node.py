@@ -9,7 +9,7 @@ from typing import Any
 from rclpy.node import Node
 
 from skill_model.model import Skillset
-from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, SkillsetEngine
+from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, SkillsetEngine
 from skill_runtime.core.hook_calls import HookCaller
 from skill_runtime.hook_processes import HookServer, RemoteHooks
 from skill_runtime.hooks import SkillHooks
@@ -23,7 +23,7 @@ HooksFactory = Callable[[Node], Mapping[str, SkillHooks]]
 class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
     """The data manager, the resource manager and the skill managers of a skillset; the node has the skillset's name.
 
-    Parameter: ``interrupt_timeout_s``. Hooks are called on threads of their own; the executor never waits for one.
+    Parameters: ``interrupt_timeout_s``, ``hook_timeout_s``. Hooks are called on threads of their own; the executor never waits for one.
 
     Args:
         skillset: the model.
@@ -54,6 +54,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
         for name in self.served_skills:
             action_type(interfaces, name)
         timeout_s = float(self.declare_parameter("interrupt_timeout_s", DEFAULT_TIMEOUT_S).value)
+        hook_timeout_s = float(self.declare_parameter("hook_timeout_s", HOOK_TIMEOUT_S).value)
         made = hooks(self) if callable(hooks) else hooks
         self.managers = Managers(
             RclpyMiddleware(self, skillset.name, interfaces=interfaces),
@@ -61,6 +62,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
             made,
             bindings=generated_bindings(skillset) if data_bindings is None else data_bindings,
             interrupt_timeout_s=timeout_s,
+            hook_timeout_s=hook_timeout_s,
             on_rival=on_rival,
         )
         if isinstance(made, RemoteHooks):
