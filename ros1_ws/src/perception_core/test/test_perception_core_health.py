@@ -79,6 +79,13 @@ def test_a_clock_that_jumps_back_starts_anew() -> None:
     assert run.watch.tick(5 * NS + 2 * TICK) is Verdict.OK
 
 
+def test_two_arrivals_at_one_step_of_a_simulated_clock_have_no_rate() -> None:
+    watch = HealthWatch(HealthLimits())
+    watch.take(FINE, NS)
+    watch.take(FINE, NS)
+    assert watch.rate_hz(NS) == 0.0
+
+
 def test_reasons_rate_and_age() -> None:
     run = Run(lambda t: True if t < 3 else "cloud is empty: 0 returns").go(2.9)
     assert run.watch.reason == ""

@@ -164,6 +164,19 @@ def test_imu_noise_has_its_size():
     assert x.mean() == pytest.approx(0.1, abs=0.005)
 
 
+def test_on_the_ground_the_sensors_see_the_world_and_not_the_ground_from_inside(world):
+    standing = pose(0.0, 0.0, 0.0, from_yaw(0.0))
+    left, right = StereoPair(world, 0).render(standing)
+    assert min(left.std(), right.std()) > 25.0
+    track = PoseTrack()
+    for n in range(8):
+        track.add(pose(0.0, 0.0, 0.0, from_yaw(0.0), 0.02 * n))
+    points = Lidar(world, 0).scan(track, 0.02)
+    up = np.array([points[axis] for axis in "xyz"]).T @ LIDAR.matrix.T[:, 2]
+    assert up.max() > 2.0, "walls"
+    assert np.abs(up[up < 0.1]).max() < 0.2, "the ground is right below"
+
+
 # --- faults --------------------------------------------------------------------------------------------------------------
 
 

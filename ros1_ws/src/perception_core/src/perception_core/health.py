@@ -148,9 +148,10 @@ class HealthWatch:
         return float("inf") if self._last_good_ns is None else (now_ns - self._last_good_ns) / NS
 
     def rate_hz(self, now_ns: int) -> float:
-        """Return how many good measurements came a second over the last two."""
+        """Return how many good measurements came a second over the last two seconds; a simulated clock may give two the same arrival."""
         recent = [stamp for stamp in self._good_ns if stamp > now_ns - RATE_OVER_S * NS]
-        return (len(recent) - 1) * NS / (recent[-1] - recent[0]) if len(recent) > 1 else 0.0
+        span_ns = recent[-1] - recent[0] if recent else 0
+        return (len(recent) - 1) * NS / span_ns if span_ns > 0 else 0.0
 
     def _verdict_without_good(self, now_ns: int) -> Verdict:
         trouble = self._fresh_trouble(now_ns)

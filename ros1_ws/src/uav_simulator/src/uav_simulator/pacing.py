@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import struct
 import threading
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 ROUNDING_S = 1e-6  # of stamps in floating point
-WORK_S = 0.08  # at 10 Hz: a measurement is dealt with before the next one is made
+WORK_S = 0.07  # at 10 Hz and ticks of 20 ms: a measurement is dealt with before the next one is made
+MEASUREMENTS = 64  # of each sensor that are remembered
 
 
 @dataclass
@@ -29,14 +31,14 @@ class Pacer:
     def __init__(self, topics: Iterable[str] = (), *, limit_s: float, patience_s: float) -> None:
         self._limit_s, self._patience_s = limit_s, patience_s
         self._sensor_of = {topic: sensor for topic, _, sensor in (word.partition("=") for word in topics) if sensor}
-        self._measured: dict[str, tuple[float, float]] = {}  # of each sensor: the last stamp, and when it was published
+        self._measured: dict[str, deque[tuple[float, float]]] = {}  # of each sensor: stamps, and when they were published
         self._listeners: dict[str, _Listener] = {}
         self._lock = threading.Lock()
 
     def measured(self, sensor: str, stamp_s: float, now_s: float) -> None:
         """Note that a sensor has published a measurement just now."""
         with self._lock:
-            self._measured[sensor] = (stamp_s, now_s)
+            self._measured.setdefault(sensor, deque(maxlen=MEASUREMENTS)).append((stamp_s, now_s))
 
     def heard(self, topic: str, stamp_s: float) -> None:
         """Note a message; one that has been left out is back when it speaks with a newer stamp."""
@@ -65,8 +67,9 @@ class Pacer:
         sensor = self._sensor_of.get(topic)
         if sensor is None:
             return now_s - listener.stamp_s - self._limit_s
-        measured_s, published_s = self._measured.get(sensor, (0.0, now_s))
-        return now_s - published_s - WORK_S if listener.stamp_s < measured_s - ROUNDING_S else -WORK_S
+        measured = self._measured.get(sensor, ())
+        waiting = next((published_s for stamp_s, published_s in measured if stamp_s > listener.stamp_s + ROUNDING_S), None)
+        return -WORK_S if waiting is None else now_s - waiting - WORK_S
 
     def _holds(self, listener: _Listener, lag_s: float, wall_s: float) -> bool:
         if not listener.live:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_simulator.sensors.mounts import LIDAR
+from uav_simulator.sensors.mounts import GEAR_M, LIDAR
 from uav_simulator.sensors.pose_track import PoseTrack
 from uav_simulator.world.scene import NO_HIT, World
 
@@ -51,6 +51,7 @@ class Lidar:
         positions, rotations = track.at(start_s + self._offsets_s)
         rays = np.empty((*self._directions.shape[:2], 6), dtype=np.float32)
         rays[..., :3] = (positions + rotations @ np.asarray(LIDAR.translation))[:, None, :]
+        rays[..., 2] = np.maximum(rays[..., 2], GEAR_M)
         rays[..., 3:] = np.einsum("cij,cbj->cbi", rotations, self._body_directions)
         hits = self._world.cast(rays)
         spec = self.spec

@@ -11,6 +11,7 @@ from uav_simulator.frames import Quat, Vec3
 
 Floats = NDArray[np.float64]
 STEREO_BASELINE_M = 0.12
+GEAR_M = 0.05  # the landing gear gives way so far at most: no sensor touches the ground, where it would see nothing
 
 
 @dataclass(frozen=True)

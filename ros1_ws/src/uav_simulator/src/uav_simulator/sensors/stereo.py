@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_simulator.sensors.mounts import STEREO_BASELINE_M, ZED_LEFT, ZED_RIGHT, rotation_matrix
+from uav_simulator.sensors.mounts import GEAR_M, STEREO_BASELINE_M, ZED_LEFT, ZED_RIGHT, rotation_matrix
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.texture import GRAINS, layer, noise_tiles, surface_table
 from uav_simulator.vehicle.noise import SlowNoise
@@ -72,6 +72,7 @@ class StereoPair:
         r_map_body = rotation_matrix(pose.attitude)
         r_map_camera = r_map_body @ ZED_LEFT.matrix
         eyes = np.array([np.asarray(pose.position) + r_map_body @ np.asarray(m.translation) for m in (ZED_LEFT, ZED_RIGHT)])
+        eyes[:, 2] = np.maximum(eyes[:, 2], GEAR_M)
         index, depth = self._cast(r_map_camera, eyes)
         grey = self._shade(index, depth, self._coefficients(r_map_camera, eyes))
         grey *= np.float32(1.0 + self._exposure.step(FRAME_S)[0])
