@@ -5,8 +5,7 @@ A step can be told (``text``), written as JSON, and played: whoever does the sam
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 Value = float | str | bool
@@ -103,7 +102,7 @@ class Story:
     """The steps of a run; ``stops`` tells that nothing more can happen after the last."""
 
     steps: tuple[StoryStep, ...] = ()
-    stops: bool = field(default=False)
+    stops: bool = False
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -116,9 +115,3 @@ class Story:
 
 
 NO_STORY = Story()
-
-
-def enumerated(names: Sequence[str]) -> str:
-    """Return names in backquotes with `and` before the last one."""
-    quoted = [f"`{name}`" for name in names]
-    return " and ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)

@@ -33,7 +33,3 @@ class Deadline:
         """Raise OutOfTimeError when the moment has passed."""
         if time.monotonic() > self.at_s:
             raise OutOfTimeError
-
-    def part(self, share: float) -> Deadline:
-        """Return an earlier deadline after this share of the time left."""
-        return Deadline(time.monotonic() + share * self.left_s(), self.given_s)

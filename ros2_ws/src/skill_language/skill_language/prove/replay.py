@@ -12,9 +12,9 @@ from skill_language.prove.witness import States, Values, Wish, Witness, data_ato
 from skill_language.stories import Ended, Execution, Path, StateChange, StepKind, StoryStep, Value
 from skill_model import semantics
 from skill_model.conditions import judge
-from skill_model.deadlines import nanoseconds
+from skill_model.deadlines import nanoseconds, waits
 from skill_model.execution_state import ExecutionState
-from skill_model.model import Invariant, Not, Skill
+from skill_model.model import Expression, Invariant, Not, Skill
 from skill_model.situation import Change, Entered, Running, Situation, Step
 
 _KINDS: Mapping[str, StepKind] = {
@@ -103,7 +103,7 @@ class Replay:
         if broken is not None:
             self._born_broken(move, names, broken)
         else:
-            self._fulfil([*self._ready(move), *self._kept(move, names)])
+            self._fulfil(move, names)
         if move.step is None:
             self._tell(move, None, names)
             return
@@ -133,11 +133,13 @@ class Replay:
         running = sorted(execution.skill for execution in situation.running)
         return dict(situation.states) != dict(states) or running != sorted(move.target.running)
 
-    def _fulfil(self, wishes: Sequence[Wish]) -> None:
-        """Have data fulfil the wishes, by a step before, if they don't."""
-        if all(judge(wish.condition, wish.states, self._situation.data) is True for wish in wishes):
-            return
-        values = self._witness.values(wishes)
+    def _fulfil(self, move: Move, names: Mapping[str, Running]) -> None:
+        """Have data fulfil what the step needs, by a step before it; invariants that may wait are fulfilled if that can be."""
+        needed = [[*self._ready(move), *self._kept(move, names, waiting=waiting)] for waiting in (True, False)]
+        for wishes in needed:
+            if all(judge(wish.condition, wish.states, self._situation.data) is True for wish in wishes):
+                return
+        values = next((found for wishes in needed if (found := self._witness.values(wishes)) is not None), None)
         if values is None:
             raise _NoValuesError
         self._receive(values)
@@ -193,7 +195,7 @@ class Replay:
         """Have data fulfil the preconditions, and not the invariant after the start."""
         skill = self._skill(move)
         after = {**self._states, **{change.resource: change.target for change in skill.start.assignments}}
-        earlier = [Wish(one.recovered, after) for one in skill.invariants[: skill.invariants.index(invariant)]]
+        earlier = [Wish(self._good(skill.name, one), after) for one in skill.invariants[: skill.invariants.index(invariant)]]
         wishes = [*self._ready(move), *(wish for wish in earlier if data_atoms([wish.condition]))]
         wishes += self._kept(move, names, but=names["new"])
         values = self._witness.values([*wishes, Wish(Not(invariant.condition), after)])
@@ -216,17 +218,25 @@ class Replay:
         conditions = [precondition.condition for precondition in self._skill(move).preconditions]
         return [Wish(condition, self._states) for condition in conditions if data_atoms([condition])]
 
-    def _kept(self, move: Move, names: Mapping[str, Running], *, but: Running | None = None) -> list[Wish]:
-        """Return the invariants over data of what runs on after the step, in the states before and after it."""
+    def _kept(self, move: Move, names: Mapping[str, Running], *, but: Running | None = None, waiting: bool = False) -> list[Wish]:
+        """Return the invariants over data of what runs on after the step, in the states before and after it.
+
+        Those that may be false for a while (``for 2 s``) are left out unless ``waiting``.
+        """
         after = self._world.situation(move.target).states
         left = [names[one.id] for one in move.step.situation.running] if move.step is not None else self._running
         wishes: list[Wish] = []
         for execution in (one for one in left if one != but):
             moments = [after] if execution not in self._running else [self._states, after]
             for invariant in self._skillset.skill(execution.skill).invariants:
-                if data_atoms([invariant.condition]):
-                    wishes += [Wish(invariant.recovered, states) for states in moments]
+                if data_atoms([invariant.condition]) and (waiting or not waits(invariant)):
+                    wishes += [Wish(self._good(execution.skill, invariant), states) for states in moments]
         return wishes
+
+    def _good(self, skill: str, invariant: Invariant) -> Expression:
+        """Return when an invariant counts as true now: a value that has fallen must recover first."""
+        fell = (skill, invariant.name) in self._situation.fallen
+        return invariant.recovered if fell else invariant.condition
 
     def _broken_at_birth(self, fault: Key) -> Invariant | None:
         """Return the invariant over data that a fault says is false right after the start."""

@@ -152,10 +152,6 @@ class Solver:
         lines = [f"{name} == {self._state(model, name)}" for name in resources]
         return (*lines, *self._told_data(model, data))
 
-    def states(self, model: Any) -> dict[str, str]:
-        """Return the state of every resource in a model."""
-        return {name: self._state(model, name) for name in self._resources}
-
     def data_values(self, model: Any) -> dict[tuple[str, ...], float | str | bool]:
         """Return the value of each data, by its name and field, that the model gives one; numbers in SI units."""
         texts = {number: text for text, number in self._texts.items()}
