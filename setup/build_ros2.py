@@ -132,12 +132,23 @@ def is_younger(name: str, package: Package) -> bool:
     return all(path.stat().st_mtime < built_s for path in build_files(package.folder))
 
 
+def has_leftovers(name: str, package: Package) -> bool:
+    """Tell whether code generated of a definition that is gone is left: rosidl does not make its lists of messages anew then."""
+    generated = (BUILD / name / "rosidl_generator_py" / name).glob("*/_*.py")
+    kept = {path.stem.replace("_", "").lower() for path in generated if path.name != "__init__.py"}
+    defined = {path.stem.replace("_", "").lower() for path in build_files(package.folder) if path.suffix in {".msg", ".srv", ".action"}}
+    return not kept <= defined
+
+
 def build() -> int:
     """Build what has changed; return the exit code."""
     packages = find_packages()
     states = {name: state_of(name, packages) for name in packages}
     built = read_built(packages, states)
-    changed = [name for name, state in states.items() if built.get(name) != state]
+    leftovers = [name for name, package in packages.items() if has_leftovers(name, package)]
+    for name in leftovers:
+        shutil.rmtree(BUILD / name)
+    changed = [name for name, state in states.items() if built.get(name) != state or name in leftovers]
     sys.stdout.write(f"to build: {' '.join(changed) or 'nothing'}\n")
     sys.stdout.flush()
     for name in changed:
