@@ -1,6 +1,6 @@
 """Decide what is to be bridged, from what runs in both worlds: a pure function, asked again at every change.
 
-A topic goes to the other world when somebody publishes it here; both ways when both worlds publish it. It flows only while somebody
+A topic goes to the other world when a node publishes it here; both ways when both worlds publish it. It flows only while a node
 over there subscribes: before that it is offered, so that tools see it, and costs nothing. A service or an action goes from the world
 that has its server, unless both have one.
 
@@ -45,7 +45,7 @@ class RouteDecision:
 
     @property
     def flows(self) -> bool:
-        """Whether somebody is there for what comes out: a call comes by itself."""
+        """Whether there are receivers; services and actions need none, their clients call."""
         return self.receivers > 0 or not isinstance(self.spec, TopicRoute)
 
 
@@ -99,7 +99,7 @@ def _topic(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) ->
     ros1_type = graphs.ros1.type_of(ros1_name)
     kinds2 = sorted({end.type_name for end in (publishers2 or subscribers2)})
     if ros1_type is None and not kinds2:
-        return  # nobody has said the type yet
+        return  # the type is not known yet
     if len(kinds2) > 1:
         yield Refused("topic", ros1_name, ros2_name, f"ROS 2 has it with different types: {', '.join(kinds2)}")
         return

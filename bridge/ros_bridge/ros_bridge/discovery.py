@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("ros_bridge")
 
 LOOK_EVERY_S = 0.02  # while a route waits for its target's subscribers
-IDLE_S = 0.2  # routes that nobody wants any more end after a while
+IDLE_S = 0.2  # routes that are not wanted any more end after a while
 CONNECT_WITHIN_S = 1.0
 AGAIN_AFTER_S = 0.5
 

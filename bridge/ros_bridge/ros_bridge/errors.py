@@ -16,7 +16,7 @@ class WorldError(BridgeError):
 
 
 class NoMasterError(BridgeError):
-    """There is no ROS master, and nobody asked to wait for one."""
+    """There is no ROS master, and the options do not say to wait for one."""
 
 
 class TypeUnknownError(BridgeError):

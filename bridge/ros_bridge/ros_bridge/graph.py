@@ -27,7 +27,7 @@ class Ros1Graph:
     service_types: Mapping[str, str] = field(default_factory=dict)
 
     def type_of(self, topic: str) -> str | None:
-        """Return a topic's type, or None when nobody has said it."""
+        """Return a topic's type, or None when it is not known."""
         known = self.types.get(topic, ANY_TYPE)
         return None if known == ANY_TYPE else known
 

@@ -34,7 +34,7 @@ class Connection:
     """XML-RPC over a connection that is kept between calls; safe from several threads, which wait for each other."""
 
     def __init__(self, uri: str, within_s: float = ANSWER_WITHIN_S) -> None:
-        """Connect to nobody yet; raises OSError when the URI has no host and port."""
+        """Remember the address; the first call connects. Raises OSError when the URI has no host and port."""
         parts = urlsplit(uri)
         try:
             self._http = http.client.HTTPConnection(parts.hostname or "localhost", parts.port or 80, timeout=within_s)

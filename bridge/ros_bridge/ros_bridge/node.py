@@ -108,7 +108,7 @@ class Bridge:
             self._write(stats_file)
 
     def _tell(self) -> None:
-        """Publish the diagnostics, and draw the live view where somebody looks."""
+        """Publish the diagnostics, and draw the live view on a terminal."""
         figures = self.table.figures()
         self._rates_hz = self._rates.update(figures, time.monotonic())
         if self._diagnostics is not None:

@@ -76,7 +76,7 @@ class Plane:
             self._callers[token] = (route, service)
 
     def call_no_more(self, token: int) -> None:
-        """Tell it no more; when it returns nobody uses the native route."""
+        """Tell it no more; when it returns the native route is not used any more."""
         with self._lock:
             self._callers.pop(token, None)
 

@@ -73,7 +73,7 @@ class PublisherLinks:
         self.node.register(Kind.SUBSCRIBER, topic, type_name)
 
     def unsubscribe(self, route: int) -> None:
-        """Connect no more; when it returns nobody uses the native route."""
+        """Connect no more; when it returns the native route is not used any more."""
         with self._lock:
             subscription = self._subscriptions.pop(route, None)
             if subscription is None:

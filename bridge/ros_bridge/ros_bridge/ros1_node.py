@@ -260,7 +260,7 @@ class _SlaveApi:
         return [OK, "", 0]
 
     def shutdown(self, caller: str, reason: str = "") -> list[Any]:
-        """End the bridge: another node has taken the name, or somebody asks for it (rosnode kill)."""
+        """End the bridge: another node has taken the name, or a user asks for it (rosnode kill)."""
         logger.warning("%s asks %s to shut down: %s", caller, self._node.name, reason or "no reason given")
         self._node.on_shutdown()
         return [OK, "", 0]

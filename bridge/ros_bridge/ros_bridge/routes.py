@@ -111,7 +111,7 @@ class RouteTable:
             return spec in self._started
 
     def park(self, spec: Spec) -> None:
-        """Make a route anew that offers its target but does not flow, as nobody is there to receive."""
+        """Make a route anew that offers its target but does not flow, as there is no receiver."""
         with self._lock:
             self._close(spec)
             self._make(spec)

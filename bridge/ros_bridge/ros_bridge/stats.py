@@ -23,7 +23,7 @@ class Durations:
 
     @classmethod
     def of(cls, bins: Iterable[int]) -> Durations:
-        """Return the histogram that somebody else has counted, in the same bins."""
+        """Return the histogram of what the data plane has counted, in the same bins."""
         durations = cls()
         durations._bins = list(bins)
         durations.count = sum(durations._bins)

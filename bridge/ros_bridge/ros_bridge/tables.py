@@ -1,4 +1,4 @@
-"""What is told about routes, as rows: for the figures' file, the diagnostics topic, the list and the live view."""
+"""Tables and summaries of routes: for the figures' file, the diagnostics topic, the list and the live view."""
 
 from __future__ import annotations
 
