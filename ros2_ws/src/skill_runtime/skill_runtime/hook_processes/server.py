@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from multiprocessing.connection import Client, Connection
@@ -23,6 +24,7 @@ AGAIN_S = 0.1
 REPLY_S = 10.0
 """Who has no reply for so long takes it for a no."""
 ENDED_KEPT = 100
+STOPS = frozenset({"on_violation", "on_failure"})
 
 
 class HookServer:
@@ -41,14 +43,22 @@ class HookServer:
         self._sending = threading.Lock()
         self._numbers = itertools.count(1)
         self._replies: dict[int, tuple[threading.Event, list[object]]] = {}
+        self._stopped: dict[str, threading.Event] = {}
+        """Executions whose function was stopped, or that are waited for."""
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"{skill}_pipe", daemon=True)
         self._thread.start()
 
     def close(self, reason: str, timeout_s: float) -> bool:
         """Stop what runs, for this reason; tell whether all hooks have returned within the time."""
+        end_s = time.monotonic() + timeout_s
+        running = [one for one in self._executions.values() if one.state in {ExecutionState.RUNNING, ExecutionState.PAUSED}]
+        failed = [execution for execution in running if self.fail(execution.id, reason)]
         self.fail_all(reason)
-        returned = self._workers.close(timeout_s)
+        # The engine has their functions stopped over this pipe: it has to stay open for that.
+        for execution in failed:
+            self._stopped.setdefault(execution.id, threading.Event()).wait(max(0.0, end_s - time.monotonic()))
+        returned = self._workers.close(max(0.0, end_s - time.monotonic()))
         self._over.set()
         with contextlib.suppress(OSError):
             if self._pipe is not None:
@@ -133,7 +143,10 @@ class HookServer:
                 execution.inputs = self._hooks.make_inputs(execution.inputs)
             except Exception as error:  # noqa: BLE001 - inputs are made by the developer's class
                 return HookAnswer(error=f"the inputs could not be made: {type(error).__name__}: {error}")
-        return call_hook(self._hooks, execution, hook)
+        answer = call_hook(self._hooks, execution, hook)
+        if hook in STOPS and execution.done:
+            self._stopped.setdefault(execution.id, threading.Event()).set()
+        return answer
 
     def _update(self, told: Snapshot) -> Execution:
         execution = self._executions.get(told.id)
@@ -155,6 +168,7 @@ class HookServer:
         """Keep an execution that has ended for the hook that stops its function."""
         if len(self._ended) == ENDED_KEPT:
             self._executions.pop(self._ended[0], None)
+            self._stopped.pop(self._ended[0], None)
         self._ended.append(execution_id)
 
     @staticmethod
@@ -178,6 +192,7 @@ class HookServer:
         answer = call_hook(self._hooks, execution, "on_failure")
         if answer.error:
             self._on_error(f"{execution}: on_failure raised\n{answer.trace}")
+        self._stopped.setdefault(execution.id, threading.Event()).set()
 
     def _send(self, message: Any) -> None:
         pipe = self._pipe
