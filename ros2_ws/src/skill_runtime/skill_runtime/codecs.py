@@ -5,6 +5,7 @@ Their classes take the same words in both worlds; an adapter makes the message a
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -127,7 +128,7 @@ def states_of(message: Any) -> ResourceStates:
 
 def skills_message(skillset: str, states: SkillStates) -> Any:
     """Return skill states as a message."""
-    message = SkillStatesMessage(skillset=skillset, skills=[_skill(name, one) for name, one in states.skills.items()])
+    message = SkillStatesMessage(skillset=skillset, skills=[_skill(skillset, name, one) for name, one in states.skills.items()])
     set_stamp(message.header.stamp, states.stamp_ns)
     message.header.frame_id = states.life
     return message
@@ -135,10 +136,7 @@ def skills_message(skillset: str, states: SkillStates) -> Any:
 
 def skills_of(message: Any) -> SkillStates:
     """Return skill states; inputs and outputs are plain values."""
-    skills = {}
-    for one in message.skills:
-        last = [_record_of(one.name, execution) for execution in one.last]
-        skills[one.name] = SkillRecord(tuple(_record_of(one.name, execution) for execution in one.open), last[0] if last else None)
+    skills = {one.name: _skill_of(one) for one in message.skills}
     return SkillStates(message.header.frame_id, stamp_ns_of(message.header.stamp), skills)
 
 
@@ -149,13 +147,36 @@ TOPICS: Mapping[str, TopicCodec] = {
 }
 
 
+# Most of what these messages hold is what the one before has held: with many skills, to make it anew would take most of the time.
+_KEPT = 4096
+_encoded: dict[tuple[str, str], tuple[SkillRecord, Any]] = {}
+_decoded: dict[tuple[Any, ...], SkillRecord] = {}
+
+
+@functools.lru_cache(maxsize=_KEPT)
 def _resource(name: str, value: ResourceValue) -> Any:
     return ResourceState(name=name, state=value.state, previous_state=value.previous, stamp_ns=value.stamp_ns)
 
 
-def _skill(name: str, skill: SkillRecord) -> Any:
-    last = [] if skill.last is None else [_execution(skill.last)]
-    return SkillState(name=name, open=[_execution(record) for record in skill.open], last=last)
+def _skill(skillset: str, name: str, skill: SkillRecord) -> Any:
+    record, message = _encoded.get((skillset, name), (None, None))
+    if record is not skill:
+        last = [] if skill.last is None else [_execution(skill.last)]
+        message = SkillState(name=name, open=[_execution(record) for record in skill.open], last=last)
+        _encoded[skillset, name] = (skill, message)
+    return message
+
+
+def _skill_of(message: Any) -> SkillRecord:
+    executions = (*message.open, *message.last)
+    # An execution of the same state and stamps holds the same.
+    key = (message.name, len(message.last), *((e.id, e.state, e.requested_ns, e.started_ns, e.ended_ns) for e in executions))
+    if key not in _decoded:
+        if len(_decoded) >= _KEPT:
+            _decoded.clear()
+        last = [_record_of(message.name, execution) for execution in message.last]
+        _decoded[key] = SkillRecord(tuple(_record_of(message.name, one) for one in message.open), last[0] if last else None)
+    return _decoded[key]
 
 
 def _execution(record: ExecutionRecord) -> Any:
