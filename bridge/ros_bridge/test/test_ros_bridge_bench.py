@@ -1,6 +1,8 @@
 """The benchmark counts right: its arithmetic, and one short case each way through a real bridge with real ends."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -36,6 +38,13 @@ def test_meter_tells_the_first_probes_and_counts_only_messages(capsys):
     figures = meter.figures()
     assert figures["received"] == 2
     assert figures["p50_ms"] > 0
+
+
+def test_an_end_is_gone_when_the_bench_is():
+    order = {"rate_hz": 10.0, "number": 10, "seconds": 1.0}
+    program = f"from bridge_tools.bench_ends import protocol; protocol.send({order}, [lambda _: None], '', lambda *_: None)"
+    end = subprocess.run([sys.executable, "-c", program], stdin=subprocess.DEVNULL, timeout=60, check=False)
+    assert end.returncode == 1
 
 
 def test_text_stamps_return():
