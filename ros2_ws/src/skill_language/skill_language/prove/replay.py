@@ -135,14 +135,15 @@ class Replay:
 
     def _fulfil(self, move: Move, names: Mapping[str, Running]) -> None:
         """Have data fulfil what the step needs, by a step before it; invariants that may wait are fulfilled if that can be."""
-        needed = [[*self._ready(move), *self._kept(move, names, waiting=waiting)] for waiting in (True, False)]
-        for wishes in needed:
+        for waiting in (True, False):
+            wishes = [*self._ready(move), *self._kept(move, names, waiting=waiting)]
             if all(judge(wish.condition, wish.states, self._situation.data) is True for wish in wishes):
                 return
-        values = next((found for wishes in needed if (found := self._witness.values(wishes)) is not None), None)
-        if values is None:
-            raise _NoValuesError
-        self._receive(values)
+            values = self._witness.values(wishes)
+            if values is not None:
+                self._receive(values)
+                return
+        raise _NoValuesError
 
     def _receive(self, values: Values, *, quietly: bool = True) -> None:
         """Take values of data as a step of their own, which nothing that runs may mind if it is to be quiet."""
