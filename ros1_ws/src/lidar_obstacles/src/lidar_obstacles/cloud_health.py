@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SECTORS = 12
-SAMPLE = 20_000  # points are enough to judge a sweep
+SAMPLE = 8_000  # points are enough to judge a sweep
 RECENT = 3  # sweeps: a sensor loses a sector from one to the next, a moving one gradually
 SECTOR_RETURNS = 20  # of the sample; a sector with fewer can't be missed
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit

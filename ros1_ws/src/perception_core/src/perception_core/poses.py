@@ -8,7 +8,6 @@ from threading import Condition
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,7 +90,31 @@ class PoseBuffer:
 def _interpolate(known_ns: NDArray[np.int64], values: NDArray[np.float64], wanted_ns: NDArray[np.int64]) -> Poses:
     known_s = (known_ns - known_ns[0]) / NS
     wanted_s = np.clip((wanted_ns - known_ns[0]) / NS, 0.0, known_s[-1])
-    attitude = Rotation.from_quat(values[:, 3:])
-    rotations = Slerp(known_s, attitude)(wanted_s) if len(known_s) > 1 else Rotation.concatenate([attitude] * len(wanted_s))
-    position = np.stack([np.interp(wanted_s, known_s, values[:, axis]) for axis in range(3)], axis=1)
-    return Poses(rotation=rotations.as_matrix(), position=position)
+    before = np.clip(np.searchsorted(known_s, wanted_s, side="right") - 1, 0, max(0, len(known_s) - 2))
+    after = np.minimum(before + 1, len(known_s) - 1)
+    share = ((wanted_s - known_s[before]) / np.maximum(known_s[after] - known_s[before], 1e-9))[:, None]
+    position = values[before, :3] + share * (values[after, :3] - values[before, :3])
+    quats = values[:, 3:] / np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
+    return Poses(rotation=_matrices(_slerp(quats[before], quats[after], share)), position=position)
+
+
+def _slerp(first: NDArray[np.float64], second: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Interpolate unit quaternions (N, 4) on the great arc; ``share`` (N, 1) is of the second."""
+    cosine = np.sum(first * second, axis=1, keepdims=True)
+    second = np.where(cosine < 0.0, -second, second)
+    angle = np.arccos(np.minimum(np.abs(cosine), 1.0))
+    near = angle < 1e-6
+    sine = np.where(near, 1.0, np.sin(angle))
+    weights = np.where(near, (1.0 - share, share), (np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine))
+    mixed: NDArray[np.float64] = weights[0] * first + weights[1] * second
+    return mixed
+
+
+def _matrices(quats_xyzw: NDArray[np.float64]) -> NDArray[np.float64]:
+    x, y, z, w = quats_xyzw.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)

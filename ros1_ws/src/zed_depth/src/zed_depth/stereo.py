@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 MEDIAN_PX = 5
 TEXTURE_PX = 21
 NOISE_KERNEL = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+NOISE_EVERY = 5  # pairs; a camera's noise changes with the light, not from image to image
 MOST_DISPARITIES = 256
-COARSE = 4  # the search for what is too near is done in images of a quarter of the size ...
+COARSE = 6  # the search for what is too near is done in images of a sixth of the size ...
 COARSE_SHARE = 0.5  # ... and up to half of their width
-SURELY_PX = 4.0  # by which a coarse disparity must be beyond the range: its own error
+SURELY_PX = 6.0  # by which a coarse disparity must be beyond the range: its own error
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class StereoMatcher:
         self.search = search
         self._sgbm = self._matcher(search.first, search.count, settings.speckle_px)
         self._coarse = self._coarse_for(0)
+        self._noise = 0.0
+        self._pairs = 0
 
     def _matcher(self, first: int, count: int, speckle_px: int) -> cv2.StereoSGBM:
         settings = self._settings
@@ -100,13 +103,12 @@ class StereoMatcher:
         """
         if left.shape != right.shape or left.ndim != 2:
             raise ValueError(f"left image {left.shape} and right image {right.shape}: expected two grey images of one size")
-        first = self.search.first
         sixteenths = _padded(self._sgbm, self.search.last, left, right)
         # Without the one or two rows above an upper edge, where blocks see the edge but nothing tells how far along the row they match.
-        sixteenths = cv2.medianBlur(np.maximum(sixteenths - 16 * (first - 1), 0).astype(np.uint16), MEDIAN_PX)
+        sixteenths = cv2.medianBlur(sixteenths, MEDIAN_PX)
         texture = self._texture(left)
-        pixels: NDArray[np.float32] = sixteenths.astype(np.float32) / np.float32(16.0) + np.float32(first - 1)
-        pixels[(sixteenths < 16) | (texture < 1.0)] = np.nan
+        pixels: NDArray[np.float32] = np.multiply(sixteenths, np.float32(1.0 / 16.0), dtype=np.float32)
+        pixels[(sixteenths < 16 * self.search.first) | (texture < 1.0)] = np.nan
         self._put_near(pixels, texture, left, right)
         return pixels
 
@@ -130,7 +132,10 @@ class StereoMatcher:
 
     def _texture(self, image: Gray) -> NDArray[np.float32]:
         """Return the texture around each pixel in units of the least that can be matched."""
-        least = min(self._settings.texture_per_noise * noise_level(image), self._settings.enough_texture)
+        if self._pairs % NOISE_EVERY == 0:
+            self._noise = noise_level(image)
+        self._pairs += 1
+        least = min(self._settings.texture_per_noise * self._noise, self._settings.enough_texture)
         gradient = np.abs(cv2.Sobel(image, cv2.CV_16S, 1, 0, ksize=1))
         mean = cv2.boxFilter(gradient, cv2.CV_32F, (TEXTURE_PX, 1))
         # The Sobel kernel [-1 0 1] spans two pixels.

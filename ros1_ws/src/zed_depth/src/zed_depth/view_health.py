@@ -100,7 +100,10 @@ def _features(image: Gray) -> tuple[Sequence[cv2.KeyPoint], Gray | None]:
 
 @dataclass(frozen=True)
 class RowFit:
-    """The vertical offset over the image: ``at_centre`` px, and per pixel to the right and down; which matches agree with it, (N,)."""
+    """The vertical offset over the image: ``at_centre`` px, and per pixel to the right and down; which matches agree with it, (N,).
+
+    Of each only what is beyond three standard errors: a few features close together tell little of a turn or of a zoom.
+    """
 
     at_centre: float
     per_column: float
@@ -121,8 +124,18 @@ def fit_rows(matches: Matches, first_guess_px: float) -> RowFit:
             break
         solution = np.linalg.lstsq(terms[agree], vertical[agree], rcond=None)[0]
         agree = np.abs(vertical - terms @ solution) <= AGREE_PX
-    at_centre, per_column, per_row = (float(value) for value in solution)
+    at_centre, per_column, per_row = _beyond_doubt(solution, terms[agree], vertical[agree])
     return RowFit(at_centre, per_column, per_row, agree)
+
+
+def _beyond_doubt(solution: Floats, terms: Floats, values: Floats) -> tuple[float, float, float]:
+    """Return the solution of a least squares fit, each coefficient less three of its standard errors."""
+    if len(values) <= ENOUGH_MATCHES // 2:
+        return 0.0, 0.0, 0.0
+    variance = float(np.sum((values - terms @ solution) ** 2)) / (len(values) - terms.shape[1])
+    errors = np.sqrt(np.maximum(variance * np.diag(np.linalg.pinv(terms.T @ terms)), 0.0))
+    sure = np.sign(solution) * np.maximum(np.abs(solution) - 3.0 * errors, 0.0)
+    return float(sure[0]), float(sure[1]), float(sure[2])
 
 
 def _densest(values: Floats) -> float:
@@ -139,9 +152,9 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
     angle = float(np.degrees(np.arctan(fit.per_column)))
     # The sentence names the greatest of the three; a turn and a zoom are measured where they do least, or noise would be told as one.
     troubles = {
-        f"the right image is {abs(fit.at_centre):.1f} px off the left one's rows": abs(fit.at_centre),
-        f"the cameras are turned against each other by {abs(angle):.2f} degrees": abs(fit.per_column) * width / 3.0,
-        f"the images differ in scale by {abs(fit.per_row):.1%}": abs(fit.per_row) * height / 4.0,
+        f"the right image is at least {abs(fit.at_centre):.1f} px off the left one's rows": abs(fit.at_centre),
+        f"the cameras are turned against each other by at least {abs(angle):.2f} degrees": abs(fit.per_column) * width / 3.0,
+        f"the images differ in scale by at least {abs(fit.per_row):.1%}": abs(fit.per_row) * height / 4.0,
     }
     told = max(troubles, key=lambda trouble: troubles[trouble])
     return broken(Fault.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None

@@ -1,0 +1,1 @@
+"""Measurements of the perception nodes; nothing that ships imports it."""
