@@ -28,7 +28,7 @@ class CloudLimits:
     of the returns beyond ``max_range_m`` are coordinates in another unit. A sector is lost with less than ``sector_share`` of what it had.
     """
 
-    min_returns: int = 300
+    min_returns: int = 100
     thin_share: float = 0.1
     max_range_m: float = 250.0
     far_share: float = 0.05

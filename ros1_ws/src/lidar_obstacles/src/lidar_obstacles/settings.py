@@ -21,7 +21,7 @@ class LidarSettings:
     start_s: float = tunable(5.0, 0.5, 120.0, "of nothing at the start until broken")
     latency_s: float = tunable(0.0, 0.0, 2.0, "that the driver is known to need from the last return to the arrival")
     max_delay_s: float = tunable(0.35, 0.05, 5.0, "by which a sweep may be older than the known latency")
-    min_returns: int = tunable(300, 1, 1_000_000, "returns of a sweep; fewer are none")
+    min_returns: int = tunable(100, 1, 1_000_000, "returns of a sweep; fewer are none")
     thin_share: float = tunable(0.1, 0.0, 0.9, "of the returns just before; fewer are a broken sensor")
     max_range_m: float = tunable(250.0, 1.0, 2000.0, "by the sensor's specification")
     # corridor

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 STEP_NS = 20_000_000
 STEP_WALL_S = 0.004
 SENSOR_STEPS = 5
-LONGEST_WORK_WALL_S = 0.5  # of a node on one measurement; longer only if it has nothing to do
+LONGEST_WORK_WALL_S = 5.0  # of a node on one measurement, on a machine under load
 FX, BASELINE_M, CX, CY = 240.0, 0.12, 240.0, 135.0
 # Rotation from the optical frame (z forward, x right) to base_link (x forward, y left).
 OPTICAL = Quaternion(-0.5, 0.5, -0.5, 0.5)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from perception_tools.cases import CASES, Case, accuracy
+from perception_bench.cases import CASES, Case, accuracy
 
 EXIT_OK, EXIT_USAGE = 0, 2
 FRAMES = 60
@@ -101,7 +101,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json:
         options.json.write_text(json.dumps({"cases": rows, "accuracy": table}, indent=1) + "\n")
     return EXIT_OK
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from perception_tools.bench import main
+from perception_bench.run import main
 
 
 def test_a_case_is_measured_against_the_bare_library(tmp_path, capsys) -> None:

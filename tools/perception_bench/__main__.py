@@ -1,0 +1,7 @@
+"""``./alula bench perception``."""
+
+import sys
+
+from perception_bench.run import main
+
+sys.exit(main())
