@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import threading
+import time
 from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Self
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 STEP_NS = 20_000_000
 STEP_WALL_S = 0.004
 SENSOR_STEPS = 5
+HEALTH_NS = NS // 10
 LONGEST_WORK_WALL_S = 5.0  # of a node on one measurement, on a machine under load
 FX, BASELINE_M, CX, CY = 240.0, 0.12, 240.0, 135.0
 # Rotation from the optical frame (z forward, x right) to base_link (x forward, y left).
@@ -65,6 +67,7 @@ class FakeFlight:
         self._states = {"zed_status": "UNKNOWN", "lidar_status": "UNKNOWN"}
         self._steps = 0
         self._done = threading.Event()
+        self._heard = threading.Event()
         self._measured = False
 
     def __enter__(self) -> Self:
@@ -80,7 +83,7 @@ class FakeFlight:
         self._cloud = rospy.Publisher("/lidar/points", PointCloud2, queue_size=10)
         self._resources = rospy.Publisher("/perception/resource_states", ResourceStates, queue_size=10, latch=True)
         self._transition = rospy.Service("/perception/transition", Transition, self._on_transition)
-        self._listener = rospy.Subscriber(f"/{self.node}/health", SensorHealth, self.health.append)
+        self._listener = rospy.Subscriber(f"/{self.node}/health", SensorHealth, self._on_health)
         self._done_listener = rospy.Subscriber(f"/{self.node}/done", Header, lambda _header: self._done.set())
         self._static.publish(_mounts())
         self._publish_resources()
@@ -144,6 +147,18 @@ class FakeFlight:
             self.at_10_hz(self.now_ns)
             if self._measured:
                 self._done.wait(LONGEST_WORK_WALL_S)
+            self._wait_for_health()
+
+    def _wait_for_health(self) -> None:
+        """Let the node's timers follow the clock: a node that tells its health tells it each tenth of a second."""
+        end_s = time.monotonic() + LONGEST_WORK_WALL_S
+        while self.health and self.health[-1].header.stamp.to_nsec() < self.now_ns - HEALTH_NS and time.monotonic() < end_s:
+            self._heard.clear()
+            self._heard.wait(STEP_WALL_S)
+
+    def _on_health(self, message: SensorHealth) -> None:
+        self.health.append(message)
+        self._heard.set()
 
     def publish_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8], *, encoding: str = "mono8", info_scale: int = 1) -> None:
         """Publish one image and its camera_info; ``info_scale`` makes that the one of a larger image."""
