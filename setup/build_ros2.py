@@ -100,8 +100,9 @@ def read_built(packages: Mapping[str, Package], states: Mapping[str, str]) -> di
     """Return what was built, state by package; nothing when the toolchain was another, and then nothing of it is kept."""
     if not BUILT.exists():  # an interrupted build, or one by colcon itself: what is younger than its sources counts
         return {name: states[name] for name, package in packages.items() if is_younger(name, package)}
-    built = json.loads(BUILT.read_text(encoding="utf-8"))
-    if built["toolchain"] != toolchain():
+    built, tools = json.loads(BUILT.read_text(encoding="utf-8")), toolchain()
+    # A record without these is an earlier version's; what is missing of its packages is found by `is_incomplete`.
+    if built.get("tools", tools) != tools:
         for folder in (BUILD, INSTALL):
             shutil.rmtree(folder, ignore_errors=True)
         BUILT.unlink()
@@ -140,6 +141,13 @@ def has_leftovers(name: str, package: Package) -> bool:
     return not kept <= defined
 
 
+def is_incomplete(name: str, package: Package) -> bool:
+    """Tell whether an interface package was configured without a type support that the middleware needs."""
+    targets = BUILD / name / "CMakeFiles" / "TargetDirectories.txt"
+    has_messages = any(path.suffix in {".msg", ".srv", ".action"} for path in build_files(package.folder))
+    return has_messages and targets.exists() and "__rosidl_typesupport_introspection_c.dir" not in targets.read_text(encoding="utf-8")
+
+
 def build() -> int:
     """Build what has changed; return the exit code."""
     packages = find_packages()
@@ -148,14 +156,15 @@ def build() -> int:
     leftovers = [name for name, package in packages.items() if has_leftovers(name, package)]
     for name in leftovers:
         shutil.rmtree(BUILD / name)
-    changed = [name for name, state in states.items() if built.get(name) != state or name in leftovers]
+    incomplete = [name for name, package in packages.items() if is_incomplete(name, package)]
+    changed = [name for name, state in states.items() if built.get(name) != state or name in {*leftovers, *incomplete}]
     sys.stdout.write(f"to build: {' '.join(changed) or 'nothing'}\n")
     sys.stdout.flush()
     for name in changed:
         (BUILD / name / "colcon_build.rc").unlink(missing_ok=True)
     code = run_colcon(changed, packages) if changed else 0
     kept = {name: state for name, state in states.items() if name not in changed or succeeded(name)}
-    BUILT.write_text(json.dumps({"toolchain": toolchain(), "packages": kept}, indent=1) + "\n", encoding="utf-8")
+    BUILT.write_text(json.dumps({"tools": toolchain(), "packages": kept}, indent=1) + "\n", encoding="utf-8")
     return code
 
 

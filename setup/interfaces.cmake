@@ -1,6 +1,8 @@
 # Read by each CMake project of the ROS 2 workspace right after project(): its interface packages generate what Python and the bridge's
-# data plane use (C, its Fast DDS type support, Python), and compile each library as one file, for reading headers takes most of the time.
-set(wanted_generators rosidl_generator_type_description rosidl_generator_c rosidl_typesupport_fastrtps_c rosidl_typesupport_c rosidl_generator_py)
+# data plane use (C, its type supports, Python), and compile most libraries as one file, for reading headers takes most of the time.
+# Fast DDS makes the types' descriptions, which it tells to peers, from the introspection.
+set(wanted_generators rosidl_generator_type_description rosidl_generator_c rosidl_typesupport_fastrtps_c
+  rosidl_typesupport_introspection_c rosidl_typesupport_c rosidl_generator_py)
 
 # Each find_package() of an interface package registers its generators anew; those that are not wanted are taken out at once.
 macro(keep_wanted_generators variable access value current_list_file stack)
