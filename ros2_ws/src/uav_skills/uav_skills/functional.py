@@ -134,9 +134,9 @@ class DepthApi(FunctionalPart):
         """Start or stop the obstacle detection."""
         self._calls.submit(self._enable, SetBool.Request(data=on), reply)
 
-    def _on_obstacle(self, obstacle: Obstacle) -> None:
-        if not obstacle.unknown:
-            self.heard_s = self.now_s
+    def _on_obstacle(self, _obstacle: Obstacle) -> None:
+        """Hear of the sensor, also where it can't judge the way: the guidance does not move on then."""
+        self.heard_s = self.now_s
 
 
 class MappingApi(FunctionalPart):
