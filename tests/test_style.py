@@ -18,6 +18,9 @@ ROS1_PACKAGES = (
     "lidar_obstacles",
     "lidar_mapping",
     "uav_simulator",
+    "radio_link",
+    "video_stream",
+    "ground_station",
 )
 ROS2_PACKAGES = (
     "alula_common",

@@ -24,13 +24,13 @@ import psutil
 
 from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, command_line, end_run, processes_of_run
+from alula_common.scenarios import scenario_names
 from alula_common.shared_memory import sweep_shared_memory
 from alula_common.signals import Interrupts
-from alula_common.suggestions import nearest
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
-from alula_flight.spec import SCENARIOS, RequestError, RunSpec, read_faults, read_imperfections, read_world
+from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_world
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.world.config import world_names
 
@@ -51,7 +51,7 @@ class Arguments(argparse.Namespace):
     out: Path | None
     seed: int
     rate: float | None
-    world: str
+    world: str | None
     autopilot: str | None
     sensors: str | None
     imperfections: str
@@ -62,10 +62,10 @@ class Arguments(argparse.Namespace):
 def parse(arguments: list[str]) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
     parser = argparse.ArgumentParser(prog="alula fly", description="Fly a scenario through the whole stack.", add_help=True)
-    parser.add_argument("scenario", help="; ".join(f"{name}: {meaning}" for name, meaning in SCENARIOS.items()))
+    parser.add_argument("scenario", help=f"what to fly: {', '.join(scenario_names())}")
     parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="break a sensor, seconds after lift-off")
     parser.add_argument(
-        "--world", default="yard", metavar="FILE|NAME", help=f"where to fly: a file, or {', '.join(world_names())} (default yard)"
+        "--world", metavar="FILE|NAME", help=f"where to fly: a file, or {', '.join(world_names())} (default: the scenario's)"
     )
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/<time>-<scenario>)")
     parser.add_argument("--seed", type=int, default=0, help="seed of world details, wind and noise (default 0)")
@@ -85,8 +85,7 @@ def parse(arguments: list[str]) -> RunSpec:
         "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what the mocks do, on top of the drone's own"
     )
     given = parser.parse_args(arguments, namespace=Arguments())
-    if given.scenario not in SCENARIOS:
-        raise RequestError(f"there is no scenario '{given.scenario}'; {nearest(given.scenario, SCENARIOS)}")
+    scenario = read_scenario(given.scenario)
     if not 0 <= given.seed < 2**31:
         raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")
     if given.rate is not None and not 0 <= given.rate <= 1000:  # also refuses nan
@@ -99,8 +98,8 @@ def parse(arguments: list[str]) -> RunSpec:
         run_id=uuid.uuid4().hex,
         seed=given.seed,
         rate=1.0 if given.rate is None else given.rate,
-        faults=read_faults(given.fail, None if given.mock else FAULTS),
-        world=read_world(given.world),
+        faults=read_faults(given.fail, None if given.mock else {**FAULTS, **dict(scenario.faults)}),
+        world=read_world(given.world or scenario.world),
         autopilot=given.autopilot,
         sensors=given.sensors or "",
         imperfections=read_imperfections(given.imperfections),

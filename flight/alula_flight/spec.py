@@ -9,15 +9,25 @@ from pathlib import Path
 
 from alula_common.faults import FaultError, parse_fault
 from alula_common.files import write_json
+from alula_common.scenarios import Scenario, ScenarioError, load_scenario
 from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.world.config import find_world, load_world
 
-SCENARIOS = {"mapping": "map the yard; watch ahead with the ZED, or with the LiDAR when the ZED has failed (paper, section 2.2)"}
+RADIO_PORT, RADIO_PORTS = 42000, 8
+"""The UDP ports of a run's radio: from the first on, so many for each DDS domain, so that runs don't meet."""
 
 
 class RequestError(Exception):
     """The command line asks for something that can't be; the message names it and the remedy in one line."""
+
+
+def read_scenario(name: str) -> Scenario:
+    """Read a scenario by its name."""
+    try:
+        return load_scenario(name)
+    except ScenarioError as error:
+        raise RequestError(str(error)) from None
 
 
 def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:
@@ -89,18 +99,21 @@ class RunSpec:
         return cls(**{**values, "faults": tuple(values["faults"]), "behaviour": tuple(values.get("behaviour", ()))})
 
     def launch_arguments(self) -> list[str]:
-        """Return the arguments of ``fly.launch``."""
+        """Return the arguments of the scenario's launch file."""
+        scenario = load_scenario(self.scenario)
+        others = [fault for fault in self.faults if parse_fault(fault).what in dict(scenario.faults)]
         arguments = [
-            f"scenario:={self.scenario}",
             f"out:={self.out_dir}",
             f"seed:={self.seed}",
             f"rate:={self.rate:g}",
-            f"faults:={','.join(self.faults)}",
+            f"faults:={','.join(fault for fault in self.faults if fault not in others)}",
             f"world:={self.world}",
             f"mavlink_port:={self.mavlink_port}",
         ]
         if self.imperfections != "off":
             arguments.append(f"imperfections:={self.imperfections}")
+        if scenario.faults:
+            arguments += [f"radio_faults:={','.join(others)}", f"radio_port:={RADIO_PORT + RADIO_PORTS * self.domain}"]
         if self.autopilot is not None:
             arguments += ["vehicle:=ardupilot" if self.sensors else "simulate:=false", f"autopilot:={self.autopilot}"]
         return arguments

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from alula_common.processes import end_run
+from alula_common.scenarios import load_scenario
 from alula_common.signals import on_end_signal
 from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
 from alula_flight.spec import RunSpec
@@ -129,7 +130,7 @@ class Supervisor:
         from roslaunch.parent import ROSLaunchParent
         from roslib.packages import find_resource
 
-        (launch_file,) = find_resource("uav_bringup", "fly.launch")[:1]
+        (launch_file,) = find_resource("uav_bringup", load_scenario(self._spec.scenario).launch)[:1]
         launch = ROSLaunchParent(
             "nodes",
             [(launch_file, self._spec.launch_arguments())],

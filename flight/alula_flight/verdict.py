@@ -16,7 +16,7 @@ MEANING = {
     "not_started": "the mission could not start",
     "running": "the mission's process ended before the mission did",
 }
-PICTURES = ("timeline.svg", "tree.svg", "map.png", "summary.json")
+PICTURES = ("timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
 
 
 def number(value: float | None, unit: str, digits: int = 2) -> str:
@@ -33,13 +33,27 @@ def flight_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight through a world was."""
     chart = summary.get("map") or {}
     coverage = chart.get("coverage")
-    return [
+    lines = [
         f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}, "
         f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {summary.get('collisions')}, "
-        f"nearest surface {number(summary.get('min_clearance_m'), 'm')}",
+        f"nearest surface {number(summary.get('min_clearance_m'), 'm')}"
+    ]
+    if summary.get("video"):
+        return [*lines, video_line(summary["video"])]
+    return [
+        *lines,
         f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
         f"coverage {number(None if coverage is None else 100 * coverage, '%', 1)}",
     ]
+
+
+def video_line(video: Mapping[str, Any]) -> str:
+    """Return what the telepilot saw."""
+    return (
+        f"  video: at least {number(video.get('min_fps'), 'frames a second', 0)}, SSIM {number(video.get('mean_ssim'), '', 3)} "
+        f"(least {number(video.get('min_ssim'), '', 3)}), delay {number(video.get('p95_delay_s'), 's')} (95 %), "
+        f"{video.get('freezes')} freezes, {video.get('adaptations')} adaptations, criterion missed: {video.get('criterion') or 'none'}"
+    )
 
 
 def mock_lines(summary: Mapping[str, Any]) -> list[str]:
@@ -61,7 +75,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:
         failure = recovery["failure_s"]
-        steps = [f"sensor failed at {failure:.2f} s"]
+        steps = [f"{'radio lost' if summary.get('video') else 'sensor failed'} at {failure:.2f} s"]
         for key, words in (("detected_s", "detected"), ("fallback_running_s", "fallback running"), ("moving_again_s", "moving again")):
             if recovery.get(key) is not None:
                 steps.append(f"{words} {recovery[key] - failure:.2f} s later")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula_common.files import write_aside, write_json
+from alula_common.scenarios import load_scenario
 from alula_flight.report.events import History, fold, read_events
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.files import Problems
@@ -19,6 +20,8 @@ from alula_flight.report.summary import Summary, summarise
 from alula_flight.report.timeline import make_timeline
 from alula_flight.report.timeline_picture import draw_timeline
 from alula_flight.report.truth import Encounter, disagreements, encounter, rests
+from alula_flight.report.video import Video, radio_lost_s, read_video
+from alula_flight.report.video_picture import draw_video
 from alula_flight.report.world import World
 
 
@@ -42,7 +45,7 @@ def make_report(facts: RunFacts) -> Summary:
     Raises:
         OSError: the summary itself can't be written.
     """
-    folder, problems = facts.out_dir, Problems()
+    folder, problems, scenario = facts.out_dir, Problems(), load_scenario(facts.scenario)
 
     # 1. What happened in the skillsets, and what the functional layer recorded.
     history, recording, mock = History(), Recording(), None
@@ -54,10 +57,14 @@ def make_report(facts: RunFacts) -> Summary:
         with problems.survive("functional.bag"):
             recording = read_recording(folder, problems)
     phases = find_phases(history, recording)
-    recovery = find_recovery(facts.scenario, history, recording, phases)
+    video = Video()
+    if "video" in scenario.report and not facts.mock:
+        with problems.survive("video"):
+            video = read_video(folder, history, phases, problems)
+    recovery = find_recovery(scenario, history, recording, phases, radio_lost_s=radio_lost_s(video, phases))
 
     # 2. The flight, and 3. its map, against the true world, where there is one.
-    truth = Truth() if facts.mock else _compare(folder, recording, phases, problems)
+    truth = Truth() if facts.mock else _compare(folder, recording, phases, problems, mapped="map" in scenario.report)
 
     # 4. The pictures.
     failed = next((fault.sensor for fault in injected(recording)), "")
@@ -71,6 +78,10 @@ def make_report(facts: RunFacts) -> Summary:
             scene = MapScene(truth.points, truth.quality.missed_enu_m, truth.world, truth.route, recording.path, failure_s, failed)
             write_aside(folder / "map.png", lambda aside: draw_map(scene, aside, title=_title(facts)))
 
+    if video.frames:
+        with problems.survive("video.svg"):
+            write_aside(folder / "video.svg", lambda aside: draw_video(video, timeline, aside, title=_title(facts)))
+
     # 5. The numbers, last, because they tell what went wrong with the rest.
     summary = summarise(
         facts,
@@ -82,13 +93,14 @@ def make_report(facts: RunFacts) -> Summary:
         resting=truth.resting,
         quality=truth.quality,
         mock=mock,
+        video=video.summary,
         problems=problems,
     )
     write_json(folder / "summary.json", summary)
     return summary
 
 
-def _compare(folder: Path, recording: Recording, phases: Phases, problems: Problems) -> Truth:
+def _compare(folder: Path, recording: Recording, phases: Phases, problems: Problems, *, mapped: bool) -> Truth:
     """Compare with the true world: the path first, then the map."""
     world: World | None = None
     with problems.survive("world.ply"):
@@ -101,8 +113,9 @@ def _compare(folder: Path, recording: Recording, phases: Phases, problems: Probl
             problems.note(sentence)
     points: Floats | None = None
     route: Floats | None = None
-    with problems.survive("map.ply"):
-        points = load_map(folder / "map.ply")
+    if mapped:
+        with problems.survive("map.ply"):
+            points = load_map(folder / "map.ply")
     with problems.survive("route.json"):
         route = load_route(folder / "route.json")
     quality = MapQuality()

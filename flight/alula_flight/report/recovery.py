@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alula_common.scenarios import Scenario
 from alula_flight.report.events import Execution, History
 from alula_flight.report.phases import Phases
 from alula_flight.report.recording import Fault, Recording, Track
@@ -13,10 +14,6 @@ from alula_flight.report.recording import Fault, Recording, Track
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 BROKEN = "BROKEN"
 MENDED = "ok"
-# Per scenario, the skill whose running means that the vehicle can see ahead again (paper, Figure 6).
-FALLBACK_SKILLS = {"mapping": "lidar_depthmap"}
-# Skills that take the vehicle somewhere; a turn on the spot, or braking past the stop point and back, is not moving on.
-MOTION_SKILLS = {"mapping": ("goto", "goto_straight")}
 MOVING_M_S = 0.2
 # The managers' clock ticks at 50 Hz, so an event's stamp may be a tick older than what caused it.
 STAMP_TOLERANCE_S = 0.05
@@ -38,18 +35,24 @@ def injected(recording: Recording) -> tuple[Fault, ...]:
     return tuple(sorted((fault for fault in faults if fault.mode != MENDED), key=lambda fault: fault.t_s))
 
 
-def find_recovery(scenario: str, history: History, recording: Recording, phases: Phases) -> Recovery | None:
-    """Return the recovery from the first failure, or None without one."""
+def find_recovery(
+    scenario: Scenario, history: History, recording: Recording, phases: Phases, *, radio_lost_s: float | None = None
+) -> Recovery | None:
+    """Return the recovery from the first failure, or None without one. ``radio_lost_s``: when the radio was lost that ended the video.
+
+    The scenario says which skill's running makes the flight safe again, and which take the vehicle on: a turn on the spot, or braking
+    past the stop point and back, is not moving on.
+    """
     faults = injected(recording)
     broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN]
-    if not faults and not broken:
+    if not faults and not broken and radio_lost_s is None:
         return None
-    failure_s = faults[0].t_s if faults else None
+    failure_s = radio_lost_s if radio_lost_s is not None else faults[0].t_s if faults else None
     since_s = -np.inf if failure_s is None else failure_s - STAMP_TOLERANCE_S
     violated = [execution.end_s for execution in history.executions if execution.outcome == VIOLATED and execution.end_s is not None]
     detected_s = _first([*broken, *violated], since_s)
-    fallback_s = _fallback(FALLBACK_SKILLS.get(scenario), history.executions, since_s if detected_s is None else detected_s)
-    motion_s = None if fallback_s is None else _first(_running_stamps(history, MOTION_SKILLS.get(scenario, ())), fallback_s)
+    fallback_s = _fallback(scenario.fallback, history.executions, since_s if detected_s is None else detected_s)
+    motion_s = None if fallback_s is None else _first(_running_stamps(history, scenario.motion), fallback_s)
     moving_s = None if motion_s is None or recording.path is None else moving_again(recording.path, motion_s, phases.landing_s)
     return Recovery(failure_s, detected_s, fallback_s, moving_s)
 
@@ -62,7 +65,7 @@ def _first(stamps: list[float], since_s: float) -> float | None:
     return min((stamp for stamp in stamps if stamp >= since_s), default=None)
 
 
-def _fallback(skill: str | None, executions: tuple[Execution, ...], since_s: float) -> float | None:
+def _fallback(skill: str, executions: tuple[Execution, ...], since_s: float) -> float | None:
     """Return when the fallback skill came to run; one that was running before the failure needs no mention."""
     return _first([e.running_s for e in executions if e.skill == skill and e.running_s is not None], since_s)
 

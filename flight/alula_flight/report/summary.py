@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TypedDict
 
 from alula_common.faults import parse_fault
+from alula_common.scenarios import load_scenario
 from alula_flight.report.events import History
 from alula_flight.report.facts import Death, RunFacts
 from alula_flight.report.files import Problems, ReportError, mapping, read_json
@@ -14,6 +15,7 @@ from alula_flight.report.phases import Phases, flight_status
 from alula_flight.report.recording import ON_GROUND, Recording
 from alula_flight.report.recovery import Recovery, injected
 from alula_flight.report.truth import Encounter, worse
+from alula_flight.report.video import VideoSummary
 
 OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "running"})
 
@@ -97,6 +99,7 @@ class Summary(TypedDict):
     resources: list[ResourceSummary]
     recovery: RecoverySummary | None
     bridge: dict[str, object] | None
+    video: VideoSummary | None
     faults: list[str]
     injected: list[InjectedFault]
     died: list[Death]
@@ -159,8 +162,10 @@ def note_doubts(facts: RunFacts, recording: Recording, phases: Phases, problems:
     if not phases.lifted_off:
         problems.note(f"no lift-off is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(recording)}
+    others = dict(load_scenario(facts.scenario).faults)  # not the simulator's: its state knows nothing of them
     for fault in facts.faults:
-        if recording.simulator is not None and parse_fault(fault).what not in broken:
+        what = parse_fault(fault).what
+        if recording.simulator is not None and what not in others and what not in broken:
             problems.note(f"the fault {fault} never happened")
 
 
@@ -176,6 +181,7 @@ def summarise(
     quality: MapQuality,
     problems: Problems,
     mock: MockSummary | None = None,
+    video: VideoSummary | None = None,
 ) -> Summary:
     """Put everything together."""
     outcome, reason = read_outcome(facts, problems)
@@ -200,6 +206,7 @@ def summarise(
         resources=resources(history, phases),
         recovery=_recovery(recovery, phases),
         bridge=bridge,
+        video=video,
         faults=list(facts.faults),
         injected=[InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(recording)],
         died=[Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],

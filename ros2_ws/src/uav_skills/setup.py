@@ -19,6 +19,7 @@ setup(
             "navigation_skillset = uav_skills.navigation:main_navigation",
             "perception_skillset = uav_skills.perception:main_perception",
             "mapping_skillset = uav_skills.mapping:main_mapping",
+            "video_skillset = uav_skills.video:main_video",
         ],
     },
 )

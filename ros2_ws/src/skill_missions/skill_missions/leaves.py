@@ -145,3 +145,24 @@ class Stays(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         if not self._condition():
             return Status.FAILURE
         return Status.SUCCESS if self._blackboard.now_s - self._since_s >= self._duration_s else Status.RUNNING
+
+
+class Awaits(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+    """SUCCESS as soon as the condition holds, FAILURE when it has not for a time of mission clock."""
+
+    def __init__(self, name: str, condition: Callable[[], bool], limit_s: float, *, blackboard: Blackboard) -> None:
+        super().__init__(name)
+        self._condition = condition
+        self._limit_s = limit_s
+        self._blackboard = blackboard
+        self._since_s = 0.0
+
+    def initialise(self) -> None:
+        """Begin to count."""
+        self._since_s = self._blackboard.now_s
+
+    def update(self) -> Status:
+        """Look and count."""
+        if self._condition():
+            return Status.SUCCESS
+        return Status.RUNNING if self._blackboard.now_s - self._since_s < self._limit_s else Status.FAILURE

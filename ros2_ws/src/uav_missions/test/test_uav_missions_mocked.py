@@ -19,13 +19,13 @@ from skill_missions.mocked import MockedMission
 from skill_runtime.core import ExecutionEvent
 from skill_runtime.mock import load_behaviour
 from uav_missions import mock_flight
-from uav_missions.plan import mapping_plan
+from uav_missions.mapping import plan as mapping_plan
 from uav_missions.route import Route, load_route
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
 ROUTE = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml").waypoints
 SKILLSETS = [importlib.import_module(f"{name}_managers.model").SKILLSET for name in ("navigation", "perception", "mapping")]
-BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], SKILLSETS)
+BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone()).of(frozenset(s.name for s in SKILLSETS))
 
 # What `./alula fly mapping --rate 0 --fail zed@30` recorded in the simulator, in the order of the requests.
 SIMULATED = [
@@ -136,8 +136,8 @@ def test_a_campaign_always_comes_to_an_end_and_down():
     """Seeds, failures of sensors at random times, and functions that fail by chance on top."""
     troubles = load_behaviour(
         [ALULA_ROOT / "skillsets/uav/mock.yaml", Path(__file__).with_name("uav_missions_troubles.yaml")],
-        SKILLSETS,
-    )
+        mock_flight.drone(),
+    ).of(frozenset(s.name for s in SKILLSETS))
     outcomes: Counter[Outcome] = Counter()
     for seed in range(100):
         chance = random.Random(seed)  # noqa: S311 - no secret
@@ -175,7 +175,7 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
 
 def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):
     assert mock_flight.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
-    assert capsys.readouterr().err == "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot\n"
+    assert capsys.readouterr().err == "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, control\n"
     assert not (tmp_path / "run").exists()
 
 

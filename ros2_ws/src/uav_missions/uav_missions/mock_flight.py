@@ -13,14 +13,15 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula_common.faults import FaultError, FaultRequest, parse_fault
+from alula_common.faults import FaultError, parse_fault
+from alula_common.scenarios import ScenarioError, load_scenario
 from skill_missions.director import EXIT_CODES, End, Outcome
 from skill_missions.files import write_json
 from skill_missions.mocked import MockedMission
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.mock import Behaviour, load_behaviour
-from uav_missions.plan import SKILLSETS, mapping_plan, write_route
+from skill_runtime.mock import load_behaviour
+from uav_missions.plan import ROBOT, plan_of, write_route
 from uav_missions.route import Route, RouteError, load_route
 
 CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
@@ -29,7 +30,7 @@ CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the arguments."""
     parser = argparse.ArgumentParser(prog="mock_flight", description="Fly a mission over mocks, in virtual time.")
-    parser.add_argument("--scenario", choices=["mapping"], default="mapping", help="which mission")
+    parser.add_argument("--scenario", default="mapping", help="which one of the folder scenarios")
     parser.add_argument("--out", type=Path, required=True, help="the run's folder, new or empty")
     parser.add_argument("--route", type=Path, required=True, help="YAML or JSON file with the key 'route': a list of [x, y, z]")
     parser.add_argument("--behaviour", type=Path, action="append", default=[], help="behaviour file; later ones come first")
@@ -38,23 +39,25 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def drone() -> list[Skillset]:
+def drone(names: Sequence[str] = ROBOT) -> list[Skillset]:
     """Return the models that the drone's managers execute."""
-    return [importlib.import_module(f"{name}_managers.model").SKILLSET for name in SKILLSETS]
+    return [importlib.import_module(f"{name}_managers.model").SKILLSET for name in names]
 
 
-def prepare(options: argparse.Namespace) -> tuple[list[Skillset], Behaviour, list[FaultRequest], Route]:
+def prepare(options: argparse.Namespace) -> tuple[MockedMission, Route]:
     """Read what the flight needs.
 
     Raises:
-        FaultError, SkillRuntimeError, RouteError: a fault or one of the files, or a fault that the behaviour has not.
+        FaultError, ScenarioError, SkillRuntimeError, RouteError: a fault or one of the files, or a fault that the behaviour has not.
     """
-    skillsets = drone()
-    behaviour = load_behaviour(options.behaviour, skillsets)
+    scenario, route = load_scenario(options.scenario), load_route(options.route)
+    behaviour = load_behaviour(options.behaviour, drone()).of(frozenset(scenario.skillsets))
     faults = [parse_fault(text) for text in options.fail]
     for request in faults:
         behaviour.fault(request)
-    return skillsets, behaviour, faults, load_route(options.route)
+    plan = plan_of(scenario, route)
+    options.out.mkdir(parents=True, exist_ok=True)
+    return MockedMission(drone(scenario.skillsets), behaviour, plan, faults=faults, seed=options.seed, out=options.out), route
 
 
 def write_account(path: Path, mission: MockedMission, lift_off_s: float | None) -> None:
@@ -75,13 +78,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Fly; return the exit code."""
     options = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        skillsets, behaviour, faults, route = prepare(options)
-        options.out.mkdir(parents=True, exist_ok=True)
+        mission, route = prepare(options)
         write_route(options.out, route)
-    except (FaultError, SkillRuntimeError, RouteError, OSError) as error:
+    except (FaultError, ScenarioError, SkillRuntimeError, RouteError, OSError) as error:
         sys.stderr.write(f"{error}\n")
         return CANNOT_START
-    mission = MockedMission(skillsets, behaviour, mapping_plan(route), faults=faults, seed=options.seed, out=options.out)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
     end: End = mission.run()

@@ -1,40 +1,53 @@
-"""The drone's missions, ready to be run."""
+"""A mission along a route, ready to be run: what its tree needs to be made."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import importlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
+from alula_common.scenarios import Scenario
 from skill_missions.director import Mission
 from skill_missions.files import write_json
 from skill_missions.pending import PendingInterrupts
 from skill_missions.plan import MissionPlan
 from skill_missions.skillset import Client, Clock
 from uav_missions.blackboard import RouteBlackboard
-from uav_missions.mapping import Clients, MappingMission, Settings
+from uav_missions.flying import FlightSettings
 from uav_missions.route import Route
 
-SKILLSETS = ("navigation", "perception", "mapping")
+ROBOT = ("navigation", "perception", "mapping", "video")
+"""All skillsets of the drone."""
 DEPARTURE = ("flight_status", "ON_GROUND")
 """Lift-off."""
 
+MakeTree = Callable[[Mapping[str, Client], RouteBlackboard, Any], Mission]
+"""Makes a mission of the clients by skillset, its memory, and its settings."""
 
-def mapping_plan(route: Route) -> MissionPlan:
-    """Return the mapping mission along a route; its parameters are those of ``mapping.Settings``."""
+
+def plan_of(scenario: Scenario, route: Route) -> MissionPlan:
+    """Return the plan of a scenario along a route: what its ``mission`` names makes it."""
+    module, _, function = scenario.mission.partition(":")
+    make_plan: Callable[[Route], MissionPlan] = getattr(importlib.import_module(module), function)
+    return make_plan(route)
+
+
+def route_plan(name: str, skillsets: tuple[str, ...], make_tree: MakeTree, settings: FlightSettings, route: Route) -> MissionPlan:
+    """Return a mission along a route; its parameters are the fields of its settings."""
 
     def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[Mission, RouteBlackboard]:
         blackboard = RouteBlackboard(clock_ns=clock_ns, route=route, pending=PendingInterrupts(clock_ns))
-        skills = Clients(clients["navigation"], clients["perception"], clients["mapping"])
-        return MappingMission(skills, blackboard, settings_of(values)), blackboard
+        return make_tree(clients, blackboard, settings_of(settings, values)), blackboard
 
     facts = lambda: {"waypoints": len(route.waypoints), "waypoints_reached": route.reached}  # noqa: E731
-    return MissionPlan("mapping", SKILLSETS, make, vars(Settings()), DEPARTURE, facts)
+    return MissionPlan(name, skillsets, make, vars(settings), DEPARTURE, facts)
 
 
-def settings_of(values: Mapping[str, float]) -> Settings:
+def settings_of(defaults: FlightSettings, values: Mapping[str, float]) -> FlightSettings:
     """Return settings from parameters; what counts is a whole number."""
-    kinds = {name: type(value) for name, value in vars(Settings()).items()}
-    return Settings(**{name: kinds[name](value) for name, value in values.items()})
+    kinds = {name: type(value) for name, value in vars(defaults).items()}
+    return type(defaults)(**{name: kinds[name](value) for name, value in values.items()})
 
 
 def write_route(out: Path, route: Route) -> None:

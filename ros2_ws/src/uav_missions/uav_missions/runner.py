@@ -14,16 +14,17 @@ from pathlib import Path
 
 import rclpy.utilities
 
+from alula_common.scenarios import ScenarioError, load_scenario
 from skill_missions.director import EXIT_CODES, Outcome
 from skill_missions.node import run_mission
-from uav_missions.plan import mapping_plan, write_route
+from uav_missions.plan import plan_of, write_route
 from uav_missions.route import RouteError, load_route
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the arguments."""
     parser = argparse.ArgumentParser(prog="mission", description="Fly a mission.")
-    parser.add_argument("--scenario", choices=["mapping"], default="mapping", help="which mission")
+    parser.add_argument("--scenario", default="mapping", help="which one of the folder scenarios")
     parser.add_argument("--out", type=Path, required=True, help="the run's folder")
     parser.add_argument("--route", type=Path, required=True, help="YAML or JSON file with the key 'route': a list of [x, y, z]")
     return parser.parse_args(arguments)
@@ -35,9 +36,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parse(rclpy.utilities.remove_ros_args(words)[1:])
     try:
         route = load_route(options.route)
+        plan = plan_of(load_scenario(options.scenario), route)
         options.out.mkdir(parents=True, exist_ok=True)
         write_route(options.out, route)
-    except (RouteError, OSError) as error:
+    except (RouteError, ScenarioError, OSError) as error:
         sys.stderr.write(f"mission: {error}\n")
         return EXIT_CODES[Outcome.NOT_STARTED]
-    return run_mission(mapping_plan(route), options.out, words)
+    return run_mission(plan, options.out, words)

@@ -59,3 +59,12 @@ def check_turn(*, heading_rad: float, rate_rad_s: float, limits: Limits = DEFAUL
 def check_duration(*, duration_s: float, limits: Limits = DEFAULT_LIMITS) -> str:
     """Refuse a time that is no number, not positive, or longer than the batteries last."""
     return check_between("duration", duration_s, 0.0, limits.max_duration_s, "s")
+
+
+def check_stream(*, min_fps: float, min_quality: float, patience_s: float) -> str:
+    """Refuse a frame rate, a similarity or a patience that no stream can be held to."""
+    if not 0.0 <= min_quality < 1.0:
+        return f"min_quality is {min_quality:g}; it must be at least 0 and below 1 (structural similarity)"
+    if not 1.0 <= patience_s <= 60.0:
+        return f"patience is {patience_s:g} s; it must be between 1 and 60 s"
+    return check_between("min_fps", min_fps, 0.0, 60.0, "frames per second")

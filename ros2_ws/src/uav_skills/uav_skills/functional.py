@@ -14,8 +14,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool, Trigger
-from uav_msgs.msg import GuidanceState, MappingState, Obstacle
-from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Takeoff
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
+from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
 from uav_skills.calls import CallQueue, Reply, ignore_answer
 
@@ -162,3 +162,27 @@ class MappingApi(FunctionalPart):
         if self.state is None or state.scans != self.state.scans:
             self.registered_s = self.now_s
         self.state = state
+
+
+class VideoApi(FunctionalPart):
+    """The video to the telepilot."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self.seen_s: float | None = None
+        """When the telepilot was last known to see pictures."""
+        self._stream = self._client(Stream, "/video_stream/stream")
+        self._subscribe(VideoState, "/video_stream/state", self._on_state)
+
+    def begin(self, *, min_fps: float, min_quality: float, patience_s: float, reply: Reply) -> None:
+        """Send, with what the telepilot needs at least."""
+        request = Stream.Request(on=True, min_fps=min_fps, min_quality=min_quality, patience_s=patience_s)
+        self._calls.submit(self._stream, request, reply)
+
+    def stop(self, reply: Reply = ignore_answer) -> None:
+        """Send no more."""
+        self._calls.submit(self._stream, Stream.Request(), reply)
+
+    def _on_state(self, state: VideoState) -> None:
+        if state.streaming and state.fps > 0.0:
+            self.seen_s = self.now_s

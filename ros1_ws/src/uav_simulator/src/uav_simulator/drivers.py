@@ -14,6 +14,7 @@ from sensor_msgs.msg import CameraInfo, Image, Imu, PointCloud2
 
 from uav_simulator import ros_messages
 from uav_simulator.sensors import degradation
+from uav_simulator.sensors.camera import ColourCamera
 from uav_simulator.sensors.faults import SensorMode
 from uav_simulator.sensors.imu import ImuReading
 from uav_simulator.simulation import TICK_NS, Simulation
@@ -35,7 +36,7 @@ class Driver(Protocol):
 
     sensor: str
     every_ticks: int
-    at_tick: int  # within its period: sensors take turns, so that the work spreads
+    at_ticks: tuple[int, ...]  # within its period: sensors take turns, so that the work spreads
 
     def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
         """Measure this moment as the mode has it, with a stamp that is wrong by so much; None when nobody listens."""
@@ -57,7 +58,8 @@ class _Publisher:
 class ZedDriver:
     """Both images and their infos, 10 Hz."""
 
-    sensor, every_ticks, at_tick = "zed", 5, 0
+    sensor, every_ticks = "zed", 5
+    at_ticks: tuple[int, ...] = (0,)
 
     def __init__(self, simulation: Simulation, rng: Rng) -> None:
         self._simulation, self._rng = simulation, rng
@@ -92,7 +94,8 @@ class ZedDriver:
 class LidarDriver:
     """The sweep that ends at this moment, 10 Hz; its stamp is the sweep's beginning."""
 
-    sensor, every_ticks, at_tick = "lidar", 5, 2
+    sensor, every_ticks = "lidar", 5
+    at_ticks: tuple[int, ...] = (2,)
 
     def __init__(self, simulation: Simulation, rng: Rng) -> None:
         self._simulation, self._rng = simulation, rng
@@ -113,7 +116,8 @@ class LidarDriver:
 class ImuDriver:
     """One reading each tick, 50 Hz."""
 
-    sensor, every_ticks, at_tick = "imu", 1, 0
+    sensor, every_ticks = "imu", 1
+    at_ticks: tuple[int, ...] = (0,)
 
     def __init__(self, simulation: Simulation, rng: Rng) -> None:
         self._simulation, self._rng = simulation, rng
@@ -132,6 +136,32 @@ class ImuDriver:
         return Measurement(simulation.now_ns, lambda: self._imu.publish(message))
 
 
+class CameraDriver:
+    """The inspection camera's picture in colour, 20 Hz on the grid of the ticks: 40 and 60 ms apart by turns."""
+
+    sensor, every_ticks = "camera", 5
+    at_ticks: tuple[int, ...] = (1, 3)
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._image = _Publisher("/camera/image_raw", Image)
+        self._camera: ColourCamera | None = None
+        self._last: NDArray[np.uint8] | None = None
+
+    def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
+        """Take a picture."""
+        simulation = self._simulation
+        if not self._image.wanted:
+            return None
+        if self._camera is None:  # only scenarios with a camera pay for its textures
+            self._camera = ColourCamera(simulation.world, simulation.seed)
+        if self._last is None or mode not in HELD:
+            self._last = self._camera.render(simulation.pose)
+        pixels = np.zeros_like(self._last) if mode is SensorMode.BLACK else self._last
+        message = ros_messages.colour_image(pixels, simulation.now_ns + stamp_shift_ns)
+        return Measurement(simulation.now_ns, lambda: self._image.publish(message))
+
+
 class Drivers:
     """All drivers, each at its time; what a late sensor has measured is published when it arrives."""
 
@@ -140,9 +170,14 @@ class Drivers:
         self._simulation = simulation
         self._measured = measured
         rngs = [np.random.default_rng([simulation.seed, 6, n]) for n in range(3)]
-        self._drivers: list[Driver] = [ZedDriver(simulation, rngs[0]), LidarDriver(simulation, rngs[1]), ImuDriver(simulation, rngs[2])]
+        self._drivers: list[Driver] = [
+            ZedDriver(simulation, rngs[0]),
+            LidarDriver(simulation, rngs[1]),
+            ImuDriver(simulation, rngs[2]),
+            CameraDriver(simulation),
+        ]
         errors = simulation.imperfections
-        latency_s = {"zed": errors.zed_latency_s, "lidar": errors.lidar_latency_s, "imu": errors.imu_latency_s}
+        latency_s = {"zed": errors.zed_latency_s, "lidar": errors.lidar_latency_s, "imu": errors.imu_latency_s, "camera": 0.0}
         self._latency_ns = {sensor: round(seconds * 1e9) for sensor, seconds in latency_s.items()}
         self._under_way: dict[str, deque[tuple[int, Measurement]]] = {driver.sensor: deque() for driver in self._drivers}
 
@@ -154,7 +189,7 @@ class Drivers:
             under_way = self._under_way[driver.sensor]
             if mode is SensorMode.DEAD:
                 under_way.clear()
-            elif now_ns // TICK_NS % driver.every_ticks == driver.at_tick:
+            elif now_ns // TICK_NS % driver.every_ticks in driver.at_ticks:
                 measurement = driver.measure(mode, degradation.FUTURE_NS if mode is SensorMode.FUTURE else 0)
                 if measurement is not None:
                     late_ns = degradation.LATE_NS if mode is SensorMode.LATE else 0

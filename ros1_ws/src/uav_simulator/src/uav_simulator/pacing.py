@@ -2,7 +2,8 @@
 
 A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, against the last measurement that the sensor published: who
 works on images has done its share when the last image is dealt with, and need not say anything while there are none. It has nearly the
-sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements.
+sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements. ``TOPIC=0.06``
+sets the seconds by which a topic may lag behind the clock.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ class Pacer:
 
     def __init__(self, topics: Iterable[str] = (), *, limit_s: float, patience_s: float) -> None:
         self._limit_s, self._patience_s = limit_s, patience_s
-        self._sensor_of = {topic: sensor for topic, _, sensor in (word.partition("=") for word in topics) if sensor}
+        said = {topic: against for topic, _, against in (word.partition("=") for word in topics) if against}
+        self._limits_s = {topic: float(against) for topic, against in said.items() if against[0].isdigit()}
+        self._sensor_of = {topic: against for topic, against in said.items() if topic not in self._limits_s}
         self._measured: dict[str, deque[tuple[float, float]]] = {}  # of each sensor: stamps, and when they were published
         self._listeners: dict[str, _Listener] = {}
         self._lock = threading.Lock()
@@ -66,7 +69,7 @@ class Pacer:
         """Return by how much the topic lags more than it may; not positive: it does not."""
         sensor = self._sensor_of.get(topic)
         if sensor is None:
-            return now_s - listener.stamp_s - self._limit_s
+            return now_s - listener.stamp_s - self._limits_s.get(topic, self._limit_s)
         measured = self._measured.get(sensor, ())
         waiting = next((published_s for stamp_s, published_s in measured if stamp_s > listener.stamp_s + ROUNDING_S), None)
         return -WORK_S if waiting is None else now_s - waiting - WORK_S

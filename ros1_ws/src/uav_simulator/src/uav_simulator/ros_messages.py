@@ -13,7 +13,7 @@ from tf2_msgs.msg import TFMessage
 from uav_simulator.frames import Quat
 from uav_simulator.sensors.imu import ACCEL_NOISE_M_S2, GYRO_NOISE_RAD_S, ImuReading
 from uav_simulator.sensors.lidar import POINT_DTYPE
-from uav_simulator.sensors.mounts import MOUNTS, ZED_LEFT
+from uav_simulator.sensors.mounts import CAMERA, MOUNTS, ZED_LEFT
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.stereo import Pinhole
 
@@ -56,6 +56,14 @@ def image(pixels: NDArray[np.uint8], stamp_ns: int) -> Image:
         step=width,
         data=pixels.tobytes(),
     )
+
+
+def colour_image(pixels: NDArray[np.uint8], stamp_ns: int) -> Image:
+    """Return an rgb8 image of the inspection camera, (H, W, 3)."""
+    height, width = pixels.shape[:2]
+    message = Image(header=header(stamp_ns, CAMERA.frame_id), height=height, width=width, encoding="rgb8", step=3 * width)
+    message.data = pixels.tobytes()
+    return message
 
 
 def camera_info(camera: Pinhole, *, right: bool, stamp_ns: int) -> CameraInfo:

@@ -32,6 +32,7 @@ class Play:
         self._seed = seed
         self._chance = random.Random(f"{seed} timeline")  # noqa: S311 - a play, not a secret
         self._skills: list[MockSkill] = []
+        self._resources: dict[str, tuple[str, ...]] = {}
         self._began_s = 0.0
         self._held: dict[Place, str] = {}
         """What faults hold resources at, whatever else the script says of them."""
@@ -43,6 +44,7 @@ class Play:
     def hooks_of(self, skillset: Skillset) -> dict[str, MockSkill]:
         """Make the hooks of a skillset's skills."""
         made = {}
+        self._resources[skillset.name] = tuple(resource.name for resource in skillset.resources)
         for skill in skillset.skills:
             rules = self._behaviour.rules.get((skillset.name, skill.name), ())
             chance = random.Random(f"{self._seed} {skillset.name}.{skill.name}")  # noqa: S311
@@ -160,7 +162,8 @@ class Play:
         now_s = self.stage.now_s - self._began_s
         value = next((value for from_s, value in reversed(script.steps) if from_s <= now_s), None)
         if value is not None:
-            self.stage.publish(*place, self._filled(value, {"t": now_s}))
+            states = {resource: self.stage.state(place[0], resource) for resource in self._resources.get(place[0], ())}
+            self.stage.publish(*place, self._filled(value, {"t": now_s, **states}))
 
     def _filled(self, value: object, names: Mapping[str, object]) -> object:
         if isinstance(value, Mapping):

@@ -189,7 +189,7 @@ class _Reader:
         said = part.record(f"the data {name}", ("period", "value", "values"))
         if ("value" in said) == ("values" in said):
             raise part.wrong(f"{name} needs either `value` or `values`")
-        known = {*self._memory, "t"}
+        known = {*self._memory, "t", *(resource.name for resource in skillset.resources)}
         period_s = said["period"].number("`period`", 0.001) if "period" in said else data.period_s or DEFAULT_PERIOD_S
         steps = ((0.0, self._filled(said["value"], known)),) if "value" in said else self._steps(name, said["values"], known)
         return (skillset.name, member), DataScript(period_s, steps, part.place)

@@ -47,6 +47,7 @@ _IMAGES = (
 FAULTS: dict[str, tuple[str, ...]] = {
     "zed": tuple(mode.value for mode in (*_ALWAYS, *_IMAGES)),
     "lidar": tuple(mode.value for mode in (*_ALWAYS, SensorMode.THINNED, SensorMode.SECTOR, SensorMode.BIASED)),
+    "camera": tuple(mode.value for mode in _ALWAYS if mode is not SensorMode.FLICKERING),
     "imu": tuple(mode.value for mode in (*_ALWAYS, SensorMode.BIASED)),
 }
 """The sensors, each with the ways in which it can fail; the first one counts where none is named."""

@@ -1,0 +1,21 @@
+"""The node's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class GroundSettings:
+    """Private parameters of /ground_station; ports are UDP on loopback."""
+
+    video_port: int = 42001  # of this node: where RTP arrives from the radio
+    report_port: int = 42002  # of the radio: where reports go
+    control_port: int = 42004  # of the radio: where the telepilot's MAVLink goes
+    player_port: int = 42006  # where the RTP that arrives is passed on to any player
+    key: str = "alula"  # shared with the drone
+    reference: str = ""  # topic of the camera that the drone films with, to compare with; only a simulation has it here
+    width: int = 640
+    height: int = 360
+    video_path: str = ""  # folder for received.mkv and shown.jsonl; empty: nothing is recorded
+    heartbeat: bool = True  # the telepilot's control link: a MAVLink heartbeat once a second

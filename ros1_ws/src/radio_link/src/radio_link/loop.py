@@ -1,0 +1,126 @@
+"""One thread that handles datagrams, ticks of the mission clock and posted items as they come: both ends of the radio, and the radio."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar
+
+import rospy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+
+NS = 1_000_000_000
+LOOPBACK = "127.0.0.1"
+WAIT_S = 0.1
+BUFFER_BYTES = 1 << 20
+LARGEST_DATAGRAM = 65535
+
+Item = TypeVar("Item")
+OnDatagram = Callable[[int, bytes], None]
+
+
+def udp_socket(port: int) -> socket.socket:
+    """Return a non-blocking socket that is bound to a port of loopback; 0: any."""
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+    made.bind((LOOPBACK, port))
+    made.setblocking(False)
+    return made
+
+
+class MissionLoop(Generic[Item]):
+    """Calls ``on_datagram(which socket, data)``, ``on_item(item)`` and ``on_tick()``, one at a time, until ROS shuts down.
+
+    ``now_ns`` is the mission clock: simulated where there is one, else the ROS clock at 50 Hz. After each tick ``~done`` tells its
+    time, so that a simulator can wait for who works for it.
+    """
+
+    def __init__(
+        self,
+        ports: Sequence[int],
+        *,
+        on_tick: Callable[[], None],
+        on_datagram: OnDatagram | None = None,
+        on_item: Callable[[Item], None] | None = None,
+    ) -> None:
+        self.sockets = [udp_socket(port) for port in ports]
+        self._on_tick, self._on_datagram, self._on_item = on_tick, on_datagram, on_item
+        self._items: deque[Item] = deque()
+        self._now_ns = self._ticked_ns = 0
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK)
+        self._lock = threading.Lock()
+        self._done = rospy.Publisher("~done", Header, queue_size=20, tcp_nodelay=True)
+        if rospy.get_param("/use_sim_time", False):
+            self._source = rospy.Subscriber("/clock", Clock, self._on_clock, queue_size=100, tcp_nodelay=True)
+        else:
+            self._source = rospy.Timer(rospy.Duration.from_sec(0.02), self._on_timer)
+
+    @property
+    def now_ns(self) -> int:
+        """The mission clock."""
+        return self._now_ns
+
+    def post(self, item: Item) -> None:
+        """Have an item handled by the loop's thread; may be called from any."""
+        with self._lock:
+            self._items.append(item)
+        os.eventfd_write(self._wake, 1)
+
+    def send(self, data: bytes, port: int, *, by: int = 0) -> None:
+        """Send a datagram to a port of loopback, whether somebody listens there or not; answers come to the socket that it is sent by."""
+        try:
+            self.sockets[by].sendto(data, (LOOPBACK, port))
+        except OSError as error:
+            rospy.logwarn_throttle(5.0, f"a datagram to port {port} could not be sent: {error}")
+
+    def run(self) -> None:
+        """Handle what comes."""
+        while not rospy.is_shutdown():
+            waiting: list[socket.socket | int] = [*self.sockets, self._wake]
+            readable, _, _ = select.select(waiting, [], [], WAIT_S)
+            if self._wake in readable:
+                os.eventfd_read(self._wake)
+            for number, each in enumerate(self.sockets):
+                if each in readable:
+                    self._receive(number, each)
+            self._handle_items()
+            self._tick()
+
+    def _receive(self, number: int, source: socket.socket) -> None:
+        while True:
+            try:
+                data = source.recv(LARGEST_DATAGRAM)
+            except BlockingIOError:
+                return
+            except OSError:
+                continue  # what was sent to a port where nobody listens comes back as an error here
+            if self._on_datagram is not None:
+                self._on_datagram(number, data)
+
+    def _handle_items(self) -> None:
+        while self._items:
+            with self._lock:
+                item = self._items.popleft()
+            if self._on_item is not None:
+                self._on_item(item)
+
+    def _tick(self) -> None:
+        now_ns = self._now_ns
+        if now_ns <= self._ticked_ns:
+            return
+        self._ticked_ns = now_ns
+        self._on_tick()
+        self._done.publish(Header(stamp=rospy.Time(*divmod(now_ns, NS))))
+
+    def _on_clock(self, message: Clock) -> None:
+        self._now_ns = max(self._now_ns, message.clock.to_nsec())
+        os.eventfd_write(self._wake, 1)
+
+    def _on_timer(self, _event: object) -> None:
+        self._now_ns = max(self._now_ns, rospy.Time.now().to_nsec())
+        os.eventfd_write(self._wake, 1)

@@ -1,0 +1,19 @@
+"""The node's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StreamSettings:
+    """Private parameters of /video_stream; ports are UDP on loopback."""
+
+    image: str = "/camera/image_raw"  # sensor_msgs/Image, rgb8 or bgr8: the simulated camera or a driver's topic
+    video_port: int = 42000  # of the radio: where RTP goes
+    report_port: int = 42003  # of this node: where the ground station's reports arrive
+    key: str = "alula"  # shared with the ground station
+    enabled: bool = False
+    video_path: str = ""  # folder for sent.mkv and sent.jsonl; empty: nothing is recorded
+    max_bps: float = 2.5e6
+    min_bps: float = 100e3

@@ -1,0 +1,125 @@
+"""The inspection over mocks, in virtual time: what the tree does when the video, the radio, a sensor or the pilot fails."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from pathlib import Path
+
+import pytest
+
+from alula_common.faults import FaultRequest, parse_fault
+from alula_common.scenarios import load_scenario
+from skill_missions.director import Outcome
+from skill_missions.mocked import MockedMission
+from skill_runtime.core import ExecutionEvent
+from skill_runtime.mock import load_behaviour
+from uav_missions import mock_flight
+from uav_missions.inspection import plan
+from uav_missions.plan import plan_of
+from uav_missions.route import Route, load_route
+
+ALULA_ROOT = Path(__file__).resolve().parents[4]
+SCENARIO = load_scenario("inspection", ALULA_ROOT / "scenarios")
+WORLD = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/building.yaml"
+ROUTE = load_route(WORLD).waypoints
+SKILLSETS = mock_flight.drone(SCENARIO.skillsets)
+BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone()).of(frozenset(SCENARIO.skillsets))
+
+
+def fly(*faults: str, seed: int = 0, tick_period_s: float = 0.1) -> MockedMission:
+    requests: list[FaultRequest] = [parse_fault(fault) for fault in faults]
+    mission = MockedMission(SKILLSETS, BEHAVIOUR, plan(Route(ROUTE)), faults=requests, seed=seed, tick_period_s=tick_period_s)
+    mission.end = mission.run()
+    return mission
+
+
+def ends(mission: MockedMission) -> list[tuple[str, str, str]]:
+    """Return how the executions ended, in the order in which they did."""
+    found = [event for _, event in mission.events if isinstance(event, ExecutionEvent)]
+    begun = {"REQUESTED", "RUNNING", "INTERRUPTING"}
+    return [(event.skill, event.state.name, event.result) for event in found if event.state.name not in begun]
+
+
+def on_ground(mission: MockedMission) -> bool:
+    return mission.state("navigation", "flight_status") == "ON_GROUND"
+
+
+def test_the_scenario_names_this_mission():
+    assert plan_of(SCENARIO, Route(ROUTE)).scenario == "inspection"
+    assert plan_of(SCENARIO, Route(ROUTE)).skillsets == SCENARIO.skillsets
+
+
+def test_a_nominal_flight_goes_all_around_with_the_nose_to_the_walls():
+    mission = fly()
+    assert mission.end.outcome is Outcome.ACCOMPLISHED
+    assert on_ground(mission)
+    assert not mission.notes
+    skills = [skill for skill, _, _ in ends(mission)]
+    assert skills.count("goto") == len(ROUTE)
+    assert [end for end in ends(mission) if end[0] == "stream"] == [("stream", "INTERRUPTED", "")], "only when the flight is over"
+    assert skills.index("stream") < skills.index("land")
+
+
+def test_a_lost_video_stops_hovers_and_lands_in_this_order():
+    mission = fly("radio@40")
+    assert mission.end.outcome is Outcome.DEGRADED
+    assert "enough_frames" in mission.end.reason
+    last = ends(mission)
+    begin = last.index(("stream", "RESOURCE_INVARIANT_VIOLATED", "enough_frames"))
+    motion = [end for end in last[begin:] if end[0] in {"goto", "hover", "land"}]
+    assert motion == [("goto", "INTERRUPTED", ""), ("hover", "TERMINATED", "DONE"), ("land", "TERMINATED", "LANDED")]
+    assert on_ground(mission)
+
+
+def test_from_the_stream_s_failure_to_hover_takes_less_than_a_second():
+    mission = fly("radio@40")
+    stamps = {(e.skill, e.state.name): e.stamp_ns for _, e in mission.events if isinstance(e, ExecutionEvent)}
+    assert 0 < stamps["hover", "RUNNING"] - stamps["stream", "RESOURCE_INVARIANT_VIOLATED"] < 1e9
+
+
+def test_a_short_loss_of_the_radio_is_forgiven():
+    mission = fly("radio@40-40.5")
+    assert mission.end.outcome is Outcome.ACCOMPLISHED
+
+
+def test_a_video_that_comes_back_while_it_hovers_does_not_call_it_back():
+    mission = fly("radio@40-44")
+    assert mission.end.outcome is Outcome.DEGRADED
+    assert [end for end in ends(mission) if end[0] == "land"] == [("land", "TERMINATED", "LANDED")]
+
+
+def test_the_zed_is_not_needed():
+    assert fly("zed@20").end.outcome is Outcome.ACCOMPLISHED
+
+
+def test_without_the_sensor_that_looks_ahead_it_is_given_up_and_landed():
+    mission = fly("lidar@20")
+    assert mission.end.outcome is Outcome.GIVEN_UP
+    assert "lidar_ok" in mission.end.reason
+    assert on_ground(mission)
+
+
+@pytest.mark.parametrize("taker", ["pilot", "control"])
+def test_who_takes_the_vehicle_is_left_alone_until_it_is_down(taker: str):
+    mission = fly(f"{taker}@20")
+    assert mission.end.outcome is Outcome.GIVEN_UP
+    taken = itertools.dropwhile(lambda end: end[1] != "RESOURCE_INVARIANT_VIOLATED", ends(mission))
+    after = [end for end in taken if end[0] in {"hover", "land"}]
+    assert after == [], "nothing is commanded any more"
+
+
+def test_without_a_ground_station_nobody_takes_off():
+    mission = fly("radio")
+    assert mission.end.outcome is Outcome.NOT_STARTED
+    assert "ground station" in mission.end.reason
+
+
+def test_whatever_fails_whenever_it_comes_to_an_end():
+    for seed in range(20):
+        chance = random.Random(seed)  # noqa: S311 - no secret
+        names = chance.sample(["radio", "zed", "lidar"], chance.randint(1, 3))
+        mission = fly(*(f"{name}@{chance.uniform(0.0, 200.0):.2f}" for name in names), seed=seed, tick_period_s=1.0)
+        assert on_ground(mission), (seed, names)
+        assert not mission.open_executions, (seed, names)
+        assert mission.end.outcome in {Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP}
