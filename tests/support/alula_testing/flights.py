@@ -114,12 +114,12 @@ def story(summary: Mapping[str, Any]) -> list[object]:
     return [*rest[:1], beside, *rest[1:]]
 
 
-def start_flight(out: Path, *arguments: str) -> Flight:
-    """Start ``./alula fly mapping ARGUMENTS`` as fast as the machine can, as a user's shell would."""
+def start_flight(out: Path, *arguments: str, scenario: str = "mapping") -> Flight:
+    """Start ``./alula fly SCENARIO ARGUMENTS`` as fast as the machine can, as a user's shell would."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_"))}
     with (out.parent / f"{out.name}.txt").open("w", encoding="utf-8") as words:
         process = subprocess.Popen(
-            [str(ALULA_ROOT / "alula"), "fly", "mapping", "--out", str(out), *arguments],
+            [str(ALULA_ROOT / "alula"), "fly", scenario, "--out", str(out), *arguments],
             stdin=subprocess.DEVNULL,
             stdout=words,
             stderr=subprocess.STDOUT,

@@ -128,6 +128,11 @@ def test_what_can_not_be_held_at_all_exhausts_it():
     control = RateController()
     drive(control, 6.0, queue_s=1.0, received_bps=30e3)
     assert control.exhausted
+    drive(control, 0.3)
+    assert control.target_bps > RateSettings().min_bps
+    assert control.exhausted, "a moment of relief gives nothing that would help"
+    drive(control, 5.0)
+    assert not control.exhausted
 
 
 def test_silence_halves_it_again_and_again():

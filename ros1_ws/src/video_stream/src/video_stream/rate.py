@@ -19,6 +19,7 @@ class RateSettings:
 
     start_bps: float = 1.5e6
     min_bps: float = 100e3
+    relieved_bps: float = 180e3  # once the least was reached: from here on there is something to give again
     max_bps: float = 2.5e6
     queue_limit_s: float = 0.15
     loss_limit: float = 0.2
@@ -40,11 +41,8 @@ class RateController:
         self._congested_bps = self._settings.max_bps * 2
         self._held_until_ns = 0
         self._heard_ns: int | None = None
-
-    @property
-    def exhausted(self) -> bool:
-        """Tell whether there is nothing more to give: the target is the least."""
-        return self.target_bps <= self._settings.min_bps * 1.001
+        self.exhausted = False
+        """There is nothing more to give: the target fell to the least and has not got away from it."""
 
     def on_report(self, report: Report, now_ns: int) -> None:
         """Take a report into account."""
@@ -71,4 +69,6 @@ class RateController:
             self._held_until_ns = now_ns + int(limits.back_off_s * NS)
 
     def _set(self, rate_bps: float) -> None:
-        self.target_bps = min(max(rate_bps, self._settings.min_bps), self._settings.max_bps)
+        limits = self._settings
+        self.target_bps = min(max(rate_bps, limits.min_bps), limits.max_bps)
+        self.exhausted = self.target_bps <= limits.min_bps or (self.exhausted and self.target_bps < limits.relieved_bps)
