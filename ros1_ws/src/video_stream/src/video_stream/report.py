@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 
 from video_stream.wire import Seal, pack_message, unpack_message
 
@@ -52,5 +52,6 @@ class Report:
     @classmethod
     def parse(cls, data: bytes, seal: Seal) -> Report:
         """Read a datagram; raise WireError."""
-        *numbers, missing, want_key = unpack_message(KIND, data, seal)
-        return cls(*numbers, tuple((frame, index) for frame, index in missing), want_key)
+        values = dict(zip((field.name for field in fields(cls)), unpack_message(KIND, data, seal), strict=True))
+        values["missing"] = tuple((frame, index) for frame, index in values["missing"])
+        return cls(**values)
