@@ -36,7 +36,7 @@ def fly(*faults: str, seed: int = 0, tick_period_s: float = 0.1) -> MockedMissio
 
 def ends(mission: MockedMission) -> list[tuple[str, str, str]]:
     """Return how the executions ended, in the order in which they did."""
-    found = [event for _, event in mission.events if isinstance(event, ExecutionEvent)]
+    found = [event for event in mission.events if isinstance(event, ExecutionEvent)]
     begun = {"REQUESTED", "RUNNING", "INTERRUPTING"}
     return [(event.skill, event.state.name, event.result) for event in found if event.state.name not in begun]
 
@@ -74,7 +74,7 @@ def test_a_lost_video_stops_hovers_and_lands_in_this_order():
 
 def test_from_the_stream_s_failure_to_hover_takes_less_than_a_second():
     mission = fly("radio@40")
-    stamps = {(e.skill, e.state.name): e.stamp_ns for _, e in mission.events if isinstance(e, ExecutionEvent)}
+    stamps = {(e.skill, e.state.name): e.stamp_ns for e in mission.events if isinstance(e, ExecutionEvent)}
     assert 0 < stamps["hover", "RUNNING"] - stamps["stream", "RESOURCE_INVARIANT_VIOLATED"] < 1e9
 
 
