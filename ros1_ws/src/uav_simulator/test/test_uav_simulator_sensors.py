@@ -257,7 +257,7 @@ def test_a_wrong_mode_is_refused(sensor, mode, said):
 def test_scheduled_faults_happen_at_their_moment_after_lift_off():
     board = SensorBoard(parse_faults("zed@3,imu", FAULTS))
     assert board.apply_due(0.0, None)
-    assert board.modes == {"zed": "ok", "lidar": "ok", "imu": "dead"}
+    assert board.modes == {"zed": "ok", "lidar": "ok", "camera": "ok", "imu": "dead"}
     assert not board.apply_due(100.0, None), "not lifted off yet"
     assert not board.apply_due(12.9, 10.0)
     assert board.apply_due(13.0, 10.0)
