@@ -116,10 +116,14 @@ def test_each_fault_is_broken_within_0_45_s_never_free_and_mended_after_1_s(flig
         flight.run(0.5)
         flight.reports.clear()
         scanner.mode = mode
-        assert flight.run(2.0, until=lambda: bool(flight.reports)), mode
+        last_good_ns = scanner.last_good_ns
+        assert flight.run(2.0, until=lambda since=last_good_ns: flight.reports and flight.told_ns(SensorHealth.BROKEN, after_ns=since)), (
+            mode
+        )
         assert flight.reports[0].to == "BROKEN", mode
+        broken_ns = flight.told_ns(SensorHealth.BROKEN, after_ns=last_good_ns)
         # Counted from the arrival, at which the node's clock may be some ticks of 20 ms behind.
-        assert 0.25 * NS <= flight.reports[0].at_ns - scanner.last_good_ns <= 0.45 * NS, mode
+        assert 0.25 * NS <= broken_ns - last_good_ns <= 0.45 * NS, mode
         obstacles.clear()
         flight.run(0.5)
         health = flight.health[-1]
@@ -129,9 +133,9 @@ def test_each_fault_is_broken_within_0_45_s_never_free_and_mended_after_1_s(flig
         assert bool(obstacles) == (mode != "dead"), mode
         mended_ns = flight.now_ns
         scanner.mode = "good"
-        assert flight.run(4.0, until=lambda: len(flight.reports) > 1), mode
+        assert flight.run(4.0, until=lambda since=mended_ns: flight.reports[1:] and flight.told_ns(SensorHealth.OK, after_ns=since)), mode
         assert flight.reports[1].to == "OK", mode
-        assert 1.0 * NS <= flight.reports[1].at_ns - mended_ns <= 1.3 * NS, mode
+        assert 1.0 * NS <= flight.told_ns(SensorHealth.OK, after_ns=mended_ns) - mended_ns <= 1.3 * NS, mode
 
 
 def test_parameters_are_changed_in_flight_and_refused_out_of_range(flight: FakeFlight, obstacles: list[Obstacle]) -> None:

@@ -114,7 +114,7 @@ class FakeFlight:
         """Whether the node listens to the clock and to the guidance."""
         return bool(self._clock.get_num_connections() and self._pose.get_num_connections())
 
-    def run(self, seconds: float, *, until: Callable[[], bool] = lambda: False) -> bool:
+    def run(self, seconds: float, *, until: Callable[[], object] = lambda: False) -> bool:
         """Let simulated time pass, at most so much, and return whether the condition came true.
 
         Time goes at most five times as fast as the wall clock, and waits for the node to be done with each measurement: a slow machine
@@ -125,7 +125,7 @@ class FakeFlight:
         while self.now_ns < end_ns and not until():
             self._step()
             pace.wait(STEP_WALL_S)
-        return until()
+        return bool(until())
 
     def _step(self) -> None:
         self.now_ns += STEP_NS
@@ -155,6 +155,11 @@ class FakeFlight:
         while self.health and self.health[-1].header.stamp.to_nsec() < self.now_ns - HEALTH_NS and time.monotonic() < end_s:
             self._heard.clear()
             self._heard.wait(STEP_WALL_S)
+
+    def told_ns(self, verdict: int, *, after_ns: int) -> int:
+        """Return when, on the node's own clock, its health first had this verdict after a moment; 0 if it has not yet."""
+        stamps = (message.header.stamp.to_nsec() for message in list(self.health) if message.verdict == verdict)
+        return next((stamp_ns for stamp_ns in stamps if stamp_ns > after_ns), 0)
 
     def _on_health(self, message: SensorHealth) -> None:
         self.health.append(message)
