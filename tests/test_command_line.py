@@ -60,7 +60,7 @@ def test_skillset_with_a_syntax_error_shows_where(tmp_path: Path) -> None:
 
 def test_models_of_the_drone_have_no_errors() -> None:
     models = sorted(str(path) for path in (ALULA_ROOT / "skillsets/uav").glob("*.skill"))
-    assert len(models) == 3
+    assert len(models) == 4
     done = alula("check", *models)
     assert done.returncode == 0, done.stdout + done.stderr
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import psutil
 
 from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port
-from alula_common.processes import RUN_ID_VARIABLE, command_line, end_run, processes_of_run
+from alula_common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
 from alula_common.scenarios import scenario_names
 from alula_common.shared_memory import sweep_shared_memory
 from alula_common.signals import Interrupts
@@ -40,7 +40,7 @@ GIVEN_UP = 1
 PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
-MISSION_NODE = "__name:=mission"  # as roslaunch writes it on the command line
+MISSION_NODE = "mission"
 
 
 class Arguments(argparse.Namespace):
@@ -215,7 +215,7 @@ class Front:
         record = DeathRecord(Path(self._spec.out_dir) / "deaths.jsonl")
         record.add(Death("supervisor", describe_exit(code), None))
         self._say("the supervisor died; the mission lands the vehicle")
-        missions = [process for process in processes_of_run(self._spec.run_id) if MISSION_NODE in command_line(process)]
+        missions = [process for process in processes_of_run(self._spec.run_id) if node_name(process) == MISSION_NODE]
         for mission in missions:
             with contextlib.suppress(psutil.NoSuchProcess):
                 mission.send_signal(signal.SIGINT)

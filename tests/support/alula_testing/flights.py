@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from alula_common.processes import command_line, end_run, processes_of_run
+from alula_common.processes import command_line, end_run, node_name, processes_of_run
 
 ALULA_ROOT = Path(__file__).resolve().parents[3]
 FLIGHT_LIMIT_S = 900.0  # wall clock; several times what a flight takes, so that a hang fails and a slow machine does not
@@ -53,10 +53,8 @@ class Flight:
         """Map each living node of the run (by the name that roslaunch gave it) and the supervisor to its process id."""
         found: dict[str, int] = {}
         for process in processes_of_run(self.run_id):
-            words = command_line(process)
-            names = [word.removeprefix("__name:=") for word in words if word.startswith("__name:=")]
-            names += ["supervisor"] if "alula_flight.supervisor" in words else []
-            for name in names:
+            name = "supervisor" if "alula_flight.supervisor" in command_line(process) else node_name(process)
+            if name:
                 found.setdefault(name, process.pid)
         return found
 

@@ -159,7 +159,7 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
     assert (right.width, right.height, right.encoding, len(right.data)) == (480, 270, "mono8", 480 * 270)
     assert seen.messages["info"][-1].P[3] == pytest.approx(-240.0 * 0.12)
     assert [f.name for f in seen.messages["lidar"][-1].fields] == ["x", "y", "z", "intensity", "time"]
-    assert {t.child_frame_id for t in seen.messages["tf"][0].transforms} == {"zed_left", "zed_right", "lidar", "imu"}
+    assert {t.child_frame_id for t in seen.messages["tf"][0].transforms} == {"zed_left", "zed_right", "camera", "lidar", "imu"}
     assert seen.count("imu") == 0, "broken from the beginning"
 
     client = Client(port)
@@ -270,5 +270,5 @@ def test_a_wrong_parameter_ends_the_node_with_one_line():
         check=False,
     )
     assert done.returncode == 2
-    assert "there is no 'sonar' to break; choose one of zed, lidar, imu" in done.stderr
+    assert "there is no 'sonar' to break; choose one of zed, lidar, camera, imu" in done.stderr
     assert "Traceback" not in done.stderr

@@ -13,6 +13,9 @@ from collections.abc import Callable
 import psutil
 
 RUN_ID_VARIABLE = "ALULA_RUN_ID"
+NODE_NAME_VARIABLE = "ALULA_NODE_NAME"
+"""Set for nodes of the ROS 2 world, which don't take the name that roslaunch writes on the command line."""
+NAME_WORD = "__name:="
 KILL_S = 5.0
 LOOK_S = 0.05
 
@@ -51,6 +54,17 @@ def _signal_all(run_id: str, send: Callable[[psutil.Process], None], wait_s: flo
     end_s = time.monotonic() + wait_s
     while processes_of_run(run_id) and time.monotonic() < end_s:
         time.sleep(LOOK_S)
+
+
+def node_name(process: psutil.Process) -> str:
+    """Return the name that roslaunch gave a process; empty when it gave none, or the process has ended."""
+    for word in command_line(process):
+        if word.startswith(NAME_WORD):
+            return word.removeprefix(NAME_WORD)
+    try:
+        return str(process.environ().get(NODE_NAME_VARIABLE, ""))
+    except psutil.Error:
+        return ""
 
 
 def command_line(process: psutil.Process) -> list[str]:

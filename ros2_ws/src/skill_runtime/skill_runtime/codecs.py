@@ -5,7 +5,6 @@ Their classes take the same words in both worlds; an adapter makes the message a
 
 from __future__ import annotations
 
-import functools
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -148,19 +147,23 @@ TOPICS: Mapping[str, TopicCodec] = {
 
 
 # Most of what these messages hold is what the one before has held: with many skills, to make it anew would take most of the time.
-_KEPT = 4096
+# Of each name the last is kept, so that nothing grows with the time that passes.
+_resources: dict[str, tuple[ResourceValue, Any]] = {}
 _encoded: dict[tuple[str, str], tuple[SkillRecord, Any]] = {}
-_decoded: dict[tuple[Any, ...], SkillRecord] = {}
+_decoded: dict[str, tuple[tuple[Any, ...], SkillRecord]] = {}
 
 
-@functools.lru_cache(maxsize=_KEPT)
 def _resource(name: str, value: ResourceValue) -> Any:
-    return ResourceState(name=name, state=value.state, previous_state=value.previous, stamp_ns=value.stamp_ns)
+    kept, message = _resources.get(name, (None, None))
+    if kept != value:
+        message = ResourceState(name=name, state=value.state, previous_state=value.previous, stamp_ns=value.stamp_ns)
+        _resources[name] = (value, message)
+    return message
 
 
 def _skill(skillset: str, name: str, skill: SkillRecord) -> Any:
-    record, message = _encoded.get((skillset, name), (None, None))
-    if record is not skill:
+    kept, message = _encoded.get((skillset, name), (None, None))
+    if kept is not skill:
         last = [] if skill.last is None else [_execution(skill.last)]
         message = SkillState(name=name, open=[_execution(record) for record in skill.open], last=last)
         _encoded[skillset, name] = (skill, message)
@@ -170,13 +173,13 @@ def _skill(skillset: str, name: str, skill: SkillRecord) -> Any:
 def _skill_of(message: Any) -> SkillRecord:
     executions = (*message.open, *message.last)
     # An execution of the same state and stamps holds the same.
-    key = (message.name, len(message.last), *((e.id, e.state, e.requested_ns, e.started_ns, e.ended_ns) for e in executions))
-    if key not in _decoded:
-        if len(_decoded) >= _KEPT:
-            _decoded.clear()
+    now = (len(message.last), *((e.id, e.state, e.requested_ns, e.started_ns, e.ended_ns) for e in executions))
+    kept = _decoded.get(message.name)
+    if kept is None or kept[0] != now:
         last = [_record_of(message.name, execution) for execution in message.last]
-        _decoded[key] = SkillRecord(tuple(_record_of(message.name, one) for one in message.open), last[0] if last else None)
-    return _decoded[key]
+        record = SkillRecord(tuple(_record_of(message.name, one) for one in message.open), last[0] if last else None)
+        kept = _decoded[message.name] = (now, record)
+    return kept[1]
 
 
 def _execution(record: ExecutionRecord) -> Any:

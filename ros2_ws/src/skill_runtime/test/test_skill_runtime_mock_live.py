@@ -171,7 +171,7 @@ def test_data_are_published_where_the_functional_layer_would(mock, call, tmp_pat
     [
         (["nowhere"], "nowhere"),
         ([UAV, "--fail", "imu@3"], "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, radio, control"),
-        ([UAV, "--fail", "zed@soon"], "--fail zed@soon: write WHAT@SECONDS"),
+        ([UAV, "--fail", "zed@soon"], "--fail: fault 'zed@soon': write WHAT, WHAT@SECONDS"),
         ([UAV, "--skillset", "flying"], "--skillset flying: uav has no such skillset; it has"),
         ([UAV, "--behaviour", "nowhere.yaml"], "nowhere.yaml: can't be read"),
     ],
@@ -194,5 +194,5 @@ def test_the_starter_is_a_behaviour_file(tmp_path):
 
     (tmp_path / "mock.yaml").write_text(done.stdout)
     behaviour = load_behaviour([tmp_path / "mock.yaml"], load_robot(UAV).skillsets)
-    assert len(behaviour.rules) == 10
-    assert len(behaviour.timeline) == 5
+    assert len(behaviour.rules) == 11
+    assert len(behaviour.timeline) == 6
