@@ -65,7 +65,7 @@ def test_a_degraded_zone_only_worsens_the_picture(flight: Flight, summary: Summa
     bits = [8 * sum(f["bytes"] for f in part) / (part[-1]["sent"] - part[0]["sent"]) for part in (good, degraded)]
     assert bits[0] > 1e6
     assert bits[1] < 700e3
-    assert np.mean([f["ssim"] for f in degraded]) < np.mean([f["ssim"] for f in good])
+    assert np.mean(similarities(degraded)) < np.mean(similarities(good))
 
 
 def test_the_summary_can_be_computed_again_from_the_records(flight: Flight, summary: Summary) -> None:
@@ -75,7 +75,7 @@ def test_the_summary_can_be_computed_again_from_the_records(flight: Flight, summ
     edges = np.arange(times[0], end_s + 1e-9, 1.0)
     counts = np.histogram(times, edges)[0]
     assert video["min_fps"] == counts.min()
-    assert video["mean_ssim"] == pytest.approx(np.mean([f["ssim"] for f in shown]), rel=0.02)
+    assert video["mean_ssim"] == pytest.approx(np.mean(similarities(shown)), rel=0.02)
     assert video["freezes"] == sum(b - a > 0.5 for a, b in pairwise([*times, end_s]))
     assert video["criterion"] == "enough_frames"
 
@@ -84,6 +84,13 @@ def test_the_pictures_of_the_report_are_there(flight: Flight, summary: Summary) 
     del summary
     for name in ("video.svg", "timeline.svg", "tree.svg", "map.png", "video/sent.mkv", "video/received.mkv", "video/stream.sdp"):
         assert (flight.out / name).stat().st_size > 0, name
+
+
+def similarities(frames: list[dict[str, Any]]) -> list[float]:
+    """The SSIM of the frames that have one: a picture that is shown before its reference is there has none, which is rare."""
+    found = [f["ssim"] for f in frames if f["ssim"] is not None]
+    assert len(found) > 0.95 * len(frames)
+    return found
 
 
 def lines(flight: Flight, name: str) -> list[dict[str, Any]]:
