@@ -1,22 +1,29 @@
-"""The node /lidar_mapping: a registered voxel map while enabled, saved as it grows."""
+"""The node /lidar_mapping: pose and map by LiDAR and IMU while enabled, saved as the map grows."""
 
 from __future__ import annotations
 
+from collections import deque
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
+import numpy as np
 import rospy
-from sensor_msgs.msg import PointCloud2
+from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion, TransformStamped, Vector3
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import Imu, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger, TriggerResponse
+from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
-from lidar_mapping.mapper import Mapper
+from lidar_mapping.inertial import ImuReading
 from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.settings import MappingSettings
+from lidar_mapping.slam import Slam
 from perception_core import NS, Sweep
 from perception_core.ros import DoneReporter, EnableSwitch, NewestWorker, Vehicle, cloud_message, read_settings, sweep_of_cloud
+from resource_reporter import ResourceReporter
 
 if TYPE_CHECKING:
     from std_srvs.srv import TriggerRequest
@@ -24,6 +31,8 @@ if TYPE_CHECKING:
     from lidar_mapping.registration import Registration
 
 CLOUD_BYTES = 1 << 23
+READINGS_KEPT = 2000
+TF_PERIOD_S = 0.1
 
 
 class LidarMappingNode:
@@ -32,7 +41,8 @@ class LidarMappingNode:
     def __init__(self, settings: MappingSettings) -> None:
         self._settings = settings
         self._path = Path(settings.map_path)
-        self._mapper = Mapper(settings.mapper)
+        self._slam = Slam(settings.slam)
+        self._readings: deque[ImuReading] = deque(maxlen=READINGS_KEPT)
         self._lock = Lock()
         self._saving = Lock()
         self._received = 0
@@ -40,6 +50,9 @@ class LidarMappingNode:
         self._resume()
         self._state = rospy.Publisher("~state", MappingState, queue_size=5, latch=True)
         self._map = rospy.Publisher("~map", PointCloud2, queue_size=1, latch=True)
+        self._pose = rospy.Publisher("~pose", PoseWithCovarianceStamped, queue_size=5)
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=5)
+        self._reporter = ResourceReporter("mapping")
         self._done = DoneReporter()
         self._vehicle = Vehicle()
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
@@ -48,8 +61,12 @@ class LidarMappingNode:
         self._timers = [
             rospy.Timer(rospy.Duration.from_sec(settings.save_period_s), self._save_if_new, reset=True),
             rospy.Timer(rospy.Duration.from_sec(settings.publish_period_s), self._publish_map, reset=True),
+            rospy.Timer(rospy.Duration.from_sec(TF_PERIOD_S), self._publish_tf, reset=True),
         ]
-        self._subscriber = rospy.Subscriber("/lidar/points", PointCloud2, self._on_cloud, queue_size=1, buff_size=CLOUD_BYTES)
+        self._subscribers = [
+            rospy.Subscriber("/imu/data", Imu, self._on_imu, queue_size=100, tcp_nodelay=True),
+            rospy.Subscriber("/lidar/points", PointCloud2, self._on_cloud, queue_size=1, buff_size=CLOUD_BYTES),
+        ]
         rospy.on_shutdown(lambda: self._save_if_new(None))
 
     def _resume(self) -> None:
@@ -57,7 +74,7 @@ class LidarMappingNode:
         if not (self._settings.resume and self._path.exists()):
             return
         try:
-            self._mapper.map.insert(read_ply(self._path))
+            self._slam.resume(read_ply(self._path))
         except (OSError, ValueError) as error:
             rospy.logwarn(f"starting with an empty map: {error}")
 
@@ -74,33 +91,80 @@ class LidarMappingNode:
         finally:
             self._done.done(item[1].stamp_ns)
 
+    def _on_imu(self, message: Imu) -> None:
+        rates, force = message.angular_velocity, message.linear_acceleration
+        reading = ImuReading(
+            message.header.stamp.to_nsec(), np.array([rates.x, rates.y, rates.z]), np.array([force.x, force.y, force.z])
+        )
+        if np.isfinite(reading.rates).all() and np.isfinite(reading.specific_force).all():
+            self._readings.append(reading)
+
+    def _readings_until(self, stamp_ns: int) -> list[ImuReading]:
+        """Take the readings up to a moment; later ones stay for the next sweep."""
+        taken: list[ImuReading] = []
+        while self._readings and self._readings[0].stamp_ns <= stamp_ns:
+            taken.append(self._readings.popleft())
+        return taken
+
     def _register(self, frame: str, sweep: Sweep) -> None:
         poses = self._vehicle.poses_at(sweep.end_ns)
         with self._lock:
             if not self._switch.enabled:
                 return
-            registration = self._mapper.add(sweep, poses, self._vehicle.mount(frame))
+            registration = self._slam.add(sweep, self._readings_until(sweep.end_ns), poses, self._vehicle.mount(frame))
             self._publish_state(sweep.stamp_ns, registration)
-        if self._mapper.map.full:
-            rospy.logwarn_throttle(10.0, f"the map is full ({self._settings.max_voxels} voxels): new surfaces are left out")
+            self._publish_pose(sweep.end_ns)
+        self._report()
+        if self._slam.full:
+            rospy.logwarn_throttle(10.0, f"the map is full ({len(self._slam.map)} voxels): new surfaces are left out")
+
+    def _report(self) -> None:
+        """Tell the skillset whether pose and map are to be trusted."""
+        problem = self._slam.problem
+        if problem:
+            rospy.logwarn_throttle(2.0, f"the map is lost: {problem}")
+        self._reporter.report("slam_status", "LOST" if problem else "OK")
 
     def _publish_state(self, stamp_ns: int, registration: Registration | None) -> None:
-        count = self._mapper.count
-        message = MappingState(header=Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="map"), running=self._switch.enabled)
-        message.scans, message.rejected, message.points = count.scans, count.rejected, len(self._mapper.map)
+        count = self._slam.count
+        message = MappingState(header=Header(stamp=_time(stamp_ns), frame_id="map"), running=self._switch.enabled)
+        message.scans, message.rejected, message.points = count.scans, count.rejected, len(self._slam.map)
+        message.loops, message.problem, message.uncertainty_m = self._slam.loops, self._slam.problem, self._slam.uncertainty_m
         if registration is not None:
             message.fitness, message.correction_m = registration.fitness, registration.correction_m
+            message.refusal, message.degenerate = registration.refusal, registration.degenerate
         self._state.publish(message)
+
+    def _publish_pose(self, stamp_ns: int) -> None:
+        known = self._slam.pose()
+        if known is None:
+            return
+        message = PoseWithCovarianceStamped(header=Header(stamp=_time(stamp_ns), frame_id="map"))
+        message.pose.pose.position = Point(*known[0][:3, 3])
+        message.pose.pose.orientation = Quaternion(*Rotation.from_matrix(known[0][:3, :3]).as_quat())
+        message.pose.covariance = known[1].ravel().tolist()
+        self._pose.publish(message)
+
+    def _publish_tf(self, _event: object) -> None:
+        """Publish map -> odom; odom -> base_link is the guidance's, from the autopilot."""
+        with self._lock:
+            place = self._slam.T_map_odom
+        transform = TransformStamped(header=Header(stamp=rospy.Time.now(), frame_id="map"), child_frame_id="odom")
+        transform.transform.translation = Vector3(*place[:3, 3])
+        transform.transform.rotation = Quaternion(*Rotation.from_matrix(place[:3, :3]).as_quat())
+        self._tf.publish(TFMessage(transforms=[transform]))
 
     def _on_switch(self, _enabled: bool) -> None:  # noqa: FBT001 -- a callback's signature
         with self._lock:  # after the scan in work: nothing contradicts this state until the next change
+            self._slam.stop()
+            self._readings.clear()
             self._publish_state(rospy.Time.now().to_nsec(), None)
 
     def _publish_map(self, _event: object) -> None:
         if not self._map.get_num_connections():
             return
         with self._lock:
-            points = self._mapper.map.points
+            points = self._slam.map.points
         self._map.publish(cloud_message(Header(stamp=rospy.Time.now(), frame_id="map"), points.astype("float32")))
 
     def _on_save(self, _request: TriggerRequest) -> TriggerResponse:
@@ -111,7 +175,7 @@ class LidarMappingNode:
         return TriggerResponse(success=True, message=f"{count} points in {self._path}")
 
     def _save_if_new(self, _event: object) -> None:
-        if self._mapper.count.scans == self._saved_scans:
+        if self._slam.count.scans == self._saved_scans:
             return
         try:
             self._save()
@@ -121,10 +185,14 @@ class LidarMappingNode:
     def _save(self) -> int:
         with self._saving:
             with self._lock:
-                points, scans = self._mapper.map.points, self._mapper.count.scans
+                points, scans = self._slam.map.points, self._slam.count.scans
             write_ply(self._path, points)
             self._saved_scans = scans
         return len(points)
+
+
+def _time(stamp_ns: int) -> rospy.Time:
+    return rospy.Time(stamp_ns // NS, stamp_ns % NS)
 
 
 def main() -> None:

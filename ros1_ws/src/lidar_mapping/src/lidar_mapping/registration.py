@@ -1,142 +1,153 @@
-"""Register a scan against a surface: point-to-plane ICP that also listens to the given pose, and whether to believe it."""
+"""Register a scan against a surface from a predicted state, and say whether to believe it.
+
+Point to plane, with a gate that narrows. Where the surfaces do not hold a direction (along a bare wall) the normals' own noise still looks
+like information; what it would amount to is taken off, so that such a direction stays as the inertial prediction has it.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import open3d as o3d
-from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
+
+from lidar_mapping.inertial import ATTITUDE, POSITION
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-CONVERGED_M = 5e-4
-TREE_LEAF = 24
-NEIGHBOURS = 20
+    from lidar_mapping.inertial import InertialFilter, State
+    from lidar_mapping.surface import Surface
+
+    Floats = NDArray[np.float64]
+
+POSE = np.array([0, 1, 2, 6, 7, 8])
+"""The places of attitude and position in the filter's error."""
 
 
 @dataclass(frozen=True)
 class RegistrationSettings:
     """How to register, and when to believe it.
 
-    Points pair up to ``max_pair_m``; residuals beyond ``kernel_m`` count less (Cauchy). The given pose is known to ``pose_sigma_m`` and
-    ``pose_sigma_rad``; all pairs of a scan together count as ``effective_points`` independent ones of ``point_sigma_m``, for neighbours
-    share their errors. So a direction that the surfaces do not hold, as along a bare wall, stays as the pose says, and the map follows a
-    pose that is right on average (GNSS) instead of carrying its first error along. A result is refused when fewer than ``min_fitness`` of
-    the points found a partner or the correction is beyond ``max_correction_m`` or ``max_correction_rad``.
+    Pairs are searched within a gate that shrinks from three standard deviations of the prediction (at least ``widest_m / 5``, at most
+    ``widest_m``) to ``gate_m``; residuals beyond ``kernel_m`` count less (Cauchy). A point is known to ``point_sigma_m``, and neighbours share
+    their errors: ``independent`` of them count. ``tilt_rad`` is the noise of a normal. A result is refused when fewer than
+    ``min_points``, or fewer than ``min_fitness`` of those that have a patch within three gates, lie within half a gate of its plane: what sees
+    new ground is not to blame for having no partner there, and of points laid down at random a sixth would lie so.
     """
 
-    max_pair_m: float = 0.25
+    widest_m: float = 2.0
+    gate_m: float = 0.12
     kernel_m: float = 0.05
-    iterations: int = 8
-    min_points: int = 100
-    min_fitness: float = 0.3
-    max_correction_m: float = 0.3
-    max_correction_rad: float = 0.05
-    pose_sigma_m: float = 0.05
-    pose_sigma_rad: float = 0.01
-    point_sigma_m: float = 0.05
-    effective_points: float = 10.0
+    gates: int = 6
+    iterations: int = 12
+    min_points: int = 80
+    min_fitness: float = 0.5
+    point_sigma_m: float = 0.02
+    independent: float = 0.1
+    tilt_rad: float = 0.06
+    constrained_m: float = 0.2
 
 
 @dataclass(frozen=True)
 class Registration:
-    """What came out: the correction in the map frame, and whether (and if not, why not) to believe it."""
+    """What came out: ``fitness`` 0..1, the correction of the prediction, the directions that no surface holds, and why not to believe it.
 
-    T_corrected_given: NDArray[np.float64]
+    ``sigma_m`` (3,) are the standard deviations of the scan's own measurement along ``directions`` (3, 3; columns, map frame), best last.
+    """
+
     fitness: float
     correction_m: float
-    correction_rad: float
+    sigma_m: Floats
+    directions: Floats
     refusal: str
+    limit_m: float = 0.2
 
     @property
     def believed(self) -> bool:
-        """Whether the correction may be applied."""
+        """Whether it was taken."""
         return not self.refusal
 
-
-class Surface:
-    """The flat parts of a cloud (N, 3), metres, with their normals, to register against; making one is costly, asking it is cheap.
-
-    Edges, twigs and the rims of what was seen so far have no plane: a scan that sees farther than the map would be pulled back by them.
-    A part is flat when its neighbourhood is thinner than ``flat_m`` (standard deviation) and at least twice as wide.
-    """
-
-    def __init__(self, points: NDArray[np.float64], *, normal_radius_m: float, flat_m: float) -> None:
-        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-        cloud.estimate_covariances(o3d.geometry.KDTreeSearchParamHybrid(radius=normal_radius_m, max_nn=NEIGHBOURS))
-        spread, axes = np.linalg.eigh(np.asarray(cloud.covariances))
-        flat = (spread[:, 0] < flat_m**2) & (spread[:, 1] > 4.0 * flat_m**2)
-        self.points = points[flat]
-        self.normals: NDArray[np.float64] = axes[flat, :, 0]
-        self.tree = cKDTree(self.points, leafsize=TREE_LEAF, balanced_tree=False, compact_nodes=False)
+    @property
+    def degenerate(self) -> int:
+        """In how many directions of space the surfaces did not hold the scan."""
+        return int(np.count_nonzero(self.sigma_m > self.limit_m))
 
 
-def register(points: NDArray[np.float64], around: NDArray[np.float64], surface: Surface, settings: RegistrationSettings) -> Registration:
-    """Find the small motion that lays the points (N, 3), already in the map as the given pose says, onto the surface.
+def refused(reason: str, fitness: float = 0.0) -> Registration:
+    """Return the registration of a scan that was not taken."""
+    return Registration(fitness, 0.0, np.full(3, np.inf), np.eye(3), reason)
 
-    ``around`` (3,) is the vehicle's position: there the correction is measured, for a rotation about a far origin would look like a shift.
-    """
+
+class _Measurement:
+    """The normal equations of the pairs of points (N, 3), body frame, with a surface; each call narrows the gate."""
+
+    def __init__(self, points: Floats, surface: Surface, settings: RegistrationSettings, first_gate_m: float) -> None:
+        self._points, self._surface, self._settings = points, surface, settings
+        narrowing = np.geomspace(first_gate_m, settings.gate_m, settings.gates)
+        self._gates_m = itertools.chain(narrowing, itertools.repeat(settings.gate_m))
+        self.pairs = 0
+        self.fitness = 0.0
+        self.held: Floats = np.zeros((3, 3))
+
+    def __call__(self, state: State) -> tuple[Floats, Floats]:
+        gate_m = next(self._gates_m)
+        settings = self._settings
+        placed = self._points @ state.rotation.T + state.position
+        paired, partner = self._surface.nearest(placed, within_m=gate_m)
+        normals = self._surface.normals[partner]
+        residual = np.einsum("ij,ij->i", normals, placed[paired] - self._surface.points[partner])
+        kernel_m = max(0.2 * gate_m, settings.kernel_m)
+        weight = settings.independent / settings.point_sigma_m**2 / (1.0 + (residual / kernel_m) ** 2)
+        rows = np.hstack([np.cross(self._points[paired], normals @ state.rotation), normals])
+        return self._spread((rows * weight[:, None]).T @ rows, rows.T @ (weight * residual), float(weight.sum()))
+
+    def judge(self, state: State) -> None:
+        """Find out how well the points lie where the state puts them."""
+        placed = self._points @ state.rotation.T + state.position
+        near, partner = self._surface.nearest(placed, within_m=3.0 * self._settings.gate_m)
+        off_m = np.abs(np.einsum("ij,ij->i", self._surface.normals[partner], placed[near] - self._surface.points[partner]))
+        self.pairs = int(np.count_nonzero(off_m < 0.5 * self._settings.gate_m))
+        self.fitness = self.pairs / max(len(near), 1)
+
+    def _spread(self, information: Floats, gradient: Floats, total: float) -> tuple[Floats, Floats]:
+        """Take the information of noise off, and put the rest in the filter's places."""
+        values, axes = np.linalg.eigh(information[3:, 3:])
+        noise = 3.0 * self._settings.tilt_rad**2 * total
+        share = np.clip((values - noise) / np.maximum(values, 1e-9), 0.0, 1.0)
+        scale = np.eye(6)
+        scale[3:, 3:] = axes @ np.diag(np.sqrt(share)) @ axes.T
+        information, gradient = scale @ information @ scale, scale @ gradient
+        self.held = information[3:, 3:]
+        whole, whole_gradient = np.zeros((15, 15)), np.zeros(15)
+        whole[np.ix_(POSE, POSE)], whole_gradient[POSE] = information, gradient
+        return whole, whole_gradient
+
+
+def register(points: Floats, surface: Surface, state: InertialFilter, settings: RegistrationSettings) -> Registration:
+    """Correct the filter by a scan (N, 3), body frame, straightened; a scan that is refused leaves the filter as it was predicted."""
     if len(points) < settings.min_points:
-        return Registration(np.eye(4), 0.0, 0.0, 0.0, f"{len(points)} points are too few")
-    arms = points - around
-    rotation: NDArray[np.float64] = np.eye(3)
-    shift: NDArray[np.float64] = np.zeros(3)
-    fitness = 0.0
-    for _ in range(settings.iterations):
-        moved = arms @ rotation.T + shift
-        distance, partner = surface.tree.query(moved + around, distance_upper_bound=settings.max_pair_m)
-        paired = np.isfinite(distance)
-        fitness = float(paired.mean())
-        if fitness < settings.min_fitness:
-            break
-        normals = surface.normals[partner[paired]]
-        residual = np.einsum("ij,ij->i", normals, moved[paired] + around - surface.points[partner[paired]])
-        step = _step(moved[paired] - shift, normals, residual, (rotation, shift), settings)
-        rotation = Rotation.from_rotvec(step[:3]).as_matrix() @ rotation
-        shift = shift + step[3:]
-        if np.abs(step[3:]).max() < CONVERGED_M and np.abs(step[:3]).max() * settings.max_pair_m < CONVERGED_M:
-            break
-    return _result(rotation, shift, around, fitness, settings)
+        return refused(f"{len(points)} points are too few")
+    predicted, covariance, kept = state.state, state.covariance, state.history[-1]
+    doubt_m = 3.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[POSITION, POSITION])[-1]))
+    reach_m = 3.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[ATTITUDE, ATTITUDE])[-1])) * 5.0  # at 5 m
+    first_gate_m = float(np.clip(doubt_m + reach_m, settings.widest_m / 5.0, settings.widest_m))
+    measurement = _Measurement(points, surface, settings, first_gate_m)
+    state.correct(measurement, least=settings.gates, most=settings.iterations)
+    measurement.judge(state.state)
+    reason = _reason(measurement, settings)
+    if reason:
+        state.state, state.covariance, state.history[-1] = predicted, covariance, kept
+        return refused(reason, measurement.fitness)
+    values, axes = np.linalg.eigh(measurement.held)
+    correction_m = float(np.linalg.norm(state.state.position - predicted.position))
+    return Registration(measurement.fitness, correction_m, np.maximum(values, 1e-6) ** -0.5, axes, "", settings.constrained_m)
 
 
-def _step(
-    arms: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    at: tuple[NDArray[np.float64], NDArray[np.float64]],
-    settings: RegistrationSettings,
-) -> NDArray[np.float64]:
-    """Return the Gauss-Newton step (6,): rotation vector and shift that reduce residuals and the distance to the given pose."""
-    rows = np.hstack([np.cross(arms, normals), normals])
-    weight = 1.0 / (1.0 + (residual / settings.kernel_m) ** 2)
-    weight *= settings.effective_points / (len(weight) * settings.point_sigma_m**2)
-    prior = np.repeat([settings.pose_sigma_rad**-2, settings.pose_sigma_m**-2], 3)
-    so_far = np.concatenate([Rotation.from_matrix(at[0]).as_rotvec(), at[1]])
-    information = (rows * weight[:, None]).T @ rows + np.diag(prior)
-    step: NDArray[np.float64] = -np.linalg.solve(information, rows.T @ (weight * residual) + prior * so_far)
-    return step
-
-
-def _result(
-    rotation: NDArray[np.float64], shift: NDArray[np.float64], around: NDArray[np.float64], fitness: float, settings: RegistrationSettings
-) -> Registration:
-    transform = np.eye(4)
-    transform[:3, :3] = rotation
-    transform[:3, 3] = around + shift - rotation @ around
-    correction_m = float(np.linalg.norm(shift))
-    correction_rad = float(Rotation.from_matrix(rotation).magnitude())
-    return Registration(transform, fitness, correction_m, correction_rad, _refusal(fitness, correction_m, correction_rad, settings))
-
-
-def _refusal(fitness: float, correction_m: float, correction_rad: float, settings: RegistrationSettings) -> str:
-    if fitness < settings.min_fitness:
-        return f"fitness {fitness:.2f} is below {settings.min_fitness:g}"
-    if correction_m > settings.max_correction_m:
-        return f"correction of {correction_m:.2f} m is beyond {settings.max_correction_m:g} m"
-    if correction_rad > settings.max_correction_rad:
-        return f"correction of {correction_rad:.3f} rad is beyond {settings.max_correction_rad:g} rad"
+def _reason(measurement: _Measurement, settings: RegistrationSettings) -> str:
+    if measurement.pairs < settings.min_points:
+        return f"{measurement.pairs} points found a surface, {settings.min_points} are needed"
+    if measurement.fitness < settings.min_fitness:
+        return f"fitness {measurement.fitness:.2f} is below {settings.min_fitness:g}"
     return ""

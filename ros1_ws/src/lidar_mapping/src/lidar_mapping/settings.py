@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from lidar_mapping.mapper import MapperSettings
-from lidar_mapping.registration import RegistrationSettings
+from lidar_mapping.graph import GraphSettings
+from lidar_mapping.odometry import OdometrySettings
+from lidar_mapping.slam import SlamSettings
+
+_SLAM, _ODOMETRY, _GRAPH = SlamSettings(), OdometrySettings(), GraphSettings()
 
 
 @dataclass(frozen=True)
@@ -18,20 +21,38 @@ class MappingSettings:
     every_scan: int = 1
     save_period_s: float = 10.0
     publish_period_s: float = 2.0
-    voxel_m: float = 0.1
-    max_voxels: int = 1_000_000
-    self_m: float = 1.2
-    max_range_m: float = 20.0
-    max_correction_m: float = 0.3
-    min_fitness: float = 0.3
+    voxel_m: float = _SLAM.voxel_m
+    max_voxels: int = _SLAM.max_voxels
+    self_m: float = _SLAM.self_m
+    max_range_m: float = _SLAM.max_range_m
+    lost_s: float = _SLAM.lost_s
+    lost_m: float = _SLAM.lost_m
+    reach_m: float = _ODOMETRY.reach_m
+    scan_voxel_m: float = _ODOMETRY.scan_voxel_m
+    max_keyframes: int = _ODOMETRY.max_keyframes
+    min_fitness: float = _ODOMETRY.registration.min_fitness
+    loop_reach_m: float = _GRAPH.reach_m
+    autopilot_m: float = _GRAPH.autopilot_m
 
     @property
-    def mapper(self) -> MapperSettings:
+    def slam(self) -> SlamSettings:
         """How the map is made."""
-        return MapperSettings(
+        registration = replace(_ODOMETRY.registration, min_fitness=self.min_fitness)
+        odometry = replace(
+            _ODOMETRY,
+            reach_m=self.reach_m,
+            scan_voxel_m=self.scan_voxel_m,
+            max_keyframes=self.max_keyframes,
+            registration=registration,
+        )
+        return replace(
+            _SLAM,
             voxel_m=self.voxel_m,
             max_voxels=self.max_voxels,
             self_m=self.self_m,
             max_range_m=self.max_range_m,
-            registration=RegistrationSettings(max_correction_m=self.max_correction_m, min_fitness=self.min_fitness),
+            lost_s=self.lost_s,
+            lost_m=self.lost_m,
+            odometry=odometry,
+            graph=replace(_GRAPH, reach_m=self.loop_reach_m, autopilot_m=self.autopilot_m),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rospy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, Obstacle
 
@@ -14,6 +15,7 @@ from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Vehicle, mode_name
 
 FRAME = "map"
+ODOMETRY = "odom"
 BODY = "base_link"
 
 
@@ -89,8 +91,8 @@ def pose_message(vehicle: Vehicle, stamp: rospy.Time) -> PoseStamped | None:
 
 
 def transform_message(pose: PoseStamped) -> TFMessage:
-    """Return the pose as a transform from map to base_link."""
-    transform = TransformStamped(header=pose.header, child_frame_id=BODY)
+    """Return the pose as a transform from odom to base_link: how odom lies in the map is for the SLAM to say."""
+    transform = TransformStamped(header=Header(stamp=pose.header.stamp, frame_id=ODOMETRY), child_frame_id=BODY)
     place = pose.pose.position
     transform.transform.translation = Vector3(place.x, place.y, place.z)
     transform.transform.rotation = pose.pose.orientation

@@ -1,0 +1,117 @@
+"""The pose graph of the keyframes: odometry, loops, and the autopilot's position, optimised when a loop was found (gtsam)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import gtsam
+import numpy as np
+
+from lidar_mapping.inertial import POSITION, InertialFilter, InertialNoise, State
+from lidar_mapping.registration import RegistrationSettings, register
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from lidar_mapping.keyframes import Keyframes
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GraphSettings:
+    """When a place is taken for a known one, and what is believed of what; metres, radians.
+
+    A keyframe is held against one that lies at least ``path_m`` of flight back and within ``reach_m``. The drift of the odometry is
+    ``drift`` of the way and ``turn_rad`` a keyframe. The autopilot's position is believed to ``autopilot_m``: loosely, for its error is the
+    same for minutes, so that many keyframes know no more of it than one.
+    """
+
+    path_m: float = 25.0
+    reach_m: float = 6.0
+    every: int = 3
+    drift: float = 0.01
+    least_m: float = 0.005
+    turn_rad: float = 0.002
+    loop_m: float = 0.03
+    loop_rad: float = 0.005
+    loop_fitness: float = 0.7
+    autopilot_m: float = 30.0
+    submap: int = 6
+
+
+class PoseGraph:
+    """Adds keyframes one after the other, finds loops, and says how the poses are to be moved."""
+
+    def __init__(self, settings: GraphSettings, registration: RegistrationSettings) -> None:
+        self._settings, self._registration = settings, registration
+        self._factors = gtsam.NonlinearFactorGraph()
+        self._path_m: list[float] = []
+        self.loops = 0
+
+    def add(self, keyframes: Keyframes, autopilot_position: Floats | None) -> bool:
+        """Take the last keyframe; when it closes a loop, move all keyframes' poses and return True."""
+        settings, index = self._settings, len(keyframes.all) - 1
+        frame = keyframes.all[index]
+        if index == 0:
+            self._factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(frame.pose), _noise(1e-3, 1e-3)))
+            self._path_m.append(0.0)
+            return False
+        step = np.linalg.inv(keyframes.all[index - 1].pose) @ frame.pose
+        length_m = float(np.linalg.norm(step[:3, 3]))
+        odometry = _noise(settings.turn_rad, settings.least_m + settings.drift * length_m)
+        self._factors.add(gtsam.BetweenFactorPose3(index - 1, index, gtsam.Pose3(step), odometry))
+        self._path_m.append(self._path_m[-1] + length_m)
+        if autopilot_position is not None:
+            heard = gtsam.noiseModel.Isotropic.Sigma(3, settings.autopilot_m)
+            self._factors.add(gtsam.GPSFactor(index, np.asarray(autopilot_position, dtype=np.float64), heard))
+        known = self._known_place(keyframes) if index % settings.every == 0 else None
+        return known is not None and self._close(keyframes, known)
+
+    def _known_place(self, keyframes: Keyframes) -> int | None:
+        """Return the nearest keyframe that lies long enough back; None when there is none."""
+        settings, here = self._settings, keyframes.all[-1].pose[:3, 3]
+        long_ago = [i for i, path_m in enumerate(self._path_m) if self._path_m[-1] - path_m > settings.path_m]
+        if not long_ago:
+            return None
+        away_m = [float(np.linalg.norm(keyframes.all[i].pose[:3, 3] - here)) for i in long_ago]
+        nearest = int(np.argmin(away_m))
+        return long_ago[nearest] if away_m[nearest] < settings.reach_m else None
+
+    def _close(self, keyframes: Keyframes, known: int) -> bool:
+        """Register the last keyframe against what was seen around a known one; optimise when that is believed."""
+        settings, index = self._settings, len(keyframes.all) - 1
+        frame = keyframes.all[index]
+        around = slice(max(0, known - settings.submap), known + settings.submap + 1)
+        surface = keyframes.surface(frame.pose[:3, 3], 4.0 * settings.reach_m, among=around)
+        if surface is None:
+            return False
+        rotation, position = frame.pose[:3, :3], frame.pose[:3, 3]
+        place = InertialFilter(_loose(), frame.stamp_ns, State(rotation, np.zeros(3), position))
+        place.covariance[POSITION, POSITION] = np.eye(3) * 0.3**2
+        found = register(frame.patches.points[:: max(1, len(frame.patches.points) // 2000)], surface, place, self._registration)
+        if not found.believed or found.fitness < settings.loop_fitness or found.degenerate:
+            return False
+        relative = np.linalg.inv(keyframes.all[known].pose) @ place.state.matrix
+        robust = gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Huber.Create(1.0), _noise(settings.loop_rad, settings.loop_m))
+        self._factors.add(gtsam.BetweenFactorPose3(known, index, gtsam.Pose3(relative), robust))
+        self.loops += 1
+        return self._optimise(keyframes)
+
+    def _optimise(self, keyframes: Keyframes) -> bool:
+        values = gtsam.Values()
+        for i, frame in enumerate(keyframes.all):
+            values.insert(i, gtsam.Pose3(frame.pose))
+        best = gtsam.LevenbergMarquardtOptimizer(self._factors, values).optimize()
+        for i, frame in enumerate(keyframes.all):
+            frame.pose = best.atPose3(i).matrix()
+        return True
+
+
+def _noise(turn_rad: float, shift_m: float) -> gtsam.noiseModel.Diagonal:
+    return gtsam.noiseModel.Diagonal.Sigmas(np.repeat([turn_rad, shift_m], 3))
+
+
+def _loose() -> InertialNoise:
+    return InertialNoise(start_attitude_rad=0.05)

@@ -1,0 +1,171 @@
+"""The state of a LiDAR-inertial odometry: propagated by inertial readings, corrected by whatever measures pose or velocity.
+
+An error-state Kalman filter in information form. Its 15 error terms are, in this order: attitude (rotation vector in the body frame),
+velocity and position (map frame, ENU), gyro bias and accelerometer bias (body frame).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from perception_core import NS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Linearise = Callable[["State"], tuple[Floats, Floats]]
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS = (slice(3 * i, 3 * i + 3) for i in range(5))
+HISTORY = 64
+"""States kept for the deskewing of one sweep."""
+
+
+@dataclass(frozen=True)
+class ImuReading:
+    """One reading in the body frame: rates rad/s, specific force m/s2."""
+
+    stamp_ns: int
+    rates: Floats
+    specific_force: Floats
+
+
+@dataclass(frozen=True)
+class InertialNoise:
+    """Densities of the noise (per root hertz) and what is known at the start (standard deviations).
+
+    Without inertial readings the vehicle is assumed to keep its velocity and attitude; ``free_m_s2`` and ``free_rad_s`` say how badly
+    (root mean square over one second).
+    """
+
+    gyro: float = 0.004
+    accel: float = 0.08
+    gyro_walk: float = 5e-5
+    accel_walk: float = 5e-4
+    free_rad_s: float = 0.5
+    free_m_s2: float = 3.0
+    start_attitude_rad: float = 0.01
+    start_velocity_m_s: float = 0.1
+    start_gyro_bias: float = 0.003
+    start_accel_bias: float = 0.05
+
+
+@dataclass(frozen=True)
+class State:
+    """``rotation`` (3, 3) is R_map_base; the rest are (3,) vectors."""
+
+    rotation: Floats
+    velocity: Floats
+    position: Floats
+    gyro_bias: Floats = field(default_factory=lambda: np.zeros(3))
+    accel_bias: Floats = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def matrix(self) -> Floats:
+        """T_map_base, (4, 4)."""
+        transform = np.eye(4)
+        transform[:3, :3], transform[:3, 3] = self.rotation, self.position
+        return transform
+
+    def plus(self, error: Floats) -> State:
+        """Return the state moved by an error (15,)."""
+        return State(
+            self.rotation @ Rotation.from_rotvec(error[ATTITUDE]).as_matrix(),
+            self.velocity + error[VELOCITY],
+            self.position + error[POSITION],
+            self.gyro_bias + error[GYRO_BIAS],
+            self.accel_bias + error[ACCEL_BIAS],
+        )
+
+    def minus(self, other: State) -> Floats:
+        """Return the error (15,) that leads from ``other`` to this state."""
+        turn = Rotation.from_matrix(other.rotation.T @ self.rotation).as_rotvec()
+        shifts = (
+            self.velocity - other.velocity,
+            self.position - other.position,
+            self.gyro_bias - other.gyro_bias,
+            self.accel_bias - other.accel_bias,
+        )
+        return np.concatenate([turn, *shifts])
+
+
+class InertialFilter:
+    """Propagates and corrects a `State`; not thread-safe."""
+
+    def __init__(self, noise: InertialNoise, stamp_ns: int, start: State) -> None:
+        self._noise = noise
+        self.stamp_ns = stamp_ns
+        self.state = start
+        sigmas = (noise.start_attitude_rad, noise.start_velocity_m_s, 1e-3, noise.start_gyro_bias, noise.start_accel_bias)
+        self.covariance: Floats = np.diag(np.repeat(np.square(sigmas), 3))
+        self.history: deque[tuple[int, State]] = deque([(stamp_ns, start)], maxlen=HISTORY)
+
+    def propagate(self, reading: ImuReading) -> None:
+        """Move to the reading's moment with its rates and specific force; one that is not later is left out."""
+        duration_s = (reading.stamp_ns - self.stamp_ns) / NS
+        if duration_s > 0.0:
+            rates = reading.rates - self.state.gyro_bias
+            force = reading.specific_force - self.state.accel_bias
+            noise = self._noise
+            densities = np.repeat(np.square([noise.gyro, noise.accel, 0.0, noise.gyro_walk, noise.accel_walk]), 3)
+            self._move(reading.stamp_ns, rates, self.state.rotation @ force + GRAVITY, force, densities * duration_s)
+
+    def coast(self, stamp_ns: int) -> None:
+        """Move to a moment without any reading: attitude and velocity are kept, and become uncertain."""
+        duration_s = (stamp_ns - self.stamp_ns) / NS
+        if duration_s > 0.0:
+            noise = self._noise
+            densities = np.repeat(np.square([noise.free_rad_s, noise.free_m_s2, 0.0, noise.gyro_walk, noise.accel_walk]), 3)
+            self._move(stamp_ns, np.zeros(3), np.zeros(3), np.zeros(3), densities * duration_s)
+
+    def correct(self, linearise: Linearise, *, least: int = 1, most: int = 1) -> None:
+        """Take a measurement that was linearised about the state: an information matrix (15, 15) and a gradient (15,), iterated.
+
+        Small steps end the iterations after the ``least``: a measurement may narrow its gates as it goes.
+        """
+        predicted, information_before = self.state, np.linalg.inv(self.covariance)
+        information = information_before
+        for iteration in range(1, most + 1):
+            measured, gradient = linearise(self.state)
+            information = information_before + measured
+            step = -np.linalg.solve(information, gradient + information_before @ self.state.minus(predicted))
+            self.state = self.state.plus(step)
+            if iteration >= least and np.abs(step[POSITION]).max() < 5e-4 and np.abs(step[ATTITUDE]).max() < 1e-4:  # noqa: PLR2004 -- m, rad
+                break
+        covariance = np.linalg.inv(information)
+        self.covariance = 0.5 * (covariance + covariance.T)
+        self.history[-1] = (self.stamp_ns, self.state)
+
+    def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, growth: Floats) -> None:
+        duration_s = (stamp_ns - self.stamp_ns) / NS
+        before = self.state
+        turn = Rotation.from_rotvec(rates * duration_s).as_matrix()
+        transition = np.eye(15)
+        transition[ATTITUDE, ATTITUDE] = turn.T
+        transition[ATTITUDE, GYRO_BIAS] = -np.eye(3) * duration_s
+        transition[VELOCITY, ATTITUDE] = -before.rotation @ cross_matrix(force) * duration_s
+        transition[VELOCITY, ACCEL_BIAS] = -before.rotation * duration_s
+        transition[POSITION, VELOCITY] = np.eye(3) * duration_s
+        self.covariance = transition @ self.covariance @ transition.T + np.diag(growth)
+        self.state = State(
+            before.rotation @ turn,
+            before.velocity + acceleration * duration_s,
+            before.position + before.velocity * duration_s + 0.5 * acceleration * duration_s**2,
+            before.gyro_bias,
+            before.accel_bias,
+        )
+        self.stamp_ns = stamp_ns
+        self.history.append((stamp_ns, self.state))
+
+
+def cross_matrix(v: Floats) -> Floats:
+    """Return the matrix that multiplies as ``v`` crossed with."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

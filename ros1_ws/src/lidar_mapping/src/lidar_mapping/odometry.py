@@ -1,0 +1,184 @@
+"""LiDAR-inertial odometry: propagate by the IMU, straighten the sweep, register it against the keyframes around, keep a keyframe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from lidar_mapping.inertial import ATTITUDE, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
+from lidar_mapping.keyframes import Keyframes
+from lidar_mapping.registration import Registration, RegistrationSettings, register
+from lidar_mapping.voxel_map import downsample
+from perception_core import NS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from lidar_mapping.keyframes import Keyframe
+    from lidar_mapping.surface import Surface
+    from perception_core import Sweep
+
+    Floats = NDArray[np.float64]
+
+IMU_GAP_NS = 100_000_000
+KNOT_NS = 10_000_000
+FIRST_SWEEPS = 3
+
+
+@dataclass(frozen=True)
+class OdometrySettings:
+    """Metres, radians. Scans are thinned to ``scan_voxel_m`` and ``scan_points``; the surface is what keyframes within ``reach_m`` saw.
+
+    A keyframe is taken after ``keyframe_m`` or ``keyframe_rad``; it holds the sweeps since the last one, ``keyframe_sweeps`` at most. What
+    the autopilot says of attitude and velocity is believed to ``autopilot_rad`` and ``autopilot_m_s``: the velocity loosely, because
+    its errors go on for seconds, so that it counts only where no surface holds a direction for long.
+    """
+
+    scan_voxel_m: float = 0.2
+    scan_points: int = 2000
+    map_voxel_m: float = 0.08
+    reach_m: float = 15.0
+    keyframe_m: float = 0.6
+    keyframe_rad: float = 0.2
+    keyframe_sweeps: int = 8
+    max_keyframes: int = 1500
+    autopilot_rad: float = 0.01
+    autopilot_m_s: float = 2.0
+    noise: InertialNoise = field(default_factory=InertialNoise)
+    registration: RegistrationSettings = field(default_factory=RegistrationSettings)
+
+
+@dataclass(frozen=True)
+class AutopilotMotion:
+    """What the autopilot says: R_map_base (3, 3), and velocity m/s ENU."""
+
+    rotation: Floats
+    velocity: Floats
+
+
+@dataclass(frozen=True)
+class Step:
+    """One sweep: its registration, its points (N, 3) in the map, and the keyframe that it made, if any."""
+
+    registration: Registration
+    points: Floats
+    keyframe: Keyframe | None
+
+
+class LidarInertialOdometry:
+    """Follows the vehicle from a start; not thread-safe."""
+
+    def __init__(self, settings: OdometrySettings, keyframes: Keyframes, stamp_ns: int, start: State) -> None:
+        self._settings = settings
+        self.keyframes = keyframes
+        self.filter = InertialFilter(settings.noise, stamp_ns, start)
+        self._surface: Surface | None = keyframes.surface(start.position, settings.reach_m)
+        self._since: list[Floats] = []
+        self._last_pose: Floats | None = None
+
+    def add(self, sweep: Sweep, readings: Iterable[ImuReading], T_base_lidar: Floats, autopilot: AutopilotMotion | None = None) -> Step:  # noqa: N803
+        """Follow the vehicle to the end of a sweep; ``readings`` are those since the sweep before, in order."""
+        self._propagate(readings, sweep.end_ns)
+        points = self._straighten(sweep, T_base_lidar)
+        if autopilot is not None:
+            self._listen_to(autopilot)
+        registration = self._register(points)
+        state = self.filter.state
+        placed = points @ state.rotation.T + state.position
+        self.filter.history = type(self.filter.history)([self.filter.history[-1]], maxlen=self.filter.history.maxlen)
+        return Step(registration, placed, self._keep(placed) if registration.believed else None)
+
+    @property
+    def state(self) -> State:
+        """Where the vehicle is."""
+        return self.filter.state
+
+    def move(self, correction: Floats) -> None:
+        """Follow the map when it is corrected; ``correction`` (4, 4) is T_corrected_before at the vehicle."""
+        state, turn = self.filter.state, correction[:3, :3]
+        position = turn @ state.position + correction[:3, 3]
+        moved = State(turn @ state.rotation, turn @ state.velocity, position, state.gyro_bias, state.accel_bias)
+        self.filter.state = moved
+        self.filter.history[-1] = (self.filter.stamp_ns, moved)
+        self._last_pose = None if self._last_pose is None else correction @ self._last_pose
+        self._since = [points @ turn.T + correction[:3, 3] for points in self._since]
+        self._surface = self.keyframes.surface(position, self._settings.reach_m)
+
+    def _propagate(self, readings: Iterable[ImuReading], end_ns: int) -> None:
+        for reading in readings:
+            if reading.stamp_ns <= end_ns:
+                self._coast(reading.stamp_ns - IMU_GAP_NS)  # over a gap the last reading says nothing
+                self.filter.propagate(reading)
+        if end_ns - self.filter.stamp_ns > IMU_GAP_NS // 2:
+            self._coast(end_ns)
+
+    def _coast(self, stamp_ns: int) -> None:
+        while self.filter.stamp_ns < stamp_ns:
+            self.filter.coast(min(stamp_ns, self.filter.stamp_ns + KNOT_NS))
+
+    def _straighten(self, sweep: Sweep, T_base_lidar: Floats) -> Floats:  # noqa: N803
+        """Return the points (N, 3) in the body frame of the filter's moment, each moved from the pose of its own."""
+        body = sweep.points @ T_base_lidar[:3, :3].T + T_base_lidar[:3, 3]
+        stamps, states = zip(*self.filter.history, strict=True)
+        if len(states) == 1:
+            return body
+        times = sweep.times_s.astype(np.float64) + (sweep.stamp_ns - stamps[0]) / NS
+        knots = (np.array(stamps, dtype=np.int64) - stamps[0]) / NS
+        segment = np.clip(np.searchsorted(knots, times) - 1, 0, len(knots) - 2)
+        # Up to one step beyond the last knot the motion is continued: readings end a little before the sweep does.
+        share = np.clip((times - knots[segment]) / np.diff(knots)[segment], 0.0, 2.0)[:, None]
+        result = np.empty_like(body, dtype=np.float64)
+        for k in np.unique(segment):
+            of_segment = segment == k
+            before = body[of_segment] @ states[k].rotation.T + states[k].position
+            after = body[of_segment] @ states[k + 1].rotation.T + states[k + 1].position
+            result[of_segment] = before + share[of_segment] * (after - before)
+        now = self.filter.state
+        straight: Floats = (result - now.position) @ now.rotation
+        return straight
+
+    def _listen_to(self, autopilot: AutopilotMotion) -> None:
+        settings = self._settings
+
+        def linearise(state: State) -> tuple[Floats, Floats]:
+            information, gradient = np.zeros((15, 15)), np.zeros(15)
+            information[ATTITUDE, ATTITUDE] = np.eye(3) / settings.autopilot_rad**2
+            gradient[ATTITUDE] = Rotation.from_matrix(autopilot.rotation.T @ state.rotation).as_rotvec() / settings.autopilot_rad**2
+            information[VELOCITY, VELOCITY] = np.eye(3) / settings.autopilot_m_s**2
+            gradient[VELOCITY] = (state.velocity - autopilot.velocity) / settings.autopilot_m_s**2
+            return information, gradient
+
+        self.filter.correct(linearise)
+
+    def _register(self, points: Floats) -> Registration:
+        if self._surface is None:
+            return Registration(1.0, 0.0, np.zeros(3), np.eye(3), "")  # the first sweep is where the start says
+        thinned = downsample(points, self._settings.scan_voxel_m)
+        if len(thinned) > self._settings.scan_points:
+            thinned = thinned[:: -(-len(thinned) // self._settings.scan_points)]
+        return register(thinned, self._surface, self.filter, self._settings.registration)
+
+    def _keep(self, placed: Floats) -> Keyframe | None:
+        """Gather the sweep, and make a keyframe of what was gathered when the vehicle has moved on.
+
+        The first sweep makes one alone, and the next few another: a single sweep is too sparse to tell normals well.
+        """
+        settings, pose = self._settings, self.filter.state.matrix
+        if len(self._since) < settings.keyframe_sweeps:
+            self._since.append(placed)
+        sparse = len(self.keyframes.all) == 1 and len(self._since) >= FIRST_SWEEPS
+        if self._last_pose is not None and not sparse:
+            moved = np.linalg.inv(self._last_pose) @ pose
+            turned = Rotation.from_matrix(moved[:3, :3]).magnitude()
+            if (np.linalg.norm(moved[:3, 3]) < settings.keyframe_m and turned < settings.keyframe_rad) or self.keyframes.full:
+                return None
+        frame = self.keyframes.add(self.filter.stamp_ns, pose, np.vstack(self._since))
+        self._since, self._last_pose = [], pose
+        self._surface = self.keyframes.surface(pose[:3, 3], settings.reach_m)
+        return frame
+

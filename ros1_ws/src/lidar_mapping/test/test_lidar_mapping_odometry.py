@@ -1,0 +1,197 @@
+"""State, surface, registration and odometry; on real scans with their true motion where the data is there."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import open3d as o3d
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lidar_mapping_yard import yard
+from scipy.spatial.transform import Rotation
+
+from lidar_mapping import (
+    AutopilotMotion,
+    ImuReading,
+    InertialFilter,
+    InertialNoise,
+    Keyframes,
+    LidarInertialOdometry,
+    OdometrySettings,
+    RegistrationSettings,
+    State,
+    Surface,
+    downsample,
+    flat_patches,
+    register,
+)
+from perception_core import NS, Sweep
+
+ROOT = Path(__file__).resolve().parents[4]
+DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
+small = st.floats(-0.3, 0.3)
+vectors = st.tuples(small, small, small).map(np.array)
+IDENTITY = State(np.eye(3), np.zeros(3), np.zeros(3))
+
+
+def filter_at(position=(0.0, 0.0, 2.0), *, sigma_m=0.1, sigma_rad=0.02) -> InertialFilter:
+    found = InertialFilter(InertialNoise(start_attitude_rad=sigma_rad), 0, State(np.eye(3), np.zeros(3), np.array(position)))
+    found.covariance[6:9, 6:9] = np.eye(3) * sigma_m**2
+    return found
+
+
+@given(vectors, vectors, vectors, vectors, vectors)
+@settings(max_examples=40, deadline=None)
+def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel) -> None:
+    error = np.concatenate([turn, velocity, position, gyro, accel])
+    start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro)
+    assert start.plus(error).minus(start) == pytest.approx(error, abs=1e-9)
+
+
+def test_propagation_follows_a_known_motion_and_grows_uncertain() -> None:
+    rate, speed = 0.5, 2.0  # rad/s about z, m/s: a circle of 4 m
+    found = InertialFilter(InertialNoise(), 0, State(np.eye(3), np.array([speed, 0.0, 0.0]), np.zeros(3)))
+    before = found.covariance.copy()
+    for k in range(1, 1001):
+        found.propagate(ImuReading(k * 2_000_000, np.array([0.0, 0.0, rate]), np.array([0.0, speed * rate, 9.81])))
+    radius = speed / rate
+    assert found.state.position == pytest.approx([radius * np.sin(1.0), radius * (1 - np.cos(1.0)), 0.0], abs=0.01)
+    assert Rotation.from_matrix(found.state.rotation).as_rotvec() == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+    assert np.all(np.diag(found.covariance)[:9] > np.diag(before)[:9])
+
+
+def test_a_plane_is_flat_and_an_edge_is_not() -> None:
+    rng = np.random.default_rng(1)
+    floor = np.stack([*rng.uniform(0.0, 4.0, (2, 4000)), rng.normal(0.0, 0.01, 4000)], axis=1)
+    wall = np.stack([rng.normal(0.0, 0.01, 4000), rng.uniform(0.0, 4.0, 4000), rng.uniform(0.0, 4.0, 4000)], axis=1)
+    both = downsample(np.vstack([floor, wall]), 0.08)
+    patches = flat_patches(both, both)
+    assert len(patches.points) > 0.8 * len(both)
+    to_floor, to_wall = np.abs(patches.normals[:, 2]), np.abs(patches.normals[:, 0])
+    assert np.all(np.maximum(to_floor, to_wall) > 0.9)
+    thread = np.stack([np.linspace(0.0, 3.0, 300), np.zeros(300), np.ones(300)], axis=1)
+    assert len(flat_patches(thread, thread).points) == 0
+
+
+def surface_of(points) -> Surface:
+    thinned = downsample(points, 0.08)
+    return Surface(flat_patches(thinned, thinned))
+
+
+@given(st.tuples(*[st.floats(-0.2, 0.2)] * 3), st.tuples(*[st.floats(-0.03, 0.03)] * 3))
+@settings(max_examples=10, deadline=None)
+def test_a_wrong_prediction_is_corrected(shift, turn) -> None:
+    here = np.array([1.0, 0.5, 2.0])
+    found = filter_at(here + shift)
+    found.state = replace(found.state, rotation=Rotation.from_rotvec(turn).as_matrix())
+    scan = downsample(yard(20000, 2), 0.3) - here
+    result = register(scan, YARD, found, RegistrationSettings())
+    assert result.believed, result.refusal
+    assert found.state.position == pytest.approx(here, abs=0.02)
+    assert Rotation.from_matrix(found.state.rotation).magnitude() < 0.005
+    assert result.correction_m == pytest.approx(np.linalg.norm(shift), abs=0.03)
+
+
+YARD = surface_of(yard(120_000, 1))
+
+
+def test_along_bare_walls_the_prediction_is_left_and_the_direction_is_named() -> None:
+    corridor = surface_of(yard(120_000, 1, corridor=True))
+    found = filter_at((0.1, 0.1, 2.0), sigma_m=0.3)
+    scan = yard(20000, 2, corridor=True)
+    scan = downsample(scan[np.abs(scan[:, 0]) < 12], 0.3) - [0.0, 0.0, 2.0]
+    result = register(scan, corridor, found, RegistrationSettings())
+    assert result.believed, result.refusal
+    assert (result.degenerate, abs(result.directions[0, 0]) > 0.99) == (1, True)
+    assert found.state.position[0] == pytest.approx(0.1, abs=0.03)
+    assert found.state.position[1:] == pytest.approx([0.0, 2.0], abs=0.02)
+    assert np.sqrt(found.covariance[6, 6]) > 0.1 > 10 * np.sqrt(found.covariance[7, 7])
+
+
+def test_what_can_not_be_believed_says_why_and_leaves_the_filter_alone() -> None:
+    scan = downsample(yard(20000, 2), 0.3) - [0.0, 0.0, 2.0]
+    found = filter_at()
+    kept = (found.state, found.covariance.copy())
+    assert "too few" in register(scan[:50], YARD, found, RegistrationSettings()).refusal
+    assert "points found a surface" in register(scan + [0.0, 0.0, 80.0], YARD, found, RegistrationSettings()).refusal
+    elsewhere = np.random.default_rng(3).uniform(-6.0, 6.0, (3000, 3))
+    assert "fitness" in register(elsewhere, YARD, found, RegistrationSettings()).refusal
+    assert found.state == kept[0]
+    assert found.covariance == pytest.approx(kept[1])
+
+
+# --- real scans ------------------------------------------------------------------------------------------------------
+
+FREE = OdometrySettings(noise=InertialNoise(start_velocity_m_s=10.0))
+
+
+def odometry() -> LidarInertialOdometry:
+    return LidarInertialOdometry(FREE, Keyframes(voxel_m=FREE.map_voxel_m, limit=10), 0, IDENTITY)
+
+
+def still(k, points, times=None) -> Sweep:
+    return Sweep(k * NS // 10, points.astype(np.float32), np.zeros(len(points), np.float32) if times is None else times)
+
+
+def off(found, truth) -> float:
+    return float(np.linalg.norm((np.linalg.inv(truth) @ found)[:3, 3]))
+
+
+@pytest.mark.skipif(not (DATA / "lidar_pair").exists(), reason=f"no real data at {DATA}: set ALULA_DATA")
+def test_two_real_scans_are_laid_onto_each_other_within_two_centimetres() -> None:
+    found = odometry()
+    for k, name in enumerate(("target", "source")):
+        cloud = np.asarray(o3d.io.read_point_cloud(str(DATA / "lidar_pair" / "data" / f"{name}.ply")).points)
+        step = found.add(still(k, cloud), [], np.eye(4))
+    assert step.registration.believed, step.registration.refusal
+    assert off(found.state.matrix, np.loadtxt(DATA / "lidar_pair" / "data" / "T_target_source.txt")) < 0.02
+
+
+@pytest.mark.skipif(not (DATA / "lidar_kitti").exists(), reason=f"no real data at {DATA}: set ALULA_DATA")
+@pytest.mark.parametrize(
+    "prior", [None, AutopilotMotion(np.eye(3), np.zeros(3)), AutopilotMotion(np.eye(3), np.array([0.0, 8.0, 0.0]))], ids=["none", "standing", "sideways"]
+)
+def test_a_car_is_followed_within_seven_centimetres_whatever_is_said_of_its_motion(prior) -> None:
+    found = odometry()
+    for k, row in enumerate(np.loadtxt(DATA / "lidar_kitti" / "T_first_scan.txt")):
+        points = np.fromfile(DATA / "lidar_kitti" / f"{k:06d}.bin", np.float32).reshape(-1, 4)[:, :3]
+        far = np.linalg.norm(points, axis=1)
+        step = found.add(still(k, points[(far > 2.5) & (far < 80.0)]), [], np.eye(4), prior)
+        assert step.registration.believed, step.registration.refusal
+        assert off(found.state.matrix, np.vstack([row.reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])) < 0.07
+
+
+@pytest.mark.skipif(not (DATA / "lidar_handheld").exists(), reason=f"no real data at {DATA}: set ALULA_DATA")
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_a_sweep_in_the_hand_is_straightened_within_four_centimetres(number) -> None:
+    """The inertial readings are made from another project's estimate of the motion; the points of before and after are real."""
+    raw, straight = (np.fromfile(DATA / "lidar_handheld" / f"{kind}_{number:02d}.bin", np.float32).reshape(-1, 3) for kind in ("raw", "deskewed"))
+    times = np.fromfile(DATA / "lidar_handheld" / f"times_{number:02d}.bin", np.float32)
+    moments = np.linspace(0.0, float(times.max()), 11)
+    poses = [rigid(raw[near], straight[near]) for near in (np.abs(times - moment) < 0.006 for moment in moments)]
+    found = odometry()
+    found.filter.state = State(poses[0][:3, :3], (poses[-1][:3, 3] - poses[0][:3, 3]) / moments[-1], poses[0][:3, 3])
+    found.filter.history[-1] = (0, found.filter.state)
+    readings = []
+    for before, after, moment, then in zip(poses, poses[1:], moments, moments[1:], strict=False):
+        rates = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).as_rotvec() / (then - moment)
+        readings.append(ImuReading(int(then * NS), rates, after[:3, :3].T @ np.array([0.0, 0.0, 9.81])))
+    near = np.linalg.norm(raw, axis=1) < 20.0
+    step = found.add(still(0, raw[near], times[near]), readings, np.eye(4))
+    apart = np.linalg.norm(step.points - straight[near], axis=1)
+    assert np.sqrt(np.mean(apart**2)) < 0.04
+    assert np.sqrt(np.mean(apart**2)) < 0.2 * np.sqrt(np.mean(np.sum((raw[near] @ poses[0][:3, :3].T + poses[0][:3, 3] - straight[near]) ** 2, axis=1)))
+
+
+def rigid(source, target) -> np.ndarray:
+    """Return T_target_source, (4, 4), by least squares."""
+    middle_source, middle_target = source.mean(axis=0).astype(float), target.mean(axis=0).astype(float)
+    rotation, _ = Rotation.align_vectors(target - middle_target, source - middle_source)
+    transform = np.eye(4)
+    transform[:3, :3] = rotation.as_matrix()
+    transform[:3, 3] = middle_target - rotation.apply(middle_source)
+    return transform
