@@ -58,7 +58,7 @@ class Path:
     def readings(self, start_s, end_s, rng):
         return [self.reading(t, rng) for t in np.arange(start_s + 0.01, end_s + 0.005, 0.01)]
 
-    def sweep(self, start_s, seed, count=9000):
+    def sweep(self, start_s, seed, count=7000):
         """A sweep of 0.1 s; each point is measured from the pose of its own moment."""
         rng = np.random.default_rng(seed)
         points = yard(count, seed, corridor=self._corridor)

@@ -144,6 +144,15 @@ class InertialFilter:
         self.covariance = 0.5 * (covariance + covariance.T)
         self.history[-1] = (self.stamp_ns, self.state)
 
+    def keep(self) -> Callable[[], None]:
+        """Return what takes back all corrections from now on; not for use across a propagation."""
+        state, covariance, last = self.state, self.covariance, self.history[-1]
+
+        def take_back() -> None:
+            self.state, self.covariance, self.history[-1] = state, covariance, last
+
+        return take_back
+
     def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, growth: Floats) -> None:
         duration_s = (stamp_ns - self.stamp_ns) / NS
         before = self.state

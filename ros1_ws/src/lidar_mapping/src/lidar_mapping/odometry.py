@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from lidar_mapping.inertial import ATTITUDE, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
 from lidar_mapping.keyframes import Keyframes
-from lidar_mapping.registration import Registration, RegistrationSettings, register
+from lidar_mapping.registration import Registration, RegistrationSettings, refused, register
 from lidar_mapping.voxel_map import downsample
 from perception_core import NS
 
@@ -36,7 +36,8 @@ class OdometrySettings:
 
     A keyframe is taken after ``keyframe_m`` or ``keyframe_rad``; it holds the sweeps since the last one, ``keyframe_sweeps`` at most. What
     the autopilot says of attitude and velocity is believed to ``autopilot_rad`` and ``autopilot_m_s``: the velocity loosely, because
-    its errors go on for seconds, so that it counts only where no surface holds a direction for long.
+    its errors go on for seconds, so that it counts only where no surface holds a direction for long. A fitness below
+    ``good_fitness`` makes other starts be tried.
     """
 
     scan_voxel_m: float = 0.2
@@ -49,6 +50,7 @@ class OdometrySettings:
     max_keyframes: int = 1500
     autopilot_rad: float = 0.01
     autopilot_m_s: float = 2.0
+    good_fitness: float = 0.85
     noise: InertialNoise = field(default_factory=InertialNoise)
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
 
@@ -85,9 +87,7 @@ class LidarInertialOdometry:
         """Follow the vehicle to the end of a sweep; ``readings`` are those since the sweep before, in order."""
         self._propagate(readings, sweep.end_ns)
         points = self._straighten(sweep, T_base_lidar)
-        if autopilot is not None:
-            self._listen_to(autopilot)
-        registration = self._register(points)
+        registration = self._locate(points, autopilot)
         state = self.filter.state
         placed = points @ state.rotation.T + state.position
         self.filter.history = type(self.filter.history)([self.filter.history[-1]], maxlen=self.filter.history.maxlen)
@@ -142,15 +142,37 @@ class LidarInertialOdometry:
         straight: Floats = (result - now.position) @ now.rotation
         return straight
 
-    def _listen_to(self, autopilot: AutopilotMotion) -> None:
+    def _locate(self, points: Floats, autopilot: AutopilotMotion | None) -> Registration:
+        """Register from where the autopilot's motion leads; where that fits badly, from other starts too, and take the best.
+
+        The others are one's own motion, and none at all since the last sweep: what the autopilot said before may have misled that, too.
+        """
+        if autopilot is None:
+            return self._register(points)
+        predicted, take_back = self.filter.state, self.filter.keep()
+        last = self.filter.history[0][1]
+        best, back_to_best = refused("not tried"), take_back
+        for velocity_m_s, start in ((self._settings.autopilot_m_s, predicted), (np.inf, predicted), (np.inf, replace(predicted, position=last.position))):
+            take_back()
+            self.filter.state = start
+            self._listen_to(autopilot, velocity_m_s)
+            found = self._register(points)
+            if found.fitness >= best.fitness:
+                best, back_to_best = found, self.filter.keep()
+            if best.believed and best.fitness > self._settings.good_fitness:
+                break
+        back_to_best()
+        return best
+
+    def _listen_to(self, autopilot: AutopilotMotion, velocity_m_s: float) -> None:
         settings = self._settings
 
         def linearise(state: State) -> tuple[Floats, Floats]:
             information, gradient = np.zeros((15, 15)), np.zeros(15)
             information[ATTITUDE, ATTITUDE] = np.eye(3) / settings.autopilot_rad**2
             gradient[ATTITUDE] = Rotation.from_matrix(autopilot.rotation.T @ state.rotation).as_rotvec() / settings.autopilot_rad**2
-            information[VELOCITY, VELOCITY] = np.eye(3) / settings.autopilot_m_s**2
-            gradient[VELOCITY] = (state.velocity - autopilot.velocity) / settings.autopilot_m_s**2
+            information[VELOCITY, VELOCITY] = np.eye(3) / velocity_m_s**2
+            gradient[VELOCITY] = (state.velocity - autopilot.velocity) / velocity_m_s**2
             return information, gradient
 
         self.filter.correct(linearise)

@@ -129,7 +129,8 @@ def register(points: Floats, surface: Surface, state: InertialFilter, settings: 
     """Correct the filter by a scan (N, 3), body frame, straightened; a scan that is refused leaves the filter as it was predicted."""
     if len(points) < settings.min_points:
         return refused(f"{len(points)} points are too few")
-    predicted, covariance, kept = state.state, state.covariance, state.history[-1]
+    predicted, take_back = state.state, state.keep()
+    covariance = state.covariance
     doubt_m = 3.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[POSITION, POSITION])[-1]))
     reach_m = 3.0 * float(np.sqrt(np.linalg.eigvalsh(covariance[ATTITUDE, ATTITUDE])[-1])) * 5.0  # at 5 m
     first_gate_m = float(np.clip(doubt_m + reach_m, settings.widest_m / 5.0, settings.widest_m))
@@ -138,7 +139,7 @@ def register(points: Floats, surface: Surface, state: InertialFilter, settings: 
     measurement.judge(state.state)
     reason = _reason(measurement, settings)
     if reason:
-        state.state, state.covariance, state.history[-1] = predicted, covariance, kept
+        take_back()
         return refused(reason, measurement.fitness)
     values, axes = np.linalg.eigh(measurement.held)
     correction_m = float(np.linalg.norm(state.state.position - predicted.position))
