@@ -57,6 +57,7 @@ def test_listings_1_and_2(navigation):
     }
 
 
+SLAM = ("UNKNOWN", "OK", "LOST")
 STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "BROKEN"), ("BROKEN", "OK"), ("BROKEN", "UNKNOWN")]
 
 
@@ -69,6 +70,7 @@ STATUS = [("UNKNOWN", "OK"), ("UNKNOWN", "BROKEN"), ("OK", "UNKNOWN"), ("OK", "B
         ("perception", "zed_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("perception", "lidar_status", ("UNKNOWN", "OK", "BROKEN"), STATUS, []),
         ("mapping", "mapping_process", ("IDLE", "RUNNING"), [], [("IDLE", "RUNNING"), ("RUNNING", "IDLE")]),
+        ("mapping", "slam_status", ("UNKNOWN", "OK", "LOST"), [(a, b) for a in SLAM for b in SLAM if a != b], []),
     ],
 )
 def test_resources(robot, skillset, resource, states, extern, internal):

@@ -25,7 +25,7 @@ What was decided, and why:
 - **BLOCKED** on a leg: one more attempt after 2 s (something may have crossed the way), then the branch fails. The LiDAR may
   see a way that the ZED did not; when it is blocked, too, the mission is given up.
 - **The map's LiDAR fails** while the ZED is fine: without it there is no map, which is what the flight is for. Flying on would
-  only take a risk for nothing: the mission is given up.
+  only take a risk for nothing: the mission is given up. The same when the map is lost (its skill's invariant `not_lost`).
 - **Giving up**: stop, hover, land where it is. The way home may be what the sensors no longer see.
 - **The pilot takes over** (SDK_authority is lost): the mission is given up and commands nothing more, also if the
   authority comes back.

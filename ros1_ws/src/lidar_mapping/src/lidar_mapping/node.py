@@ -159,6 +159,7 @@ class LidarMappingNode:
             self._slam.stop()
             self._readings.clear()
             self._publish_state(rospy.Time.now().to_nsec(), None)
+        self._reporter.report("slam_status", "UNKNOWN")
 
     def _publish_map(self, _event: object) -> None:
         if not self._map.get_num_connections():

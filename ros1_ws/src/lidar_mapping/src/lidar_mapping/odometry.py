@@ -48,8 +48,8 @@ class OdometrySettings:
     keyframe_rad: float = 0.2
     keyframe_sweeps: int = 8
     max_keyframes: int = 1500
-    autopilot_rad: float = 0.01
-    autopilot_m_s: float = 2.0
+    autopilot_rad: float = 0.003
+    autopilot_m_s: float = 0.2
     good_fitness: float = 0.85
     noise: InertialNoise = field(default_factory=InertialNoise)
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
