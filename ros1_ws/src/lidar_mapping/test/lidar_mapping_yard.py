@@ -53,7 +53,7 @@ class Path:
         acceleration = (self.position(t + h) - 2 * self.position(t) + self.position(t - h)) / h**2
         rates = np.array([0.0, 0.0, (self.yaw(t + h) - self.yaw(t - h)) / (2 * h)]) + rng.normal(0.0, 0.003, 3)
         force = self.pose(t)[:3, :3].T @ (acceleration + GRAVITY) + rng.normal(0.0, 0.05, 3)
-        return ImuReading(int(round(t * NS)), rates, force)
+        return ImuReading(round(t * NS), rates, force)
 
     def readings(self, start_s, end_s, rng):
         return [self.reading(t, rng) for t in np.arange(start_s + 0.01, end_s + 0.005, 0.01)]
@@ -71,14 +71,14 @@ class Path:
         times = np.round(times * 100) / 100
         seen += rng.normal(0.0, NOISE_M, seen.shape)
         near = np.linalg.norm(seen, axis=1) < self._reach_m
-        return Sweep(int(round(start_s * NS)), seen[near].astype(np.float32), times[near].astype(np.float32))
+        return Sweep(round(start_s * NS), seen[near].astype(np.float32), times[near].astype(np.float32))
 
     def autopilot(self, end_s, *, drift=0.0, jump_m=0.0, jump_s=np.inf):
-        """What the autopilot tells of the last second: the pose, with a position that grows wrong by ``drift`` of the way from the start."""
+        """What the autopilot tells of the last second: the pose, its position wrong by ``drift`` of the way from the start."""
         poses = PoseBuffer(keep_s=60.0)
         for t in np.arange(max(0.0, end_s - 1.0), end_s + 0.03, 0.02):
             pose = self.pose(t)
             start = self.position(0.0)
             given = start + (1.0 + drift) * (pose[:3, 3] - start) + (jump_m if t >= jump_s else 0.0) * np.array([1.0, 0.0, 0.0])
-            poses.add(int(round(t * NS)), tuple(given), Rotation.from_matrix(pose[:3, :3]).as_quat())
+            poses.add(round(t * NS), tuple(given), Rotation.from_matrix(pose[:3, :3]).as_quat())
         return poses

@@ -136,9 +136,10 @@ class InertialFilter:
         for iteration in range(1, most + 1):
             measured, gradient = linearise(self.state)
             information = information_before + measured
-            step = -np.linalg.solve(information, gradient + information_before @ self.state.minus(predicted))
+            slope = gradient + information_before @ self.state.minus(predicted)
+            step: Floats = -np.asarray(np.linalg.solve(information, slope), dtype=np.float64)
             self.state = self.state.plus(step)
-            if iteration >= least and np.abs(step[POSITION]).max() < 5e-4 and np.abs(step[ATTITUDE]).max() < 1e-4:  # noqa: PLR2004 -- m, rad
+            if iteration >= least and np.abs(step[POSITION]).max() < 5e-4 and np.abs(step[ATTITUDE]).max() < 1e-4:
                 break
         covariance = np.linalg.inv(information)
         self.covariance = 0.5 * (covariance + covariance.T)

@@ -1,4 +1,4 @@
-"""What was seen from where: the clouds of stretches of the flight, each in the frame of its keyframe, so that it can be moved afterwards."""
+"""What was seen from where: the clouds of stretches of the flight, each in its keyframe's frame, so that it can be moved later."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Keyframes:
         """Take the points (N, 3), map frame, of the sweeps since the last keyframe; the planes are found with the help of the last ones."""
         fresh = downsample(points, self._voxel_m)
         around = np.vstack([fresh, *(frame.points_in_map() for frame in self.all[-NEIGHBOUR_KEYFRAMES:])])
-        back = np.linalg.inv(pose)
+        back: Floats = np.asarray(np.linalg.inv(pose), dtype=np.float64)
         patches = flat_patches(fresh, around).moved(back)
         inside = (fresh @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
         frame = Keyframe(stamp_ns, pose, inside, patches)
@@ -66,6 +66,8 @@ class Keyframes:
 
     def surface(self, position: Floats, reach_m: float, *, among: slice | None = None) -> Surface | None:
         """Return the patches of all keyframes (or those ``among``) within reach; None when there are none."""
-        near = [frame for frame in self.all[among or slice(None)] if frame.everywhere or np.linalg.norm(frame.pose[:3, 3] - position) < reach_m]
+        near = [
+            frame for frame in self.all[among or slice(None)] if frame.everywhere or np.linalg.norm(frame.pose[:3, 3] - position) < reach_m
+        ]
         patches = join([frame.patches.moved(frame.pose) for frame in near])
         return Surface(patches) if len(patches.points) else None

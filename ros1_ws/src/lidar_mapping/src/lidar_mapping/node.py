@@ -93,9 +93,7 @@ class LidarMappingNode:
 
     def _on_imu(self, message: Imu) -> None:
         rates, force = message.angular_velocity, message.linear_acceleration
-        reading = ImuReading(
-            message.header.stamp.to_nsec(), np.array([rates.x, rates.y, rates.z]), np.array([force.x, force.y, force.z])
-        )
+        reading = ImuReading(message.header.stamp.to_nsec(), np.array([rates.x, rates.y, rates.z]), np.array([force.x, force.y, force.z]))
         if np.isfinite(reading.rates).all() and np.isfinite(reading.specific_force).all():
             self._readings.append(reading)
 

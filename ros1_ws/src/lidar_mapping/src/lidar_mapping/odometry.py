@@ -152,7 +152,11 @@ class LidarInertialOdometry:
         predicted, take_back = self.filter.state, self.filter.keep()
         last = self.filter.history[0][1]
         best, back_to_best = refused("not tried"), take_back
-        for velocity_m_s, start in ((self._settings.autopilot_m_s, predicted), (np.inf, predicted), (np.inf, replace(predicted, position=last.position))):
+        for velocity_m_s, start in (
+            (self._settings.autopilot_m_s, predicted),
+            (np.inf, predicted),
+            (np.inf, replace(predicted, position=last.position)),
+        ):
             take_back()
             self.filter.state = start
             self._listen_to(autopilot, velocity_m_s)
@@ -203,4 +207,3 @@ class LidarInertialOdometry:
         self._since, self._last_pose = [], pose
         self._surface = self.keyframes.surface(pose[:3, 3], settings.reach_m)
         return frame
-

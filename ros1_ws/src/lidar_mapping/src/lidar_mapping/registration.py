@@ -31,10 +31,12 @@ class RegistrationSettings:
     """How to register, and when to believe it.
 
     Pairs are searched within a gate that shrinks from three standard deviations of the prediction (at least ``widest_m / 5``, at most
-    ``widest_m``) to ``gate_m``; residuals beyond ``kernel_m`` count less (Cauchy). A point is known to ``point_sigma_m``, and neighbours share
-    their errors: ``independent`` of them count. ``tilt_rad`` is the noise of a normal. A result is refused when fewer than
-    ``min_points``, or fewer than ``min_fitness`` of those that have a patch within three gates, lie within half a gate of its plane: what sees
-    new ground is not to blame for having no partner there, and of points laid down at random a sixth would lie so.
+    ``widest_m``) to ``gate_m``; residuals beyond ``kernel_m`` count less (Cauchy). A point is known to ``point_sigma_m``, and
+    neighbours share their errors: ``independent`` of them count. ``tilt_rad`` is the noise of a normal.
+
+    A result is refused when fewer than ``min_points``, or fewer than ``min_fitness`` of those that have a patch within three gates, lie
+    within half a gate of its plane: what sees new ground is not to blame for having no partner there, and of points laid down at
+    random a sixth would lie so.
     """
 
     widest_m: float = 2.0

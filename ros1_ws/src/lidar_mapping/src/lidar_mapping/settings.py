@@ -31,6 +31,8 @@ class MappingSettings:
     scan_voxel_m: float = _ODOMETRY.scan_voxel_m
     max_keyframes: int = _ODOMETRY.max_keyframes
     min_fitness: float = _ODOMETRY.registration.min_fitness
+    autopilot_m_s: float = _ODOMETRY.autopilot_m_s
+    autopilot_rad: float = _ODOMETRY.autopilot_rad
     loop_reach_m: float = _GRAPH.reach_m
     autopilot_m: float = _GRAPH.autopilot_m
 
@@ -43,6 +45,8 @@ class MappingSettings:
             reach_m=self.reach_m,
             scan_voxel_m=self.scan_voxel_m,
             max_keyframes=self.max_keyframes,
+            autopilot_m_s=self.autopilot_m_s,
+            autopilot_rad=self.autopilot_rad,
             registration=registration,
         )
         return replace(

@@ -1,8 +1,8 @@
 """The flat patches of a cloud, which scans are registered against.
 
-Only what is flat at the scale at which it was seen is taken: edges, twigs and the rims of what was seen so far have no plane, and would hold
-a scan back that sees farther than the map. The smallest scale comes first, because narrow faces (a pilaster's side) are often all
-that tells of the motion along a facade.
+Only what is flat at the scale at which it was seen is taken: edges, twigs and the rims of what was seen so far have no plane,
+and would hold a scan back that sees farther than the map. The smallest scale comes first, because narrow faces (a pilaster's side)
+are often all that tells of the motion along a facade.
 """
 
 from __future__ import annotations
@@ -74,9 +74,7 @@ def join(parts: Sequence[Patches]) -> Patches:
     return Patches(np.vstack([part.points for part in parts]), np.vstack([part.normals for part in parts]))
 
 
-def _planes(
-    points: Floats, around: Floats, tree: cKDTree, scale: Scale
-) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+def _planes(points: Floats, around: Floats, tree: cKDTree, scale: Scale) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the mean and the normal of each neighbourhood, which are flat, and which had neighbours enough to tell."""
     distance, index = tree.query(points, k=NEIGHBOURS, distance_upper_bound=scale.radius_m)
     near = np.isfinite(distance)
