@@ -117,7 +117,7 @@ def test_what_can_not_be_believed_says_why_and_leaves_the_filter_alone() -> None
     found = filter_at()
     kept = (found.state, found.covariance.copy())
     assert "too few" in register(scan[:50], YARD, found, RegistrationSettings()).refusal
-    assert "points found a surface" in register([*scan, 0.0, 0.0, 80.0], YARD, found, RegistrationSettings()).refusal
+    assert "points found a surface" in register(scan + np.array([0.0, 0.0, 80.0]), YARD, found, RegistrationSettings()).refusal
     elsewhere = np.random.default_rng(3).uniform(-6.0, 6.0, (3000, 3))
     assert "fitness" in register(elsewhere, YARD, found, RegistrationSettings(min_points=10)).refusal
     assert found.state is kept[0]
@@ -179,7 +179,7 @@ def test_a_sweep_in_the_hand_is_straightened_within_four_centimetres(number) -> 
     poses, moments = motion(raw, straight, times)
     found = odometry()
     speeds = np.diff(poses[:, :3, 3], axis=0) / np.diff(moments)[:, None]
-    forces = [*np.vstack([np.zeros((1, 3)), np.diff(speeds, axis=0) / np.diff(moments)[1:, None]]), 0.0, 0.0, 9.81]
+    forces = np.vstack([np.zeros((1, 3)), np.diff(speeds, axis=0) / np.diff(moments)[1:, None]]) + np.array([0.0, 0.0, 9.81])
     found.filter.state = State(poses[0][:3, :3], speeds[0], poses[0][:3, 3])
     found.filter.history[-1] = (0, found.filter.state)
     readings = []
