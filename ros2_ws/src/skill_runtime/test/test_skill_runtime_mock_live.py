@@ -193,6 +193,13 @@ def test_the_starter_is_a_behaviour_file(tmp_path):
     from skill_runtime.mock import load_behaviour
 
     (tmp_path / "mock.yaml").write_text(done.stdout)
-    behaviour = load_behaviour([tmp_path / "mock.yaml"], load_robot(UAV).skillsets)
-    assert len(behaviour.rules) == 11
-    assert len(behaviour.timeline) == 6
+    skillsets = load_robot(UAV).skillsets
+    behaviour = load_behaviour([tmp_path / "mock.yaml"], skillsets)
+    assert len(behaviour.rules) == sum(len(skillset.skills) for skillset in skillsets)
+    leaves_by_itself = [
+        resource
+        for skillset in skillsets
+        for resource in skillset.resources
+        if any(arrow.extern and arrow.source == resource.initial for arrow in resource.transitions)
+    ]
+    assert len(behaviour.timeline) == len(leaves_by_itself) > 0
