@@ -91,7 +91,7 @@ def main(arguments: list[str]) -> int:
         logger.error("%s", error)
         return EXIT_CONFIG
     try:
-        from ros_bridge.session import list_session, run_session  # rclpy takes its time: a wrong option is told before
+        from ros_bridge.session import list_session, run_session  # rclpy takes its time, so options are checked first
 
         master, name = connect_master(), own_name(arguments)
         if options.list:

@@ -38,7 +38,7 @@ class TypeLookup(Protocol):
 
 @dataclass(frozen=True)
 class RouteDecision:
-    """A route that is to exist. ``receivers``: how many foreign subscribers wait at its target; with none it does not flow."""
+    """A route that is to exist. ``receivers``: foreign subscribers of its target; with none nothing is forwarded."""
 
     spec: Spec
     receivers: int = 0

@@ -100,7 +100,7 @@ class Discovery:
         while not self._stop.is_set():
             try:
                 self._follow()
-            except Exception:  # whatever a graph in motion makes rclpy or a node raise: bridging goes on, and the graph is read anew
+            except Exception:  # whatever a graph in motion makes rclpy or a node raise: bridging goes on, and the graph is read again
                 if not self._stop.wait(AGAIN_AFTER_S):
                     logger.exception("discovery begins again after an error")
 

@@ -218,7 +218,7 @@ class GoalsToRos1:
             return
         final = TO_ROS2[status]
         if status is Ros1Status.PREEMPTED and not goal.cancel_seen:
-            final = Ros2Status.ABORTED  # nobody asked for its end: ROS 2 calls only that a cancelling
+            final = Ros2Status.ABORTED  # ended without a request to cancel; ROS 2 has CANCELED for those only
         self._accept(goal)
         self._end(goal, final if final in ROS2_TERMINAL else Ros2Status.ABORTED, payload, reason, now_s)
 

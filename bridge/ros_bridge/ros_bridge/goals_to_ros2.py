@@ -4,9 +4,9 @@ Towards ROS 1 it behaves as actionlib's own server does: the status list goes ou
 5 s, a cancel request that overtakes its goal is remembered, one with a stamp also meets goals that come later with an earlier stamp.
 A goal is PENDING until the server in ROS 2 executes it, and PREEMPTING when that server agrees to cancel, not before.
 
-A request to a server that is just coming or going may get lost, and so may its answer. So a goal without an answer, or with a server that
-has come anew, is asked after with a request for its result: a server that does not know the goal says so at once. Then the goal is
-sent again, under the same id, which no server takes twice, or, if it had been accepted, it is over.
+A request to a server that is starting or stopping may get lost, and so may its answer. For a goal that has no answer, or whose server was
+restarted, the bridge therefore requests the result: a server that does not know the goal refuses at once. Then the goal is sent again under
+the same id, which no server accepts twice; a goal that had been accepted before has ended.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ def own_host() -> str:
 
 
 def bind_address(host: str) -> str:
-    """Return the address to listen on: loopback when others are told to come there, else all."""
+    """Return the address to listen on: loopback when that is the host name that peers get, else all."""
     return "127.0.0.1" if host.startswith(LOOPBACK) else "0.0.0.0"  # noqa: S104 - other machines' nodes are peers
 
 
@@ -108,14 +108,14 @@ class Ros1Node:
             return [[one.name, one.type_name] for one in self._registered if one.kind is kind]
 
     def register(self, kind: Kind, name: str, type_name: str = "") -> None:
-        """Tell the master; a subscribed topic's publishers are told to ``changed``. Calls of a service go to the port of the topics."""
+        """Register with the master; ``changed`` gets a subscribed topic's publishers. Service calls go to the port of the topics."""
         registration = Registration(kind, name, type_name)
         with self._lock:
             self._registered[registration] += 1
         self._tell(registration)
 
     def unregister(self, kind: Kind, name: str, type_name: str = "") -> None:
-        """Tell the master that it is over, when nobody else has registered the same."""
+        """Unregister at the master, once the last registration of this kind and name is gone."""
         registration = Registration(kind, name, type_name)
         with self._lock:
             self._registered[registration] -= 1

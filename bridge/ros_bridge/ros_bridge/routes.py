@@ -88,7 +88,7 @@ class RouteTable:
         self.failed: dict[Spec, str] = {}
 
     def reconcile(self, wanted: Iterable[Spec]) -> None:
-        """Close what is not wanted and make what is missing; a spec that fails is reported once, and tried again when wanted anew."""
+        """Close what is not wanted and make what is missing; a spec that fails is reported once, and tried when wanted again."""
         wanted = dict.fromkeys(wanted)
         with self._lock:
             for spec in [spec for spec in self._running if spec not in wanted]:
@@ -106,12 +106,12 @@ class RouteTable:
                 self._started.add(spec)
 
     def started(self, spec: Spec) -> bool:
-        """Tell whether a route flows."""
+        """Tell whether a route forwards messages."""
         with self._lock:
             return spec in self._started
 
     def park(self, spec: Spec) -> None:
-        """Make a route anew that offers its target but does not flow, as there is no receiver."""
+        """Make a route again whose target is advertised while nothing is forwarded, because there was no receiver."""
         with self._lock:
             self._close(spec)
             self._make(spec)
@@ -140,7 +140,7 @@ class RouteTable:
             return dict(self._running)
 
     def figures(self) -> dict[Spec, Figures]:
-        """Return the figures of the running routes, with what crossed before they were made anew."""
+        """Return the figures of the running routes, with what crossed before they were made again."""
         return {spec: route.figures().after(self._earlier.get(key_of(spec), Figures())) for spec, route in self.running().items()}
 
     def close(self) -> None:

@@ -57,7 +57,7 @@ class Figures:
     errors: int = 0
 
     def after(self, earlier: Figures) -> Figures:
-        """Return the figures of a route that was made anew: counts go on, durations are those of the newer part."""
+        """Return the figures of a route that was made again: counts go on, durations are those of the newer part."""
         reasons = earlier.dropped.keys() | self.dropped.keys()
         return Figures(
             count=earlier.count + self.count,
