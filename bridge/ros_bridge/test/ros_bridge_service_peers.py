@@ -19,6 +19,14 @@ BIG_BYTES = 4_000_000
 SET_BOOL_SUM = "09fb03525b03e7ea1fd3992bafd87e16"
 TYPES = Types(ament_prefixes())
 SET_SENSOR = TYPES.service("uav_msgs/SetSensor")
+SERVICES = """
+services:
+  - {name: /bv/in_ros2, server: ros2, type: uav_msgs/SetSensor, timeout_s: 20.0}
+  - {name: /bv/held_in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 20.0}
+  - {name: /bv/in_ros1, server: ros1, type: uav_msgs/SetSensor, timeout_s: 20.0}
+  - {name: /bv/odd_in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 2.0}
+  - {name: /bv/held_in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 20.0}
+"""
 
 
 class Client:

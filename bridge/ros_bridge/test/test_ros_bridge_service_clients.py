@@ -9,6 +9,7 @@ from ros_bridge_harness import wait_until
 from ros_bridge_service_peers import (
     BIG_BYTES,
     LIMIT_S,
+    SERVICES,
     SET_SENSOR,
     Client,
     HeldService,
@@ -25,14 +26,7 @@ from ros_bridge_wire import header, read_header
 from std_srvs.srv import SetBool
 from uav_msgs.srv import SetSensor
 
-CONFIG = """
-services:
-  - {name: /bv/in_ros2, server: ros2, type: uav_msgs/SetSensor, timeout_s: 20.0}
-  - {name: /bv/held_in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 20.0}
-  - {name: /bv/in_ros1, server: ros1, type: uav_msgs/SetSensor, timeout_s: 20.0}
-  - {name: /bv/odd_in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 2.0}
-  - {name: /bv/held_in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 20.0}
-"""
+CONFIG = SERVICES
 
 
 def test_clients_in_ros1_are_checked_and_answered(world):

@@ -6,6 +6,7 @@ import time
 from ros_bridge_harness import BridgeProcess, wait_until
 from ros_bridge_service_peers import (
     LIMIT_S,
+    SERVICES,
     Client,
     HeldService,
     Server,
@@ -19,14 +20,7 @@ from ros_bridge_service_peers import (
 )
 from std_srvs.srv import SetBool
 
-CONFIG = """
-services:
-  - {name: /bv/in_ros2, server: ros2, type: uav_msgs/SetSensor, timeout_s: 20.0}
-  - {name: /bv/held_in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 20.0}
-  - {name: /bv/in_ros1, server: ros1, type: uav_msgs/SetSensor, timeout_s: 20.0}
-  - {name: /bv/odd_in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 2.0}
-  - {name: /bv/held_in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 20.0}
-"""
+CONFIG = SERVICES
 
 
 def test_restarted_master_learns_where_services_are(world):
