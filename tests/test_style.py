@@ -50,3 +50,14 @@ COMMANDS = {"lint": ["ruff", "check", "."], "format": ["ruff", "format", "--chec
 def test_tree_is_clean(name: str) -> None:
     done = subprocess.run(COMMANDS[name], cwd=ALULA_ROOT, capture_output=True, text=True, timeout=280, check=False)
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
+
+
+@pytest.mark.parametrize(
+    ("language", "source"), [("skill", "skillsets/uav/navigation.skill"), ("python", "ros2_ws/src/uav_skills/uav_skills/navigation.py")]
+)
+def test_the_readme_shows_lines_of_the_product(language: str, source: str) -> None:
+    """What a newcomer reads first is what runs: excerpts, in the order of the file."""
+    shown = (ALULA_ROOT / "README.md").read_text().split(f"```{language}\n")[1].split("```")[0]
+    lines = iter((ALULA_ROOT / source).read_text().splitlines())
+    missing = [line for line in shown.splitlines() if line and line not in lines]
+    assert not missing
