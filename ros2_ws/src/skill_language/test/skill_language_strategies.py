@@ -136,7 +136,7 @@ def skills(draw):
 skillsets = st.builds(
     Skillset,
     names,
-    types=st.lists(names, max_size=2).map(tuple),
+    types=st.lists(names, max_size=2, unique=True).map(tuple),
     parameters=parameters,
     data=st.lists(st.builds(Data, names, names, st.none() | floats), max_size=2).map(tuple),
     resources=st.lists(resources(), max_size=3).map(tuple),
