@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import signal
 import threading
@@ -66,7 +67,8 @@ class DeathRecord:
         """Keep a death and write it down."""
         with self._lock:
             self._deaths.append(death)
-            with self._path.open("a", encoding="utf-8") as file:
+            # A disk that is full, or a folder that has gone, must not end the run.
+            with contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(death)) + "\n")
 
     @property

@@ -11,6 +11,7 @@ import argparse
 import contextlib
 import ctypes
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -41,6 +42,7 @@ PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
 MISSION_NODE = "mission"
+SENSORS_MB_S = 7.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
 
 
 class Arguments(argparse.Namespace):
@@ -56,6 +58,7 @@ class Arguments(argparse.Namespace):
     sensors: str | None
     imperfections: str
     mock: bool
+    record: str
     behaviour: list[Path]
 
 
@@ -84,6 +87,9 @@ def parse(arguments: list[str]) -> RunSpec:
     parser.add_argument(
         "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what the mocks do, on top of the drone's own"
     )
+    parser.add_argument(
+        "--record", choices=["functional", "sensors"], default="functional", help="sensors: functional.bag also holds raw measurements"
+    )
     given = parser.parse_args(arguments, namespace=Arguments())
     scenario = read_scenario(given.scenario)
     if not 0 <= given.seed < 2**31:
@@ -107,6 +113,7 @@ def parse(arguments: list[str]) -> RunSpec:
         mavlink_port=0 if given.mock else free_port(),
         domain=0,
         mock=given.mock,
+        record=given.record,
         behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
     )
 
@@ -129,6 +136,8 @@ def check_mock(given: Arguments) -> None:
         raise RequestError("--behaviour says what mocks do; add --mock")
     if given.mock and given.autopilot is not None:
         raise RequestError("--mock flies without a vehicle; leave out --autopilot")
+    if given.mock and given.record == "sensors":
+        raise RequestError("--record sensors: mocks measure nothing; leave it out with --mock")
     if given.mock and given.rate is not None:
         raise RequestError("--mock flies in virtual time, which no --rate limits; leave it out")
 
@@ -270,9 +279,20 @@ def main(arguments: list[str]) -> int:
     spec_path = out / "run.json"
     spec.save(spec_path)
     say = announce(spec)
+    if spec.record == "sensors":
+        say(sensors_words(out))
     code = Front(spec, claim, say).fly(spec_path)
     say("making the report")
     return finish(spec, code)
+
+
+def sensors_words(out: Path) -> str:
+    """Return how much the raw measurements will take, and how much there is."""
+    free_gb, minutes_gb = shutil.disk_usage(out).free / 1e9, 120 * SENSORS_MB_S / 1e3
+    return (
+        f"functional.bag will hold raw measurements: about {SENSORS_MB_S:g} MB a second of flight, {minutes_gb:.1f} GB for two minutes; "
+        f"{free_gb:.0f} GB are free, and the last one is left alone"
+    )
 
 
 def fly_mocked(spec: RunSpec) -> int:
@@ -282,9 +302,12 @@ def fly_mocked(spec: RunSpec) -> int:
     out = Path(spec.out_dir)
     if code == CANNOT_START and not (out / "mission.json").exists():
         raise RequestError(words.strip() or "the mission could not start")
-    spec.save(out / "run.json")
-    (out / "logs").mkdir(exist_ok=True)
-    (out / "logs" / "mission.log").write_text(words, encoding="utf-8")
+    try:
+        spec.save(out / "run.json")
+        (out / "logs").mkdir(exist_ok=True)
+        (out / "logs" / "mission.log").write_text(words, encoding="utf-8")
+    except OSError as error:
+        say(f"{error.filename} could not be written: {error.strerror}")
     say("making the report")
     return finish(spec, code)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from alula_common.record import EVENTS, FILE, RecordFollower
 from alula_flight.deaths import read_deaths
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, TransitionEvent, read_event
@@ -29,38 +29,31 @@ def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: flo
 
 
 class LiveEvents:
-    """Follows ``events.jsonl`` and ``deaths.jsonl`` of a run's folder."""
+    """Follows ``skills.mcap`` and ``deaths.jsonl`` of a run's folder."""
 
     def __init__(self, out: Path, say: Callable[[str], None]) -> None:
-        self._events = out / "events.jsonl"
+        self._record = RecordFollower(out / FILE)
         self._deaths = out / "deaths.jsonl"
         self._say = say
         self._begun_s: float | None = None
         self._lift_off_s: float | None = None
-        self._offset = 0
         self._deaths_shown = 0
 
     def show_new(self) -> None:
-        """Say what was written since the last call; half a line waits for its other half."""
-        if self._events.exists():
-            with self._events.open("rb") as file:
-                file.seek(self._offset)
-                for line in file:
-                    if not line.endswith(b"\n"):
-                        break
-                    self._offset += len(line)
-                    self._show(line)
+        """Say what was written since the last call; what is written in part waits for the rest."""
+        for entry in self._record.poll():
+            if entry.topic == EVENTS:
+                self._show(entry.value)
         deaths = read_deaths(self._deaths)
         for death in deaths[self._deaths_shown :]:
             self._say(death.sentence())
         self._deaths_shown = len(deaths)
 
-    def _show(self, line: bytes) -> None:
+    def _show(self, record: Mapping[str, object]) -> None:
         try:
-            record = json.loads(line)
-            event = read_event(record if isinstance(record, dict) else {})
+            event = read_event(record)
         except ValueError:
-            return  # the report names unreadable lines
+            return  # the report names it
         if self._begun_s is None:
             self._begun_s = event.stamp_s
         if self._lift_off_s is None and isinstance(event, TransitionEvent) and (event.resource, event.from_state) == DEPARTURE:

@@ -64,6 +64,7 @@ class RunSpec:
     ``world`` is a world file; ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at
     most, 0 unlimited. ``sensors``: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors, "" where
     real drivers run elsewhere. ``imperfections`` of the simulated autopilot and sensors.
+    ``record``: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
     """
 
@@ -81,6 +82,7 @@ class RunSpec:
     sensors: str = ""
     imperfections: str = "off"
     mock: bool = False
+    record: str = "functional"
     behaviour: tuple[str, ...] = ()
 
     @property
@@ -110,6 +112,8 @@ class RunSpec:
             f"world:={self.world}",
             f"mavlink_port:={self.mavlink_port}",
         ]
+        if self.record != "functional":
+            arguments.append(f"record:={self.record}")
         if self.imperfections != "off":
             arguments.append(f"imperfections:={self.imperfections}")
         if scenario.faults:

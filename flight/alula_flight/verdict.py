@@ -16,6 +16,7 @@ MEANING = {
     "not_started": "the mission could not start",
     "running": "the mission's process ended before the mission did",
 }
+BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
 PICTURES = ("timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
 
 
@@ -27,6 +28,15 @@ def number(value: float | None, unit: str, digits: int = 2) -> str:
 def landed(summary: Mapping[str, Any]) -> str:
     """Return whether it came down, in words; nothing is said of what is not known to have flown."""
     return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
+
+
+def outcome_words(summary: Mapping[str, Any]) -> str:
+    """Return how the mission ended, in words; where its files are lost, by the exit code of its process."""
+    outcome = summary.get("outcome")
+    code = summary.get("mission_exit")
+    if outcome is None and code in BY_EXIT_CODE:
+        return f"{MEANING[BY_EXIT_CODE[code]]} (by its exit code; its own account is lost)"
+    return MEANING.get(str(outcome), f"outcome: {outcome}")
 
 
 def flight_lines(summary: Mapping[str, Any]) -> list[str]:
@@ -67,9 +77,8 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
 
 def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
     """Return the verdict, a line each."""
-    outcome = summary.get("outcome")
     reason = summary.get("reason")
-    lines = ["", MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")]
+    lines = ["", outcome_words(summary) + (f": {reason}" if reason else "")]
     lines += [f"  {death.sentence()}" for death in died]
     lines += mock_lines(summary) if summary.get("mock") else flight_lines(summary)
     recovery = summary.get("recovery") or {}

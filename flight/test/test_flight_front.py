@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -14,6 +13,8 @@ import pytest
 
 from alula_common.network import NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
+from alula_common.record import EVENTS, RecordWriter
+from alula_common.record import FILE as RECORD
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
@@ -210,17 +211,21 @@ def test_deaths_are_written_at_once_and_a_cut_line_is_left_out(tmp_path):
     assert "started again" in death.sentence()
 
 
-def test_live_lines_wait_for_whole_lines(tmp_path):
+def test_live_lines_wait_for_whole_events(tmp_path):
     said: list[str] = []
     live = LiveEvents(tmp_path, said.append)
     live.show_new()
-    events = tmp_path / "events.jsonl"
-    whole = '{"stamp_s": 3.0, "skillset": "navigation", "kind": "EXECUTION", "skill": "goto", "id": "1", "state": "RUNNING"}\n'
-    events.write_text(whole + whole[:20])
+    path = tmp_path / RECORD
+    event = {"stamp_s": 3.0, "skillset": "navigation", "kind": "EXECUTION", "skill": "goto", "id": "1", "state": "RUNNING"}
+    writer = RecordWriter(path)
+    writer.write(EVENTS, 0, event)
+    one = path.stat().st_size
+    writer.write(EVENTS, 0, event)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: one + 20])
     live.show_new()
     assert len(said) == 1
-    with events.open("a") as file:
-        file.write(whole[20:])
+    path.write_bytes(whole)
     live.show_new()
     assert len(said) == 2
     assert "navigation.goto" in said[0]
@@ -233,7 +238,9 @@ def test_live_lines_count_from_lift_off_on_any_clock(tmp_path):
     record = {"skillset": "navigation", "kind": "EXECUTION", "skill": "takeoff", "id": "1", "state": "RUNNING"}
     change = {"skillset": "navigation", "kind": "TRANSITION", "resource": "flight_status", "from_state": "ON_GROUND", "to_state": "IN_AIR"}
     stamps = (0.0, record), (2.5, record), (5.0, change), (35.0, record)
-    (tmp_path / "events.jsonl").write_text("".join(json.dumps({**what, "stamp_s": epoch_s + s, "cause": ""}) + "\n" for s, what in stamps))
+    writer = RecordWriter(tmp_path / RECORD)
+    for stamp_s, what in stamps:
+        writer.write(EVENTS, 0, {**what, "stamp_s": epoch_s + stamp_s, "cause": ""})
     live.show_new()
     assert [line.partition("  navigation")[0] for line in said] == ["start+ 0.0 s", "start+ 2.5 s", "t=   0.0 s", "t=  30.0 s"]
 

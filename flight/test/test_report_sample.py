@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -16,6 +17,8 @@ from geometry_msgs.msg import PoseStamped
 from numpy.typing import NDArray
 from std_msgs.msg import String
 from uav_msgs.msg import GuidanceState, MappingState
+
+from alula_common.record import EVENTS, RecordWriter
 
 Floats = NDArray[np.float64]
 Box = tuple[Sequence[float], Sequence[float]]
@@ -129,13 +132,18 @@ class Log:
         skillset, resource = name.split(".")
         self._add(t_s, skillset, "TRANSITION", resource=resource, from_state=source, to_state=target, cause=cause)
 
-    def write(self, path: Path, *, tail: str = "") -> None:
-        """Write ``events.jsonl`` in the order of time; ``tail`` is a last line without its end."""
+    def write(self, path: Path, *, until_s: float = math.inf) -> None:
+        """Write ``skills.mcap`` in the order of time, as a mission that died at ``until_s`` leaves it."""
         ordered = sorted(self.events, key=lambda event: event["stamp_s"])
         numbers: dict[str, int] = {}
         for event in ordered:
             event["sequence"] = numbers[event["skillset"]] = numbers.get(event["skillset"], 0) + 1
-        path.write_text("".join(json.dumps(event) + "\n" for event in ordered) + tail, encoding="utf-8")
+        writer = RecordWriter(path)
+        for event in ordered:
+            if event["stamp_s"] < until_s:
+                writer.write(EVENTS, round(event["stamp_s"] * 1e9), event)
+        if until_s == math.inf:
+            writer.close()
 
 
 def failing_flight() -> Log:

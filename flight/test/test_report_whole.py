@@ -14,6 +14,7 @@ import matplotlib.image as mpl_image
 import numpy as np
 import pytest
 
+from alula_common.record import FILE as RECORD
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.making import make_report
 from alula_flight.verdict import verdict_lines
@@ -71,7 +72,7 @@ def guidance(t_s: np.ndarray) -> list[dict[str, Any]]:
 def lay_out(folder: Path) -> None:
     """Write what a flight leaves behind."""
     folder.mkdir(exist_ok=True)
-    failing_flight().write(folder / "events.jsonl")
+    failing_flight().write(folder / RECORD)
     write_world(folder / "world.ply", [WALL], ([-20, -25], [60, 35]))
     xs, ys = np.meshgrid(np.arange(-20, 60, 0.2), np.arange(-25, 35, 0.2))
     ground = np.stack([xs.ravel(), ys.ravel(), np.full(xs.size, 0.04)], axis=1)
@@ -233,14 +234,14 @@ def test_an_empty_folder(tmp_path):
     assert {key for key, value in summary.items() if value is not None} == known
     assert summary["skills"] == summary["resources"] == []
     assert set(summary["map"].values()) == {None}
-    for name in ("events.jsonl", "functional.bag", "world.ply", "map.ply", "route.json", "mission.json", "bridge.json"):
+    for name in (RECORD, "functional.bag", "world.ply", "map.ply", "route.json", "mission.json", "bridge.json"):
         assert [problem for problem in summary["problems"] if name in problem], name
     assert {path.name for path in tmp_path.iterdir()} == OUTPUTS
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"{", b"[]", b"null", b'"text"'], ids=repr)
 def test_garbage_everywhere(tmp_path, content):
-    for name in ("events.jsonl", "mission.json", "route.json", "functional.bag", "bridge.json", "map.ply", "world.ply"):
+    for name in (RECORD, "mission.json", "route.json", "functional.bag", "bridge.json", "map.ply", "world.ply"):
         (tmp_path / name).write_bytes(content)
     summary = make_report(facts(tmp_path))
     assert summary["outcome"] is None
@@ -249,13 +250,13 @@ def test_garbage_everywhere(tmp_path, content):
     assert json.loads((tmp_path / "summary.json").read_text())["problems"] == summary["problems"]
 
 
-@pytest.mark.parametrize("missing", ["events.jsonl", "mission.json", "route.json", "functional.bag", "bridge.json", "map.ply", "world.ply"])
+@pytest.mark.parametrize("missing", [RECORD, "mission.json", "route.json", "functional.bag", "bridge.json", "map.ply", "world.ply"])
 def test_each_file_may_be_missing(folder, missing):
     (folder / missing).unlink()
     summary = make_report(facts(folder))
     assert any(missing in problem for problem in summary["problems"])
     unknown = {
-        "events.jsonl": summary["skills"] == [],
+        RECORD: summary["skills"] == [],
         "mission.json": summary["outcome"] is None,
         "route.json": summary["map"]["coverage"] is None and summary["map"]["rmse_m"] is not None,
         "functional.bag": summary["min_clearance_m"] is None and summary["lift_off"]["source"] == "flight_status",
@@ -278,10 +279,7 @@ def test_a_crash_in_flight(folder):
     told = guidance(t_s[half])
     write_bag(folder / "functional.bag.active", poses=(t_s[half], position[half]), states=[state], guidance=told, cut_at=10**9)
     (folder / "mission.json").write_text('{"outcome": "running", "reason": ""}')
-    lines = (folder / "events.jsonl").read_text().splitlines(keepends=True)
-    (folder / "events.jsonl").write_text(
-        "".join(line for line in lines if json.loads(line)["stamp_s"] < LIFT_OFF_S + 40.0) + '{"stamp_s": 52'
-    )
+    failing_flight().write(folder / RECORD, until_s=LIFT_OFF_S + 40.0)
     summary = make_report(facts(folder, mission_exit=None))
     assert (summary["outcome"], summary["reason"], summary["landed"]) == ("running", None, False)
     assert summary["duration_s"] == pytest.approx(40.0, abs=1.0)
@@ -299,7 +297,7 @@ def test_nominal_has_no_recovery(tmp_path):
     log.change(0.0, "navigation.flight_status", "ON_GROUND", "IN_AIR")
     log.skill(1.0, "navigation.goto_straight", "s1", "REQUESTED", inputs={"speed": math.nan})
     log.skill(1.0, "navigation.goto_straight", "s1", "NOT_READY", result="in_air", message="flight_status is ON_GROUND")
-    log.write(tmp_path / "events.jsonl")
+    log.write(tmp_path / RECORD)
     summary = make_report(facts(tmp_path, faults=[]))
     assert summary["recovery"] is None
     assert json.loads((tmp_path / "summary.json").read_text())["skills"][0]["inputs"] == {"speed": None}
@@ -309,7 +307,7 @@ def test_nominal_has_no_recovery(tmp_path):
 def test_nothing_is_said_to_have_landed_that_never_flew(folder):
     t_s, position = poses()
     ground = position * 0.0
-    (folder / "events.jsonl").write_text("")
+    Log().write(folder / RECORD)
     states = [{"t_s": t, "reference": "idle", "landed_state": 1} for t in t_s]
     state = {"lift_off_s": None, "collisions": 0, "min_clearance_m": None, "distance_m": 0.0, "faults": []}
     write_bag(folder / "functional.bag", poses=(t_s, ground), states=[state], guidance=states)

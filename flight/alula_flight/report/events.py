@@ -1,17 +1,17 @@
 """From the events of all skillsets to executions of skills and transitions of resources.
 
-Each line of ``events.jsonl`` is the record of an event (see ``skill_runtime.core.events``). Stamps become seconds since lift-off
-only when they are shown: here they are absolute seconds of mission clock.
+Each message on ``/events`` of ``skills.mcap`` is the record of an event (see ``skill_runtime.core.events``). Stamps become seconds
+since lift-off only when they are shown: here they are absolute seconds of mission clock.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from alula_flight.report.files import Problems, ReportError, mapping
+from alula_common.record import EVENTS, RecordFollower
+from alula_flight.report.files import Problems, mapping
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
 
@@ -46,30 +46,24 @@ class History:
         return [execution for execution in self.executions if execution.skill == skill]
 
 
-def parse_event(line: str) -> EngineEvent:
-    """Read one line; raise ReportError when it is none of an event."""
-    try:
-        return read_event(mapping(json.loads(line)))
-    except ValueError as error:
-        raise ReportError(str(error)) from error
-
-
 def read_events(path: Path, problems: Problems) -> list[EngineEvent]:
-    """Read ``events.jsonl``; a missing file, bad lines and lost events are noted as problems."""
+    """Read ``skills.mcap``; a missing file, a missing end, what is no event and lost events are noted as problems.
+
+    Raises:
+        RecordError: the file is no record.
+    """
     if not path.exists():
         problems.note(f"{path.name} is missing: nothing is known of skills and resources")
         return []
+    record = RecordFollower(path)
     events: list[EngineEvent] = []
-    lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
-    for number, line in enumerate(lines, start=1):
-        if not line.strip():
-            continue
+    for number, entry in enumerate((entry for entry in record.poll() if entry.topic == EVENTS), start=1):
         try:
-            events.append(parse_event(line))
-        except ReportError as error:
-            # The writer ends each event with a newline: whatever stands behind the last one was cut off.
-            what = "was cut off" if number == len(lines) else f"is no event ({error})"
-            problems.note(f"{path.name}: line {number} {what}")
+            events.append(read_event(entry.value))
+        except ValueError as error:
+            problems.note(f"{path.name}: event {number} is no event ({error})")
+    if not record.ended:
+        problems.note(f"{path.name} was cut off{f': {record.broken}' if record.broken else ''}")
     ordered = in_order(events)
     for sentence in gaps(ordered):
         problems.note(f"{path.name}: {sentence}")

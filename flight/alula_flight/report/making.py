@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula_common.files import write_aside, write_json
+from alula_common.record import FILE as RECORD
 from alula_common.scenarios import load_scenario
 from alula_flight.report.events import History, fold, read_events
 from alula_flight.report.facts import RunFacts
@@ -40,17 +41,15 @@ class Truth:
 def make_report(facts: RunFacts) -> Summary:
     """Make ``timeline.json``, ``timeline.svg``, ``map.png`` and ``summary.json`` in the run's folder and return the summary.
 
-    Whatever is missing, cut off or makes no sense is named in the summary's ``problems``; numbers that depend on it are None.
-
-    Raises:
-        OSError: the summary itself can't be written.
+    Whatever is missing, cut off, makes no sense or can't be written is named in the summary's ``problems``; numbers that depend on it
+    are None.
     """
     folder, problems, scenario = facts.out_dir, Problems(), load_scenario(facts.scenario)
 
     # 1. What happened in the skillsets, and what the functional layer recorded.
     history, recording, mock = History(), Recording(), None
-    with problems.survive("events.jsonl"):
-        history = fold(read_events(folder / "events.jsonl", problems), problems)
+    with problems.survive(RECORD):
+        history = fold(read_events(folder / RECORD, problems), problems)
     if facts.mock:
         recording, mock = read_mock(folder, problems)
     else:
@@ -96,7 +95,10 @@ def make_report(facts: RunFacts) -> Summary:
         video=video.summary,
         problems=problems,
     )
-    write_json(folder / "summary.json", summary)
+    try:
+        write_json(folder / "summary.json", summary)
+    except OSError as error:
+        summary["problems"].append(f"summary.json could not be written: {error.strerror or error}")
     return summary
 
 

@@ -8,7 +8,7 @@ from alula_common.faults import parse_fault
 from alula_common.scenarios import load_scenario
 from alula_flight.report.events import History
 from alula_flight.report.facts import Death, RunFacts
-from alula_flight.report.files import Problems, ReportError, mapping, read_json
+from alula_flight.report.files import Problems, ReportError, mapping, read_json, sequence
 from alula_flight.report.map_quality import MapQuality
 from alula_flight.report.mocked import MockSummary
 from alula_flight.report.phases import Phases, flight_status
@@ -117,6 +117,8 @@ def read_outcome(facts: RunFacts, problems: Problems) -> tuple[str | None, str |
     with problems.survive("mission.json"):
         values = mapping(read_json(facts.out_dir / "mission.json"))
         outcome, reason = (str(values[name]) if values.get(name) is not None else None for name in ("outcome", "reason"))
+        for problem in sequence(values.get("problems")):
+            problems.note(str(problem))
         if outcome not in OUTCOMES:
             problems.note(f"mission.json names no outcome that is known: {outcome}")
             outcome = None

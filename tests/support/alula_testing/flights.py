@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
@@ -16,6 +15,7 @@ from typing import Any
 import pytest
 
 from alula_common.processes import command_line, end_run, node_name, processes_of_run
+from alula_common.record import EVENTS, FILE, RecordFollower
 
 ALULA_ROOT = Path(__file__).resolve().parents[3]
 FLIGHT_LIMIT_S = 900.0  # wall clock; several times what a flight takes, so that a hang fails and a slow machine does not
@@ -39,15 +39,8 @@ class Flight:
         return dict(json.loads((self.out / "summary.json").read_text(encoding="utf-8")))
 
     def events(self) -> list[dict[str, Any]]:
-        """All whole lines of events.jsonl so far."""
-        path = self.out / "events.jsonl"
-        if not path.exists():
-            return []
-        found = []
-        for line in path.read_text(encoding="utf-8").splitlines():
-            with contextlib.suppress(json.JSONDecodeError):
-                found.append(json.loads(line))
-        return found
+        """All events of the record so far."""
+        return [dict(entry.value) for entry in RecordFollower(self.out / FILE).poll() if entry.topic == EVENTS]
 
     def processes(self) -> dict[str, int]:
         """Map each living node of the run (by the name that roslaunch gave it) and the supervisor to its process id."""

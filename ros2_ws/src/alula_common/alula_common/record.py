@@ -1,7 +1,8 @@
 """The record of a run's decisions, ``skills.mcap``: messages of JSON on named topics, in the order in which they came.
 
 The file is an MCAP without chunks (https://mcap.dev/spec): each message is on the disk when ``write`` returns, so a crash loses none,
-and a reader can follow the file while it grows. Foxglove opens it. Stamps are nanoseconds of mission clock.
+and a reader can follow the file while it grows. Foxglove opens it. Stamps are nanoseconds of mission clock. The order of the file is
+the order in which the mission came to know: an event is stamped with when it happened, which may be before what stands above it.
 """
 
 from __future__ import annotations
@@ -34,10 +35,15 @@ TREE = "/tree"
 """The whole tree, whenever a node changed: the nested view that ``tree.json`` has at the end."""
 BLACKBOARD = "/blackboard"
 """Values of the mission's blackboard that changed, by name."""
+TICKS = "/ticks"
+"""Each tick of the tree, before what it decides: ``{unmet}``, what keeps the mission from starting; empty once it has started."""
+REPORTS = "/reports"
+"""What the tree was told of its executions: ``{skillset, skill, id, state, progress, result, message, outputs}``, at each change."""
 OPERATOR = "/operator"
 """What the operator did: ``{command, by}`` and what belongs to it."""
 DATA = "/data"
-"""Each sample of data that a skillset got: ``{skillset, data, value, stamp_s}``."""
+"""Samples of data that a skillset got: ``{skillset, data, value, stamp_s}``; each where the model's conditions ask for the data, else
+one a second."""
 
 MAGIC = b"\x89MCAP0\r\n"
 MAX_RECORD_BYTES = 1 << 28

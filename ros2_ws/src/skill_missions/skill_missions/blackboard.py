@@ -6,6 +6,7 @@ typed, and each mission has its own: derive from it to add what the leaves of a 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from skill_missions.pending import PendingInterrupts
@@ -44,6 +45,10 @@ class Blackboard:
     def now_s(self) -> float:
         """Mission clock."""
         return self.clock_ns() / NANOSECONDS
+
+    def values(self) -> Mapping[str, object]:
+        """Return what is on it by name, as ``json`` can write it; what derives from this adds its own."""
+        return {"failures": [failure.sentence() for failure in self.failures], "reason": self.reason}
 
     def note_reason(self) -> None:
         """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""

@@ -79,7 +79,7 @@ class Director:
         self.end: End | None = None
         self.start_s: float | None = None
         self._mission = mission
-        self._blackboard = blackboard
+        self.blackboard = blackboard
         self._start_timeout_s = start_timeout_s
         self._wait_until_s: float | None = None
         self._watch = TreeWatch(mission.root)
@@ -109,6 +109,10 @@ class Director:
         self._phase = self._halt
         return "the robot stops where it is"
 
+    def unmet(self) -> list[str]:
+        """Return what keeps the mission from starting, in words; nothing once it has started, or is over."""
+        return self._mission.unmet_conditions() if self.start_s is None and self.end is None else []
+
     def remember(self) -> None:
         """Take note of how each node is; for those who look at the tree later only, instead of ``view`` after each step."""
         self._watch.remember()
@@ -126,7 +130,7 @@ class Director:
     # --- phases ------------------------------------------------------------------------------------------------------
 
     def _wait(self) -> None:
-        unmet, now_s = self._mission.unmet_conditions(), self._blackboard.now_s
+        unmet, now_s = self._mission.unmet_conditions(), self.blackboard.now_s
         if self._wait_until_s is None and now_s > 0.0:  # zero: the mission clock was not heard yet
             self._wait_until_s = now_s + self._start_timeout_s
         if not unmet:
@@ -148,14 +152,14 @@ class Director:
 
     def _settle(self) -> None:
         """Wait until what was interrupted has ended; the registry bounds this."""
-        if not self._blackboard.pending.names():
+        if not self.blackboard.pending.names():
             self.end = self._judge()
 
     def _judge(self) -> End:
         if self._stop is not None:
             return End(Outcome.ABORTED, self._abort_reason)
         if self._mission.root.status is not Status.SUCCESS:
-            return End(Outcome.GIVEN_UP, self._blackboard.reason)
+            return End(Outcome.GIVEN_UP, self.blackboard.reason)
         if self._mission.degraded:
-            return End(Outcome.DEGRADED, "; then ".join(failure.sentence() for failure in self._blackboard.failures))
+            return End(Outcome.DEGRADED, "; then ".join(failure.sentence() for failure in self.blackboard.failures))
         return End(Outcome.ACCOMPLISHED)

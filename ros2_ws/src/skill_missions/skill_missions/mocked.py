@@ -10,7 +10,7 @@ from alula_common.faults import FaultRequest
 from skill_missions.director import Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
-from skill_missions.skillset import WakingClient
+from skill_missions.skillset import MissionClient
 from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent
 from skill_runtime.local import LocalWorld
@@ -56,11 +56,11 @@ class MockedMission:
         for fault in faults:
             self.play.fail(fault)
         self._tick_period_s = tick_period_s
-        self._record = None if out is None else MissionRecord(out, plan)
         self._due = False
         self._abort_reasons: list[str] = []
-        clients = {skillset.name: WakingClient(self.world.client(skillset.name), self._wake) for skillset in skillsets}
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
+        record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
+        clients = {skillset.name: MissionClient(self.world.client(skillset.name), self._wake, record) for skillset in skillsets}
         mission, blackboard = plan.make(clients, clock_ns, plan.parameters)
         self.director = Director(mission, blackboard)
         self.world.on_event(self._on_event)
@@ -118,16 +118,26 @@ class MockedMission:
 
     def _tick(self) -> None:
         self._due = False
+        if self._record is not None:
+            self._record.tick(self.director)
         if self._abort_reasons:
-            self.director.abort(self._abort_reasons.pop())
+            self._abort_now(self._abort_reasons.pop())
         try:
             self.director.step()
         except Exception as error:  # noqa: BLE001 - as over ROS 2: whatever breaks in a tree, the robot has to come to rest
             self.director.abort(f"the tree raised {type(error).__name__}: {error}")
-        self.director.remember()
+        if self._record is None:
+            self.director.remember()
+        else:
+            self._record.outcome_of_tick(self.director)
+
+    def _abort_now(self, reason: str) -> None:
+        if self._record is not None:
+            self._record.abort(reason)
+        self.director.abort(reason)
 
     def _on_event(self, _skillset: str, event: EngineEvent) -> None:
         self.events.append(event)
         if self._record is not None:
-            self._record.note(event)
+            self._record.event(event)
         self._wake()

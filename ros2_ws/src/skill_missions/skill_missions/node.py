@@ -25,7 +25,7 @@ from std_srvs.srv import Trigger
 from skill_missions.director import EXIT_CODES, START_TIMEOUT_S, Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
-from skill_missions.skillset import WakingClient
+from skill_missions.skillset import MissionClient
 from skill_runtime.codecs import event_of
 from skill_runtime.ros2 import SkillsetClient
 
@@ -44,10 +44,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self, out: Path, plan: MissionPlan) -> None:
         super().__init__("mission")
         self.due = False
-        self.record = MissionRecord(out, plan)
         self._plan = plan
+        self._values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
+        self.record = MissionRecord(out, plan, self._clock_ns, self._values)
         self._view_json = ""
-        self._skillsets = {name: WakingClient(SkillsetClient(self, name), self.wake) for name in plan.skillsets}
+        self._skillsets = {name: MissionClient(SkillsetClient(self, name), self.wake, self.record) for name in plan.skillsets}
         self.director = self._make_director()
         self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", 10)
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
@@ -59,7 +60,10 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     @property
     def now_s(self) -> float:
         """Mission clock."""
-        return int(self.get_clock().now().nanoseconds) / 1e9
+        return self._clock_ns() / 1e9
+
+    def _clock_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
 
     def wake(self) -> None:
         """Have the tree ticked in this turn of the main loop; several events in one turn make one tick."""
@@ -68,6 +72,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def tick(self) -> None:
         """Do one step and tell the world."""
         self.due = False
+        self.record.tick(self.director)
         try:
             self.director.step()
         except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
@@ -75,10 +80,12 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self.director.abort(f"the tree raised {type(error).__name__}: {error}")
         stamp = self.get_clock().now().to_msg()
         self._heartbeat.publish(Header(stamp=stamp, frame_id="mission"))
+        self.record.outcome_of_tick(self.director)
         self._publish_tree()
 
     def abort(self, reason: str) -> str:
         """Stop what runs and bring the robot to rest where it is."""
+        self.record.abort(reason)
         answer = self.director.abort(reason)
         self.get_logger().warning(f"{reason}: {answer}")
         self.wake()
@@ -88,11 +95,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Write what is left to write."""
         self._publish_tree()
         self.record.finish(end, self.director, self.now_s)
+        for problem in self.record.problems:
+            self.get_logger().error(problem)
 
     def _make_director(self) -> Director:
-        clock_ns = lambda: int(self.get_clock().now().nanoseconds)  # noqa: E731
-        values = {name: self._parameter(name, value) for name, value in self._plan.parameters.items()}
-        mission, blackboard = self._plan.make(self._skillsets, clock_ns, values)
+        mission, blackboard = self._plan.make(self._skillsets, self._clock_ns, self._values)
         return Director(mission, blackboard, start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S))
 
     def _parameter(self, name: str, default: float) -> Any:
@@ -105,7 +112,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._tree.publish(String(data=view_json))
 
     def _on_event(self, event: Event) -> None:
-        self.record.note(event_of(event))
+        self.record.event(event_of(event))
         self.wake()
 
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -16,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from alula_common.record import EVENTS, FILE, RecordFollower
 from alula_common.runs import LATEST, NoRunError, find_run, load_run
 from alula_common.signals import Interrupts, on_end_signal
 from alula_common.suggestions import nearest
@@ -172,11 +173,9 @@ def events(clients: Clients, options: argparse.Namespace, out: Out) -> int:
 
 def recorded_events(folder: Path, options: argparse.Namespace, out: Out) -> int:
     """Show the events that a run has recorded so far."""
-    path = folder / "events.jsonl"
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        record = json.loads(line)
-        if options.skillset in {None, record["skillset"]}:
-            _tell(record, out)
+    for entry in RecordFollower(folder / FILE).poll():
+        if entry.topic == EVENTS and options.skillset in {None, entry.value["skillset"]}:
+            _tell(entry.value, out)
     return DONE
 
 

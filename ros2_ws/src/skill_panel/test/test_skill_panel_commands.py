@@ -9,6 +9,7 @@ from typing import Any
 import navigation_managers.model as navigation
 import pytest
 
+from alula_common.record import EVENTS, FILE, RecordWriter
 from skill_panel.commands import COMMANDS, CommandError, main, parse
 from skill_runtime.mock import load_behaviour, mock_world
 
@@ -85,7 +86,9 @@ def test_events_of_a_run_are_read_from_its_folder(tmp_path: Path, capsys: pytest
     (tmp_path / "run.json").write_text('{"domain": 5}')
     record = {"stamp_s": 3.5, "sequence": 1, "skillset": "navigation", "kind": "TRANSITION"}
     record |= {"resource": "flight_status", "from_state": "ON_GROUND", "to_state": "IN_AIR", "cause": "extern"}
-    (tmp_path / "events.jsonl").write_text(json.dumps(record) + "\n")
+    writer = RecordWriter(tmp_path / FILE)
+    writer.write(EVENTS, 3_500_000_000, record)
+    writer.close()
     assert main(["events", "--run", str(tmp_path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == record
     assert main(["events", "--run", str(tmp_path)]) == 0

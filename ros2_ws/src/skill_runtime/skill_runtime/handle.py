@@ -101,6 +101,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         self._interrupt = interrupt
         self._pause = pause
         self._listeners: list[Callable[[Report[OutputsT]], None]] = []
+        self._request_listeners: list[Callable[[str], None]] = []
 
     @property
     def done(self) -> bool:
@@ -117,6 +118,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
     def interrupt(self) -> None:
         """Ask for the end; returns at once, without effect when it has ended already."""
         if not self.done and self._interrupt is not None:
+            self._requested("interrupt")
             self._interrupt()
 
     def pause(self) -> Pending[str]:
@@ -129,6 +131,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
 
     def _set_paused(self, *, paused: bool) -> Pending[str]:
         if not self.done and self._pause is not None:
+            self._requested("pause" if paused else "resume")
             return self._pause(paused)
         refused: Pending[str] = Pending(self._host)
         refused.resolve(f"{self.skill} has ended" if self.done else f"{self.skill} can't be paused")
@@ -148,6 +151,11 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         """Have ``callback(report)`` called at each change of state, progress or outputs, on the thread that brings it."""
         with self._lock:
             self._listeners.append(callback)
+
+    def on_request(self, callback: Callable[[str], None]) -> None:
+        """Have ``callback(kind)`` called when something is asked of the execution: ``interrupt``, ``pause`` or ``resume``."""
+        with self._lock:
+            self._request_listeners.append(callback)
 
     def reports(self) -> Reports[OutputsT]:
         """Follow the execution from now to its end, in a ``for`` or an ``async for``."""
@@ -217,6 +225,12 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
     def fail(self, message: str) -> None:
         """End as FAILED for a reason on the client's side."""
         self.end(ExecutionState.FAILED, "", message)
+
+    def _requested(self, kind: str) -> None:
+        with self._lock:
+            listeners = list(self._request_listeners)
+        for listener in listeners:
+            listener(kind)
 
     def _tell(self) -> None:
         with self._lock:

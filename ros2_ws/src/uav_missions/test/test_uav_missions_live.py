@@ -14,6 +14,8 @@ pytest.importorskip("rclpy")
 
 from uav_skills_rig import Rig
 
+from alula_common.record import EVENTS, read_record
+
 CLOCKS_APART_S = 0.1
 """Managers under load stamp by a clock message that is some ticks old."""
 ROUTE = {"route": [[0.0, 0.0, 3.0], [8.0, 0.0, 3.0], [8.0, 6.0, 3.0]]}
@@ -41,7 +43,7 @@ class Mission:
         return json.loads((self.out / name).read_text())
 
     def events(self) -> list[dict]:
-        return [json.loads(line) for line in (self.out / "events.jsonl").read_text().splitlines()]
+        return [dict(entry.value) for entry in read_record(self.out) if entry.topic == EVENTS]
 
     def executions(self, since: int = 0) -> list[tuple[str, str]]:
         return [(event["skill"], event["result"] or event["state"]) for event in self.events()[since:] if event["kind"] == "EXECUTION"]

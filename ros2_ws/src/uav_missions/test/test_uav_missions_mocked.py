@@ -6,6 +6,7 @@ import importlib
 import json
 import os
 import random
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from alula_common.faults import FaultRequest
+from alula_common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
 from skill_missions.director import Outcome
 from skill_missions.mocked import MockedMission
 from skill_runtime.core import ExecutionEvent
@@ -153,6 +155,21 @@ def test_a_campaign_always_comes_to_an_end_and_down():
     assert min(outcomes.values()) > 5
 
 
+# What a mapping flight asks for whose sensors both fail on the second leg.
+WITHOUT_EYES = [
+    "start takeoff",
+    "start lidar_mapping",
+    "start zed_depthmap",
+    "start goto_straight",
+    "start goto_straight",
+    "interrupt goto_straight",
+    "start lidar_depthmap",
+    "interrupt lidar_mapping",
+    "start hover",
+    "start land",
+]
+
+
 def arguments(out: Path, *more: str) -> list[str]:
     route, behaviour = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml", ALULA_ROOT / "skillsets/uav/mock.yaml"
     return ["--out", str(out), "--route", str(route), "--behaviour", str(behaviour), *more]
@@ -162,7 +179,8 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
     assert mock_flight.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
     mission = json.loads((tmp_path / "run/mission.json").read_text())
     assert (mission["outcome"], mission["waypoints_reached"]) == ("given_up", 1)
-    events = [json.loads(line) for line in (tmp_path / "run/events.jsonl").read_text().splitlines()]
+    record = read_record(tmp_path / "run")
+    events = [entry.value for entry in record if entry.topic == EVENTS]
     for skillset in ("navigation", "perception", "mapping"):
         numbers = [event["sequence"] for event in events if event["skillset"] == skillset]
         assert numbers == list(range(1, len(numbers) + 1))
@@ -170,7 +188,38 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
     assert [(fault["sensor"], round(fault["t_s"] - mock["lift_off_s"], 2)) for fault in mock["faults"]] == [("zed", 8.0), ("lidar", 8.0)]
     assert mock["notes"] == []
     assert (tmp_path / "run/tree.svg").read_text().startswith("<svg")
-    assert json.loads((tmp_path / "run/tree.json").read_text())["status"] == "FAILURE"
+    tree = json.loads((tmp_path / "run/tree.json").read_text())
+    assert tree["status"] == "FAILURE"
+    assert [entry.value for entry in record if entry.topic == TREE][-1] == tree
+    assert [entry.value["outcome"] for entry in record if entry.topic == MISSION] == ["running", "given_up"]
+    assert [entry.value for entry in record if entry.topic == MISSION][-1] == mission
+    decisions = [entry.value for entry in record if entry.topic == DECISIONS]
+    assert [decision["number"] for decision in decisions] == list(range(1, len(decisions) + 1))
+    assert [f"{decision['kind']} {decision['skill']}" for decision in decisions] == WITHOUT_EYES
+    assert decisions[0]["inputs"] == {"height": 3.0, "speed": 2.0}
+    requested = [event["id"] for event in events if event.get("state") == "REQUESTED"]
+    assert [decision["id"] for decision in decisions if decision["kind"] == "start"] == requested
+    ends = {entry.value["id"]: entry.value["state"] for entry in record if entry.topic == REPORTS}
+    assert ends == {event["id"]: event["state"] for event in events if event["kind"] == "EXECUTION"}
+    assert {name for entry in record if entry.topic == BLACKBOARD for name in entry.value} >= {"failures", "reason", "waypoint"}
+
+
+def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run/skills.mcap").symlink_to("/dev/full")
+    assert mock_flight.main(arguments(tmp_path / "run")) == 0
+    mission = json.loads((tmp_path / "run/mission.json").read_text())
+    assert mission["outcome"] == "accomplished"
+    assert mission["problems"] == ["skills.mcap ends early: No space left on device"]
+
+
+def test_a_folder_that_goes_away_in_flight_does_not_end_it(tmp_path):
+    out = tmp_path / "run"
+    out.mkdir()
+    mission = MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(Route(ROUTE)), out=out)
+    mission.world.clock.after(20.0, lambda: shutil.rmtree(out))
+    assert mission.run().outcome is Outcome.ACCOMPLISHED
+    assert not out.exists()
 
 
 def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):

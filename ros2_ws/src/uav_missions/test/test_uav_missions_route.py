@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skill_missions.files import EventLog, write_json
-from skill_runtime.core.events import TransitionEvent
 from uav_missions.route import Route, RouteError, load_route, wrap_rad
 
 
@@ -67,20 +65,3 @@ def test_a_route_that_can_not_be_used_is_named_with_its_place(tmp_path, text, co
 def test_a_missing_route_file_is_named(tmp_path):
     with pytest.raises(RouteError, match="nowhere"):
         load_route(tmp_path / "nowhere.yaml")
-
-
-def test_json_files_are_replaced_as_a_whole_and_nothing_is_left_beside(tmp_path):
-    path = tmp_path / "mission.json"
-    write_json(path, {"outcome": "running"})
-    write_json(path, {"outcome": "accomplished"})
-    assert json.loads(path.read_text()) == {"outcome": "accomplished"}
-    assert [file.name for file in tmp_path.iterdir()] == ["mission.json"]
-
-
-def test_each_event_is_on_disk_at_once(tmp_path):
-    log = EventLog(tmp_path / "events.jsonl")
-    for number in range(3):
-        log.add(TransitionEvent(number, 0, "door", "OPEN", "CLOSED", "extern", "house"))
-        lines = (tmp_path / "events.jsonl").read_text().splitlines()
-        assert [json.loads(line)["sequence"] for line in lines] == list(range(number + 1))
-    log.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from py_trees.behaviour import Behaviour
@@ -18,6 +19,12 @@ class RouteBlackboard(Blackboard):
     route: Route
     waypoint: Waypoint | None = None
     aligned_yaw_rad: float | None = None
+
+    def values(self) -> Mapping[str, object]:
+        """Return what is on it by name."""
+        waypoint = None if self.waypoint is None else list(self.waypoint)
+        own = {"waypoint": waypoint, "waypoints_reached": self.route.reached, "aligned_yaw_rad": self.aligned_yaw_rad}
+        return {**super().values(), **own}
 
 
 class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped

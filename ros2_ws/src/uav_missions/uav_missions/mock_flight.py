@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula_common.faults import FaultError, parse_fault
+from alula_common.files import write_json
 from alula_common.scenarios import ScenarioError, load_scenario
 from skill_missions.director import EXIT_CODES, End, Outcome
-from skill_missions.files import write_json
 from skill_missions.mocked import MockedMission
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
@@ -86,7 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
     end: End = mission.run()
-    write_account(options.out / "mock.json", mission, mission.departure_s)
+    try:
+        write_account(options.out / "mock.json", mission, mission.departure_s)
+    except OSError as error:
+        sys.stderr.write(f"mock.json could not be written: {error.strerror}\n")
     return EXIT_CODES[end.outcome]
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from alula_common.files import write_json
 from alula_common.scenarios import Scenario
 from skill_missions.director import Mission
-from skill_missions.files import write_json
 from skill_missions.pending import PendingInterrupts
 from skill_missions.plan import MissionPlan
 from skill_missions.skillset import Client, Clock
@@ -40,7 +40,8 @@ def route_plan(name: str, skillsets: tuple[str, ...], make_tree: MakeTree, setti
         blackboard = RouteBlackboard(clock_ns=clock_ns, route=route, pending=PendingInterrupts(clock_ns))
         return make_tree(clients, blackboard, settings_of(settings, values)), blackboard
 
-    facts = lambda: {"waypoints": len(route.waypoints), "waypoints_reached": route.reached}  # noqa: E731
+    waypoints = [list(waypoint) for waypoint in route.waypoints]
+    facts = lambda: {"waypoints": len(waypoints), "waypoints_reached": route.reached, "route": waypoints}  # noqa: E731
     return MissionPlan(name, skillsets, make, vars(settings), DEPARTURE, facts)
 
 

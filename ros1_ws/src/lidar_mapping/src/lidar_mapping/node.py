@@ -23,7 +23,7 @@ from lidar_mapping.settings import MappingSettings
 from lidar_mapping.slam import Slam
 from perception_core import NS, Sweep
 from perception_core.ros import DoneReporter, EnableSwitch, NewestWorker, Vehicle, cloud_message, read_settings, sweep_of_cloud
-from resource_reporter import ResourceReporter
+from resource_reporter import ResourceReporter, ToldService
 
 if TYPE_CHECKING:
     from std_srvs.srv import TriggerRequest
@@ -57,7 +57,7 @@ class LidarMappingNode:
         self._vehicle = Vehicle()
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=self._on_switch)
-        self._save_service = rospy.Service("~save", Trigger, self._on_save)
+        self._save_service = ToldService("~save", Trigger, self._on_save)
         self._timers = [
             rospy.Timer(rospy.Duration.from_sec(settings.save_period_s), self._save_if_new, reset=True),
             rospy.Timer(rospy.Duration.from_sec(settings.publish_period_s), self._publish_map, reset=True),

@@ -1,6 +1,10 @@
-"""Extern transitions: the functional layer says which state a resource has, this package sees to it that the skillset knows."""
+"""Extern transitions: the functional layer says which state a resource has, this package sees to it that the skillset knows.
 
+Also: what the functional layer is told by services, as messages (``ToldService``).
+"""
+
+from resource_reporter.calls import ToldService
 from resource_reporter.ledger import Call, Ledger
 from resource_reporter.reporter import ResourceReporter
 
-__all__ = ["Call", "Ledger", "ResourceReporter"]
+__all__ = ["Call", "Ledger", "ResourceReporter", "ToldService"]

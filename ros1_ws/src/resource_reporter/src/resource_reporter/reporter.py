@@ -7,8 +7,10 @@ import time
 
 import rospy
 from skillset_interfaces.msg import ResourceStates
+from skillset_interfaces.srv import TransitionRequest
 
 from resource_reporter.caller import CallFailedError, TransitionCaller
+from resource_reporter.calls import tell_call
 from resource_reporter.ledger import Call, Ledger
 
 # A latched topic may have been missed only while its publisher was away: nothing has to be polled. This bounds one wait.
@@ -74,11 +76,14 @@ class ResourceReporter:
 
     def _make(self, call: Call) -> None:
         """Make one call, outside the lock, and note its answer."""
+        service, request, begin_s = f"/{self._skillset}/transition", TransitionRequest(call.resource, call.to), rospy.get_time()
         try:
             answer = self._caller.call(call)
         except CallFailedError as error:
+            tell_call(service, request, None, begin_s, str(error))
             self._note_refusal(call, str(error))
             return
+        tell_call(service, request, answer, begin_s)
         if answer.accepted:
             with self._changed:
                 self._ledger.accepted(call, answer.state, time.monotonic())

@@ -32,7 +32,7 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
-from resource_reporter import ResourceReporter
+from resource_reporter import ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
 from uav_guidance.follower import Setpoint
@@ -90,13 +90,13 @@ class GuidanceNode:
     # ---- services ------------------------------------------------------------------------------------------------------
 
     def _offer_services(self) -> None:
-        rospy.Service("~takeoff", Takeoff, self._take_off)
-        rospy.Service("~set_position", SetPositionReference, self._set_position)
-        rospy.Service("~set_heading", SetHeadingReference, self._set_heading)
-        rospy.Service("~hover", Command, lambda _: self._ask(requests.HoverRequest(), CommandResponse))
-        rospy.Service("~land", Command, lambda _: self._ask(requests.LandRequest(), CommandResponse))
-        rospy.Service("~take_authority", Command, lambda _: self._ask(requests.AuthorityRequest(), CommandResponse))
-        rospy.Service("~check_fence", CheckFence, self._check_fence)
+        ToldService("~takeoff", Takeoff, self._take_off)
+        ToldService("~set_position", SetPositionReference, self._set_position)
+        ToldService("~set_heading", SetHeadingReference, self._set_heading)
+        ToldService("~hover", Command, lambda _: self._ask(requests.HoverRequest(), CommandResponse))
+        ToldService("~land", Command, lambda _: self._ask(requests.LandRequest(), CommandResponse))
+        ToldService("~take_authority", Command, lambda _: self._ask(requests.AuthorityRequest(), CommandResponse))
+        ToldService("~check_fence", CheckFence, self._check_fence)
 
     def _take_off(self, call: TakeoffCall) -> TakeoffResponse:
         return self._ask(requests.TakeoffRequest(call.height_m, call.speed_m_s), TakeoffResponse)

@@ -16,7 +16,7 @@ from uav_msgs.msg import VideoState
 from uav_msgs.srv import Stream, StreamResponse
 
 from perception_core.ros import read_settings
-from resource_reporter import ResourceReporter
+from resource_reporter import ResourceReporter, ToldService
 from video_stream.criteria import Criteria, Margins, Watch
 from video_stream.encoder import Rgb
 from video_stream.levels import Level
@@ -59,7 +59,7 @@ class VideoStreamNode:
         self._loop: MissionLoop[Image] = MissionLoop(
             [settings.report_port], on_tick=self._on_tick, on_datagram=self._on_report, on_item=self._on_image
         )
-        self._service = rospy.Service("~stream", Stream, self._on_stream)
+        self._service = ToldService("~stream", Stream, self._on_stream)
         self._subscriber = rospy.Subscriber(settings.image, Image, self._loop.post, queue_size=2, buff_size=IMAGE_BYTES, tcp_nodelay=True)
 
     def run(self) -> None:

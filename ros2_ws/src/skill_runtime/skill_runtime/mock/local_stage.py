@@ -10,7 +10,8 @@ from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.local import LocalWorld, Timer
 from skill_runtime.mock.behaviour import Behaviour
-from skill_runtime.mock.play import Play
+from skill_runtime.mock.play import MakeSkill, Play
+from skill_runtime.mock.skill import MockSkill
 
 
 class LocalStage:
@@ -58,13 +59,18 @@ def mock_world(
     """Serve skillsets by mocks in one process; the play's clock begins with the first step of the world's."""
     world = LocalWorld(start_s=start_s, latency_s=latency_s)
     play = Play(behaviour or Behaviour(), LocalStage(world), seed=seed)
+    serve_play(world, play, skillsets)
+    return world, play
+
+
+def serve_play(world: LocalWorld, play: Play, skillsets: Iterable[Skillset], make: MakeSkill = MockSkill) -> None:
+    """Serve skillsets by the mocks of a play whose stage is the world, and have it begin."""
     for skillset in skillsets:
         for resource in skillset.resources:
             play.on_state(skillset.name, resource.name, resource.initial)
         # At once, whatever the world's latency: the functional layer is nearer than any client.
-        world.serve(skillset, play.hooks_of(skillset)).on_step(functools.partial(_follow, play, skillset.name))
+        world.serve(skillset, play.hooks_of(skillset, make)).on_step(functools.partial(_follow, play, skillset.name))
     world.clock.soon(play.begin)
-    return world, play
 
 
 def _follow(play: Play, skillset: str, events: Sequence[EngineEvent]) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import functools
 import random
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from alula_common.faults import FaultRequest
-from skill_model.model import Skillset
-from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Place, Value
+from skill_model.model import Skill, Skillset
+from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Place, Rule, Value
 from skill_runtime.mock.formula import Formula, FormulaError
 from skill_runtime.mock.skill import MockSkill
 from skill_runtime.mock.stage import Job, Stage
+
+MakeSkill = Callable[["Play", str, Skill, Sequence[Rule], random.Random], MockSkill]
 
 
 class Play:
@@ -41,14 +43,14 @@ class Play:
         self._awaited: dict[tuple[Place, str], list[tuple[float, Job]]] = {}
         self._entered_s: dict[tuple[Place, str], float] = {}
 
-    def hooks_of(self, skillset: Skillset) -> dict[str, MockSkill]:
-        """Make the hooks of a skillset's skills."""
+    def hooks_of(self, skillset: Skillset, make: MakeSkill = MockSkill) -> dict[str, MockSkill]:
+        """Make the hooks of a skillset's skills; ``make`` by default makes those that follow the rules alone."""
         made = {}
         self._resources[skillset.name] = tuple(resource.name for resource in skillset.resources)
         for skill in skillset.skills:
             rules = self._behaviour.rules.get((skillset.name, skill.name), ())
             chance = random.Random(f"{self._seed} {skillset.name}.{skill.name}")  # noqa: S311
-            made[skill.name] = MockSkill(self, skillset.name, skill, rules, chance)
+            made[skill.name] = make(self, skillset.name, skill, rules, chance)
         self._skills += made.values()
         return made
 
@@ -82,6 +84,10 @@ class Play:
         self._entered_s[entered] = self.stage.now_s
         for delay_s, job in self._awaited.pop(entered, ()):
             self._do(delay_s, job)
+
+    def holds(self, skillset: str) -> bool:
+        """Tell whether a fault holds a resource of this skillset."""
+        return any(place[0] == skillset for place in self._held)
 
     # --- for the skills ----------------------------------------------------------------------------------------------
 

@@ -75,7 +75,7 @@ class MockSkill(SkillHooks):
 
     def validate(self, inputs: object) -> str:
         """Count the call, choose, and refuse if that was chosen."""
-        choice = self._choose(inputs)
+        choice = self.choose(inputs)
         if isinstance(inputs, MockInputs):
             inputs.choice = choice
         else:
@@ -109,23 +109,36 @@ class MockSkill(SkillHooks):
             return said
         return self._play.number(said, {**run.names, "t": elapsed_s, "f": part}, self._chance)
 
-    def on_interrupt(self, execution: Execution) -> None:
+    def on_interrupt(self, execution: Execution) -> bool | None:
         """Stop: what it moves stays where it is, what was still to come does not come."""
         with self._play.lock:
             self.move()
             run = self._runs.pop(execution.id, None)
         for appointment in run.appointments if run is not None else ():
             appointment.cancel()
+        return None
 
     def move(self) -> None:
         """Bring the memory up to date; called with the play's lock held."""
         for run in self._runs.values():
             self._move(run, _part(self._play.stage.now_s - run.started_s, run.delay_s))
 
+    def forget(self, execution_id: str) -> None:
+        """Take note that somebody else has ended an execution: what it moves has got there, what was still to come does not come."""
+        with self._play.lock:
+            run = self._runs.pop(execution_id, None)
+            if run is not None:
+                self._move(run, 1.0)
+        for appointment in run.appointments if run is not None else ():
+            appointment.cancel()
+
     # --- parts -------------------------------------------------------------------------------------------------------
 
-    def _choose(self, inputs: object) -> Choice:
-        """Choose the rules of the next call, with one draw for each rule that has a chance, whether or not it applies."""
+    def choose(self, inputs: object) -> Choice:
+        """Choose what is done in the next call, by the rules; what derives from this may know better.
+
+        There is one draw for each rule that has a chance, whether or not it applies.
+        """
         with self._play.lock:
             self._calls += 1
             names = self._names(inputs)

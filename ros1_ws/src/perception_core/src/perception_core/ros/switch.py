@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import rospy
 from std_srvs.srv import SetBool, SetBoolResponse
 
+from resource_reporter import ToldService
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -19,7 +21,7 @@ class EnableSwitch:
     def __init__(self, *, enabled: bool, on_change: Callable[[bool], None] | None = None) -> None:
         self.enabled = enabled
         self._on_change = on_change
-        self._service = rospy.Service("~enable", SetBool, self._serve)
+        self._service = ToldService("~enable", SetBool, self._serve)
 
     def _serve(self, request: SetBoolRequest) -> SetBoolResponse:
         self.enabled = bool(request.data)
