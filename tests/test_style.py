@@ -29,6 +29,7 @@ ROS2_PACKAGES = (
     "skill_runtime",
     "skill_panel",
     "skill_missions",
+    "mission_replay",
     "uav_skills",
     "uav_missions",
 )

@@ -1,0 +1,148 @@
+"""``./alula replay RUN [--from skills] ...``: make the decisions of a recorded mission again, and tell where they differ.
+
+Decisions go to standard output, a line each; the rest to standard error. Ends with 0 (decided as then), 1 (decided otherwise, or an
+expectation failed), 2 (could not be replayed).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula_common.files import write_json, write_text
+from mission_replay.asked import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
+from mission_replay.recorded import Recorded, ReplayError, load
+from mission_replay.replay import Replay, Result
+from skill_missions.record import MissionRecord
+from uav_missions.plan import write_route
+from uav_missions.route import Route
+
+SAME, OTHERWISE, CANNOT_REPLAY = 0, 1, 2
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="alula replay", description="Make the decisions of a recorded mission again.")
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run's folder, or its skills.mcap")
+    parser.add_argument("--from", dest="depth", choices=["skills"], default="skills", help="what is taken from the record")
+    parser.add_argument("--tree", default="", metavar="FILE.py|MODULE[:FUNCTION]", help="another tree: function plan(route) -> MissionPlan")
+    parser.add_argument("--model", type=Path, action="append", default=[], metavar="FILE", help="another model of a skillset")
+    parser.add_argument(
+        "--set", action="append", default=[], dest="settings", metavar="NAME=VALUE", help="another parameter of the mission"
+    )
+    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[@SECONDS[-SECONDS]]", help="what did not fail then")
+    parser.add_argument(
+        "--behaviour", type=Path, action="append", default=[], metavar="FILE", help="what mocks do where nothing was recorded"
+    )
+    parser.add_argument("--on", action="store_true", help="go on over mocks after the first difference")
+    parser.add_argument("--rate", type=float, default=0.0, help="mission clock a second at most (default 0: no limit)")
+    parser.add_argument("--out", type=Path, help="folder for the replay's own record")
+    parser.add_argument("--json", action="store_true", help="decisions and difference as JSON, a line each")
+    options = parser.parse_args(words)
+    if not 0.0 <= options.rate <= 1e6:
+        parser.error(f"--rate {options.rate:g}: must be 0 (no limit) or a positive factor")
+    return options
+
+
+def prepare(recorded: Recorded, options: argparse.Namespace) -> Replay:
+    """Make the replay; raises ReplayError."""
+    plan = plan_for(recorded, options.tree)
+    skillsets = skillsets_for(plan, options.model)
+    behaviour = behaviour_for(recorded, skillsets, options.behaviour)
+    parameters = parameters_for(recorded, plan, options.settings)
+    make_record = None
+    if options.out is not None:
+        make_folder(options.out)
+        make_record = lambda clock_ns: MissionRecord(options.out, plan, clock_ns, parameters)  # noqa: E731
+    return Replay(
+        recorded,
+        plan,
+        skillsets,
+        behaviour,
+        parameters=parameters,
+        faults=faults_for(behaviour, options.fail),
+        go_on=options.on,
+        record=make_record,
+        rate=options.rate,
+    )
+
+
+def make_folder(out: Path) -> None:
+    """Make the folder of a replay; raises ReplayError where there is something in it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise ReplayError(f"--out {out}: is not empty; choose another, a replay never overwrites")
+    except OSError as error:
+        raise ReplayError(f"--out {out}: {error.strerror}") from error
+
+
+def zero_of(recorded: Recorded) -> float:
+    """Return what times count from: lift-off, or the record's beginning where there was none."""
+    lift_off_s = recorded.mission.get("lift_off_s")
+    return float(lift_off_s) if isinstance(lift_off_s, int | float) else min(entry.stamp_s for entry in recorded.entries)
+
+
+def trace_of(result: Result, zero_s: float) -> list[dict[str, object]]:
+    """Return the decisions as they are written; the same replay gives the same, byte for byte."""
+    return [{**vars(decision), "t_s": round(decision.t_s - zero_s, 6)} for decision in result.decisions]
+
+
+def verdict(recorded: Recorded, result: Result, zero_s: float) -> list[str]:
+    """Return what came of it, in lines."""
+    lines = []
+    if not recorded.whole:
+        lines.append(f"the record breaks off after {len(recorded.decisions)} decisions; replayed up to there")
+    if result.difference is not None:
+        lines += result.difference.lines(zero_s)
+        now = "stopped there" if result.end is None else result.end.outcome.value
+        return [*lines, f"outcome then: {recorded.outcome or 'unknown'}, now: {now}"]
+    lines.append(f"{len(result.decisions)} decisions, all as they were")
+    if result.end is not None:
+        lines.append(f"outcome: {result.end.outcome.value}{f': {result.end.reason}' if result.end.reason else ''}")
+    return lines
+
+
+def same(recorded: Recorded, result: Result) -> bool:
+    """Tell whether all went as it did then."""
+    ended_alike = result.end is None or not recorded.outcome or result.end.outcome.value == recorded.outcome
+    return result.difference is None and ended_alike
+
+
+def write_out(out: Path, recorded: Recorded, result: Result, zero_s: float) -> None:
+    """Write what is not in the replay's own record: the trace and the verdict."""
+    write_text(out / "trace.jsonl", "".join(json.dumps(line) + "\n" for line in trace_of(result, zero_s)))
+    route = recorded.mission.get("route")
+    if isinstance(route, list):
+        write_route(out, Route([(x, y, z) for x, y, z in route]))
+    difference = None if result.difference is None else result.difference.as_dict()
+    write_json(
+        out / "replay.json", {"of": str(recorded.path), "same": same(recorded, result), "difference": difference, "notes": result.notes}
+    )
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Replay; return the exit code."""
+    options = parse(sys.argv[1:] if words is None else words)
+    try:
+        recorded = load(options.run)
+        result = prepare(recorded, options).run()
+        zero_s = zero_of(recorded)
+        if options.out is not None:
+            write_out(options.out, recorded, result, zero_s)
+    except (ReplayError, OSError) as error:
+        sys.stderr.write(f"alula replay: {error}\n")
+        return CANNOT_REPLAY
+    for line, decision in zip(trace_of(result, zero_s), result.decisions, strict=True):
+        text = json.dumps(line) if options.json else f"{decision.t_s - zero_s:9.2f} s  {decision.words()}"
+        sys.stdout.write(f"{text}\n")
+    for text in verdict(recorded, result, zero_s):
+        sys.stderr.write(f"{text}\n")
+    return SAME if same(recorded, result) else OTHERWISE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,210 @@
+"""The recorded vehicle: real managers in virtual time whose functions answer as they did, and as mocks where nothing was recorded."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from alula_common.faults import FaultRequest
+from mission_replay.recorded import Answer
+from skill_model.execution_state import ExecutionState
+from skill_model.model import Skill, Skillset
+from skill_runtime.core.events import TransitionEvent
+from skill_runtime.core.execution import Execution
+from skill_runtime.handle import SkillHandle
+from skill_runtime.local import LocalWorld
+from skill_runtime.mock import NEVER, Behaviour, Choice, Ending, LocalStage, MockSkill, Play, Rule, serve_play
+
+
+class ReplayedSkill(MockSkill):
+    """The hooks of one skill: a call that was recorded is answered by the record, any other one by the mock's rules."""
+
+    def __init__(self, vehicle: Vehicle, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
+        super().__init__(play, skillset, skill, rules, chance)
+        self._vehicle = vehicle
+
+    def choose(self, inputs: object) -> Choice:
+        """Let the record end the call, where it does; the rules still say what the call moves."""
+        choice = super().choose(inputs)
+        answer = self._vehicle.next_answer(self._name)
+        if answer is None:
+            return choice
+        by_itself = answer.state is ExecutionState.TERMINATED
+        delay = choice.script.delay if not by_itself or answer.duration_s is None else answer.duration_s
+        refused = answer.state is ExecutionState.NOT_VALIDATED
+        ending = Ending(refuse=answer.message or "refused") if refused else NEVER
+        return Choice(replace(choice.script, delay=delay, ending=ending, progress=0.0, outputs={}, changes=()), "")
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Begin."""
+        super().on_dispatch(execution)
+        self._vehicle.dispatched(execution, self)
+
+    def progress(self, execution: Execution) -> float:
+        """Return what was told last."""
+        told = self._vehicle.progress_of(execution.id)
+        return super().progress(execution) if told is None else told
+
+    def on_interrupt(self, execution: Execution) -> bool | None:
+        """Stop; done when it was done in the record."""
+        super().on_interrupt(execution)
+        return False if self._vehicle.stops_later(execution.id) else None
+
+
+class ReplayStage(LocalStage):
+    """The play's stage: mocks give the data of a skillset only where the record's are no longer true."""
+
+    def __init__(self, world: LocalWorld) -> None:
+        super().__init__(world)
+        self.mocked: set[str] = set()
+
+    def publish(self, skillset: str, data: str, value: object) -> None:
+        """Publish a value of the mocks."""
+        if skillset in self.mocked:
+            super().publish(skillset, data, value)
+
+    def publish_recorded(self, skillset: str, data: str, value: object) -> None:
+        """Publish a value of the record."""
+        if skillset not in self.mocked:
+            super().publish(skillset, data, value)
+
+
+class Vehicle:
+    """Answers the tree's requests.
+
+    Args:
+        skillsets: the models that the managers execute.
+        answers: of the record, by its ids.
+        behaviour: of the mocks that answer what was not recorded; what it has happen by the clock is left out.
+        start_s: mission clock at the beginning.
+    """
+
+    def __init__(self, skillsets: Sequence[Skillset], answers: Mapping[str, Answer], behaviour: Behaviour, *, start_s: float) -> None:
+        self.world = LocalWorld(start_s=start_s)
+        self.stage = ReplayStage(self.world)
+        self.play = Play(replace(behaviour, timeline=()), self.stage)
+        self.handles: dict[str, SkillHandle] = {}
+        self._answers = answers
+        self._recorded: dict[str, str] = {}
+        """The record's id of an execution of this replay."""
+        self._here: dict[str, str] = {}
+        """The other way round."""
+        self._calls: dict[str, deque[Answer | None]] = {}
+        self._running: dict[str, tuple[Execution, MockSkill]] = {}
+        self._progress: dict[str, float] = {}
+        self._passed: set[str] = set()
+        self._caused = {
+            place for rules in behaviour.rules.values() for rule in rules for change in rule.changes or () for place in change.states
+        }
+        serve_play(self.world, self.play, skillsets, self._make_skill)
+
+    def _make_skill(self, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
+        return ReplayedSkill(self, play, skillset, skill, rules, chance)
+
+    def fail(self, request: FaultRequest) -> None:
+        """Have a fault happen that was not recorded; raises SkillRuntimeError where there is none."""
+        self.play.fail(request)
+
+    # --- requests ----------------------------------------------------------------------------------------------------
+
+    def requested(self, skillset: str, skill: str, execution_id: str, recorded_id: str | None) -> None:
+        """Take note of a request; ``recorded_id``: the same one in the record, None where there is none."""
+        answer = None if recorded_id is None else self._answers.get(recorded_id)
+        if answer is not None and (answer.ended_s is None and not self._goes_on(answer)):
+            answer = None
+        if answer is not None and recorded_id is not None:
+            self._recorded[execution_id] = recorded_id
+            self._here[recorded_id] = execution_id
+        self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
+
+    def recorded_id(self, execution_id: str) -> str | None:
+        """Return the record's id of an execution of this replay."""
+        return self._recorded.get(execution_id)
+
+    def next_answer(self, name: str) -> Answer | None:
+        """Return the record's answer to the next call of a skill; None where a mock answers."""
+        calls = self._calls.get(name)
+        return calls.popleft() if calls else None
+
+    def dispatched(self, execution: Execution, hooks: MockSkill) -> None:
+        """Take note that a function was started."""
+        recorded_id = self._recorded.get(execution.id)
+        if recorded_id is not None:
+            self._running[recorded_id] = execution, hooks
+            if recorded_id in self._passed:  # it was answered before it was asked here
+                self.world.clock.soon(lambda: self._end(recorded_id))
+
+    def progress_of(self, execution_id: str) -> float | None:
+        """Return the progress that was told last of a recorded execution."""
+        recorded_id = self._recorded.get(execution_id)
+        return None if recorded_id is None else self._progress.get(recorded_id, 0.0)
+
+    def stops_later(self, execution_id: str) -> bool:
+        """Tell whether the record has yet to say that an execution was interrupted."""
+        recorded_id = self._recorded.get(execution_id)
+        if recorded_id is None or recorded_id in self._passed:
+            return False
+        return self._answers[recorded_id].state is ExecutionState.INTERRUPTED
+
+    # --- what the record tells ---------------------------------------------------------------------------------------
+
+    def report(self, recorded_id: str, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
+        """Have the tree be told of an execution what it was told."""
+        self._progress[recorded_id] = progress
+        if state.terminal:
+            self._passed.add(recorded_id)
+            self._end(recorded_id)
+            return
+        handle = self.handles.get(self._here.get(recorded_id, ""))
+        if handle is not None and state is ExecutionState.RUNNING and not handle.done:
+            handle.run(progress, dict(outputs))
+
+    def transition(self, event: TransitionEvent, *, diverged: bool) -> None:
+        """Have a resource change as it did; after the decisions have diverged only where no other course of things explains it."""
+        place = (event.skillset, event.resource)
+        if diverged and place in self._caused and not self._explained(event.skillset):
+            return
+        self.play.take({place: event.to_state})
+
+    def sample(self, skillset: str, data: str, value: object) -> None:
+        """Have a data arrive, unless a fault that was not recorded makes it untrue."""
+        if self.play.holds(skillset):
+            self.stage.mocked.add(skillset)
+        self.stage.publish_recorded(skillset, data, value)
+
+    def over(self) -> None:
+        """Take note that the record has no more to say."""
+        self.stage.mocked |= set(self.world.managers)
+
+    # --- inside ------------------------------------------------------------------------------------------------------
+
+    def _goes_on(self, answer: Answer) -> bool:
+        """Tell whether an execution of the record had not ended when it broke off."""
+        return answer.state.active
+
+    def _explained(self, skillset: str) -> bool:
+        """Tell whether an execution of the skillset runs whose course is the recorded one."""
+        return any(
+            answer.skillset == skillset and not execution.done
+            for recorded_id, (execution, _) in self._running.items()
+            if (answer := self._answers[recorded_id]).state is ExecutionState.TERMINATED
+        )
+
+    def _end(self, recorded_id: str) -> None:
+        """End an execution as the record has it; violations and refusals follow from the model by themselves."""
+        answer = self._answers[recorded_id]
+        execution, hooks = self._running.get(recorded_id, (None, None))
+        if execution is None or hooks is None or execution.done:
+            return
+        match answer.state:
+            case ExecutionState.TERMINATED:
+                hooks.forget(execution.id)
+                execution.terminate(answer.result, answer.message, answer.outputs)
+            case ExecutionState.INTERRUPTED:
+                execution.interrupted(answer.message)
+            case ExecutionState.FAILED:
+                execution.fail(answer.message)
+            case _:
+                pass

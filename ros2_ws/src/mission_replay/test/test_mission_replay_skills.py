@@ -1,0 +1,236 @@
+"""Replays of recorded missions by the tree alone: the same decisions again, and what one change does to them."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+from pathlib import Path
+
+import pytest
+from mcap.writer import Writer
+
+from alula_common.record import DECISIONS, FILE, MISSION, RecordWriter, read_record
+from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
+from mission_replay.comparison import alike
+from uav_missions import mock_flight
+
+ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
+WORLDS = {"mapping": "yard", "inspection": "building"}
+
+
+def fly(out: Path, *faults: str, scenario: str = "mapping") -> Path:
+    """Fly over mocks and return the run's folder."""
+    words = ["--out", str(out), "--scenario", scenario, "--behaviour", str(ALULA_ROOT / "skillsets/uav/mock.yaml")]
+    words += ["--route", str(ALULA_ROOT / f"ros1_ws/src/uav_simulator/worlds/{WORLDS[scenario]}.yaml")]
+    mock_flight.main([*words, *(word for fault in faults for word in ("--fail", fault))])
+    return out
+
+
+def requests(run: Path) -> list[tuple]:
+    """Return what a recorded tree asked for, in order, without ids and times."""
+    found = [entry.value for entry in read_record(run) if entry.topic == DECISIONS]
+    return [(value["kind"], value["skillset"], value["skill"], value["inputs"]) for value in found]
+
+
+def ending(run: Path) -> tuple[str, str]:
+    """Return outcome and reason."""
+    mission = [entry.value for entry in read_record(run) if entry.topic == MISSION][-1]
+    return mission["outcome"], mission["reason"]
+
+
+@pytest.fixture(scope="module")
+def nominal(tmp_path_factory) -> Path:
+    return fly(tmp_path_factory.mktemp("nominal") / "run")
+
+
+@pytest.fixture(scope="module")
+def zed_dead(tmp_path_factory) -> Path:
+    return fly(tmp_path_factory.mktemp("zed") / "run", "zed@20")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "faults"),
+    [
+        ("mapping", ["zed@8", "lidar@8"]),
+        ("mapping", ["pilot@12"]),
+        ("inspection", []),
+        ("inspection", ["radio@20"]),
+        ("inspection", ["lidar@9"]),
+    ],
+)
+def test_a_flight_is_decided_as_it_was(tmp_path, capsys, scenario, faults):
+    run = fly(tmp_path / "run", *faults, scenario=scenario)
+    assert main([str(run), "--out", str(tmp_path / "again")]) == SAME
+    assert f"{len(requests(run))} decisions, all as they were" in capsys.readouterr().err
+    assert requests(tmp_path / "again") == requests(run)
+    assert ending(tmp_path / "again") == ending(run)
+
+
+def test_a_replay_is_a_record_that_replays(zed_dead, tmp_path):
+    assert main([str(zed_dead), "--out", str(tmp_path / "again")]) == SAME
+    assert main([str(tmp_path / "again")]) == SAME
+
+
+def test_ten_replays_are_one(zed_dead, capsys):
+    traces = set()
+    for rate in (0.0, 1e6) * 5:
+        assert main([str(zed_dead / FILE), "--json", "--rate", str(rate)]) == SAME
+        traces.add(capsys.readouterr().out)
+    (trace,) = traces
+    assert [json.loads(line)["number"] for line in trace.splitlines()] == list(range(1, len(requests(zed_dead)) + 1))
+
+
+def test_a_failure_that_did_not_happen_is_decided_as_one_that_did(nominal, zed_dead, tmp_path, capsys):
+    assert main([str(nominal), "--fail", "zed@20", "--on", "--out", str(tmp_path / "changed")]) == OTHERWISE
+    assert requests(tmp_path / "changed") == requests(zed_dead)
+    assert ending(tmp_path / "changed") == ending(zed_dead)
+    said = capsys.readouterr().err
+    assert "resource perception.zed_status: then 'OK', now 'BROKEN'" in said
+    assert "outcome then: accomplished, now: degraded" in said
+    difference = json.loads((tmp_path / "changed/replay.json").read_text())["difference"]
+    assert (difference["now"]["kind"], difference["now"]["skill"]) == ("interrupt", "goto_straight")
+    assert "ZED navigation" in difference["knew_now"]["path"]
+
+
+def test_without_on_it_stops_at_the_first_difference(nominal, capsys):
+    assert main([str(nominal), "--fail", "zed@20"]) == OTHERWISE
+    told = capsys.readouterr()
+    assert "now: stopped there" in told.err
+    assert told.out.splitlines()[-1].endswith("interrupt navigation.goto_straight")
+
+
+def test_the_lost_radio_ends_an_inspection_as_it_does_in_flight(tmp_path):
+    run, failed = fly(tmp_path / "run", scenario="inspection"), fly(tmp_path / "failed", "radio@20", scenario="inspection")
+    assert main([str(run), "--fail", "radio@20", "--on", "--out", str(tmp_path / "changed")]) == OTHERWISE
+    assert requests(tmp_path / "changed") == requests(failed)
+    assert ending(tmp_path / "changed") == ending(failed)
+
+
+WRONG_ORDER = """
+from uav_missions import mapping
+
+
+class LidarFirst(mapping.MappingMission):
+    def _map_the_area(self):
+        self._zed_navigation, self._lidar_navigation = self._lidar_navigation, self._zed_navigation
+        return super()._map_the_area()
+
+
+mapping.MappingMission = LidarFirst
+plan = mapping.plan
+"""
+
+
+def test_a_tree_with_its_branches_in_the_wrong_order_is_told(nominal, tmp_path, capsys, monkeypatch):
+    from uav_missions import mapping
+
+    monkeypatch.setattr(mapping, "MappingMission", mapping.MappingMission)  # put back afterwards
+    (tmp_path / "tree.py").write_text(WRONG_ORDER)
+    assert main([str(nominal), "--tree", str(tmp_path / "tree.py")]) == OTHERWISE
+    said = capsys.readouterr().err
+    assert "then: start perception.zed_depthmap at 2." in said
+    assert "now:  start perception.lidar_depthmap at 2." in said
+
+
+def test_a_weakened_invariant_is_told(zed_dead, tmp_path, capsys):
+    text = (ALULA_ROOT / "skillsets/uav/perception.skill").read_text()
+    weak = text.replace("zed_ok: resource = (zed_status == OK)", "zed_ok: resource = (zed_status != UNKNOWN)")
+    assert weak != text
+    (tmp_path / "perception.skill").write_text(weak)
+    assert main([str(zed_dead), "--model", str(tmp_path / "perception.skill")]) == OTHERWISE
+    said = capsys.readouterr().err
+    assert "then: interrupt navigation.goto_straight" in said
+    assert "now:  nothing" in said
+
+
+def test_another_parameter_is_another_input(nominal, capsys):
+    assert main([str(nominal), "--set", "speed_m_s=0.5"]) == OTHERWISE
+    assert "input speed" in capsys.readouterr().err
+
+
+def test_a_record_that_breaks_off_is_replayed_up_to_there(zed_dead, tmp_path, capsys):
+    whole = (zed_dead / FILE).read_bytes()
+    every = requests(zed_dead)
+    chance = random.Random(1)  # noqa: S311 - no secret
+    for _ in range(8):
+        cut = tmp_path / FILE
+        cut.write_bytes(whole[: chance.randrange(4000, len(whole) - 1000)])
+        recorded = requests(cut)
+        assert main([str(cut), "--json"]) == SAME
+        told = capsys.readouterr()
+        assert [json.loads(line)["skill"] for line in told.out.splitlines()][: len(recorded)] == [skill for _, _, skill, _ in recorded]
+        assert recorded == every[: len(recorded)]
+        assert "the record breaks off" in told.err
+
+
+def write_foreign(path: Path) -> None:
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/chatter", "cdr", 0)
+        writer.add_message(channel, 1, b"\x00\x01\x00\x00", 1)
+        writer.finish()
+
+
+def write_wrong_mission(path: Path) -> None:
+    writer = RecordWriter(path)
+    writer.write(MISSION, 0, {"scenario": "mapping", "route": [[0, 0, 3]]})
+    writer.write(DECISIONS, 0, {"number": "one"})
+    writer.close()
+
+
+def write_wrong_scenario(path: Path) -> None:
+    writer = RecordWriter(path)
+    writer.write(MISSION, 0, {"scenario": "../secret", "route": [[0, 0, 3]]})
+    writer.close()
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(b"#ROSBAG V2.0\n"),
+        lambda path: path.write_bytes(os.urandom(5000)),
+        lambda path: path.write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 200),
+        write_foreign,
+        write_wrong_mission,
+        write_wrong_scenario,
+        lambda path: None,
+    ],
+)
+def test_what_is_no_record_is_refused_in_a_line(tmp_path, capsys, write):
+    write(tmp_path / FILE)
+    assert main([str(tmp_path / FILE)]) == CANNOT_REPLAY
+    said = capsys.readouterr().err
+    assert said.startswith("alula replay: ")
+    assert said.count("\n") == 1
+    assert "skills.mcap" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--fail", "imu@3"], "there is no fault 'imu'"),
+        (["--fail", "zed@x"], "zed:dark@30-40"),
+        (["--set", "sped_m_s=1"], "did you mean `speed_m_s`"),
+        (["--set", "speed_m_s=fast"], "is no number"),
+        (["--tree", "nowhere.py"], "there is no such file"),
+        (["--tree", "no.such.module"], "no.such"),
+        (["--tree", "json"], "plan"),
+        (["--model", "nowhere.skill"], "nowhere.skill"),
+    ],
+)
+def test_a_wrong_request_is_told_in_a_line(nominal, capsys, words, complaint):
+    assert main([str(nominal), *words]) == CANNOT_REPLAY
+    said = capsys.readouterr().err
+    assert complaint in said
+    assert said.count("\n") == 1
+
+
+def test_numbers_are_alike_within_the_tolerance():
+    assert alike({"target": {"x": 1.0}, "list": [1, 2.0]}, {"target": {"x": 1.0 + 1e-9}, "list": [1.0, 2]})
+    assert not alike({"x": 1.0}, {"x": 1.001})
+    assert not alike({"x": 1.0}, {"y": 1.0})
+    assert not alike([1.0], [1.0, 2.0])
+    assert alike("text", "text")
