@@ -32,6 +32,7 @@ ROS2_PACKAGES = (
     "mission_replay",
     "uav_skills",
     "uav_missions",
+    "run_analysis",
 )
 TYPED = [
     "flight/alula_flight",
@@ -39,6 +40,7 @@ TYPED = [
     "tools/bridge_tools",
     "tools/skill_bench",
     "tools/perception_bench",
+    "tools/log_mutations",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),
     *(f"ros1_ws/src/{name}/src/{name}" for name in ROS1_PACKAGES),
 ]

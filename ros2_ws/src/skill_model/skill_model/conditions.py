@@ -126,6 +126,23 @@ def present(condition: Expression, states: States, data: Data) -> str:
     return ", ".join(dict.fromkeys(words))
 
 
+def whatever_the_data(condition: Expression, *, unknown: bool) -> Expression:
+    """Return over resources alone when a condition is true with all data unknown, the unknown being counted as ``unknown``."""
+    match condition:
+        case DataIs():
+            return Constant(unknown)
+        case Not(operand=operand):
+            return Not(whatever_the_data(operand, unknown=not unknown))
+        case And(operands=operands):
+            return And(tuple(whatever_the_data(operand, unknown=unknown) for operand in operands))
+        case Or(operands=operands):
+            return Or(tuple(whatever_the_data(operand, unknown=unknown) for operand in operands))
+        case Implies(premise=premise, conclusion=conclusion):
+            return Implies(whatever_the_data(premise, unknown=not unknown), whatever_the_data(conclusion, unknown=unknown))
+        case _:
+            return condition
+
+
 def data_of(condition: Expression) -> list[DataIs]:
     """Return the atoms over data."""
     return [atom for atom in atoms(condition) if isinstance(atom, DataIs)]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
+from skill_model.conditions import whatever_the_data
 from skill_model.model import (
     TRUE,
     And,
@@ -111,23 +112,6 @@ def _invariant(invariant: Invariant) -> Invariant:
 
 def _event(event: Event, possibly: _Possibly) -> Event:
     return replace(event, guard=possibly(event.guard))
-
-
-def whatever_the_data(condition: Expression, *, unknown: bool) -> Expression:
-    """Return over resources alone when a condition is true with all data unknown, the unknown being counted as ``unknown``."""
-    match condition:
-        case DataIs():
-            return Constant(unknown)
-        case Not(operand=operand):
-            return Not(whatever_the_data(operand, unknown=not unknown))
-        case And(operands=operands):
-            return And(tuple(whatever_the_data(operand, unknown=unknown) for operand in operands))
-        case Or(operands=operands):
-            return Or(tuple(whatever_the_data(operand, unknown=unknown) for operand in operands))
-        case Implies(premise=premise, conclusion=conclusion):
-            return Implies(whatever_the_data(premise, unknown=not unknown), whatever_the_data(conclusion, unknown=unknown))
-        case _:
-            return condition
 
 
 def conjunction(conditions: Iterator[Expression]) -> Expression:

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from skill_language.errors import Severity
-from skill_language.prove.abstract import whatever_the_data
 from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
+from skill_model.conditions import whatever_the_data
 from skill_model.model import (
     NO_EFFECT,
     NOWHERE,

@@ -1,0 +1,79 @@
+"""Flights of the drone over mocks, many in one process: what does not change between them is read once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from alula_common.faults import FaultError, FaultRequest
+from alula_common.scenarios import Scenario, ScenarioError, load_scenario
+from run_analysis.errors import AnalysisError
+from skill_missions.director import End
+from skill_missions.mocked import MockedMission
+from skill_model.model import Skillset
+from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.core.events import EngineEvent
+from skill_runtime.mock import Behaviour, load_behaviour
+from uav_missions.mock_flight import drone
+from uav_missions.plan import plan_of
+from uav_missions.route import Route, RouteError, load_route
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A flight over mocks: what happened, how it ended, what went wrong in the mocks themselves, and what is open."""
+
+    events: Sequence[EngineEvent]
+    end: End
+    notes: Sequence[str]
+    open: Sequence[str]
+    faults: dict[str, float] = field(default_factory=dict)
+    """When each fault came, seconds of mission clock; those that came to nothing are missing."""
+
+
+@dataclass(frozen=True)
+class MockFlights:
+    """A scenario, ready to be flown."""
+
+    scenario: Scenario
+    skillsets: tuple[Skillset, ...]
+    behaviour: Behaviour
+    waypoints: tuple[tuple[float, float, float], ...]
+
+    def check(self, faults: Sequence[FaultRequest]) -> None:
+        """Refuse faults that the mocks don't have.
+
+        Raises:
+            AnalysisError: there is none of this name.
+        """
+        try:
+            for fault in faults:
+                self.behaviour.fault(fault)
+        except (FaultError, SkillRuntimeError) as error:
+            raise AnalysisError(str(error)) from None
+
+    def fly(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> Flown:
+        """Fly once."""
+        plan = plan_of(self.scenario, Route(list(self.waypoints)))
+        mission = MockedMission(self.skillsets, self.behaviour, plan, faults=faults, seed=seed)
+        end = mission.run()
+        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.play.faults))
+
+
+def load_flights(name: str, behaviour: Sequence[Path] = ()) -> MockFlights:
+    """Read what flights of a scenario need: the drone's own mocks, with behaviour files on top of them.
+
+    Raises:
+        AnalysisError: a file is missing or wrong, with its place.
+    """
+    root = Path(os.environ.get("ALULA_ROOT", "."))
+    try:
+        scenario = load_scenario(name)
+        route = load_route(root / "ros1_ws" / "src" / "uav_simulator" / "worlds" / f"{scenario.world}.yaml")
+        files = [root / "skillsets" / "uav" / "mock.yaml", *behaviour]
+        known = load_behaviour(files, drone()).of(frozenset(scenario.skillsets))
+    except (ScenarioError, RouteError, SkillRuntimeError) as error:
+        raise AnalysisError(str(error)) from None
+    return MockFlights(scenario, tuple(drone(scenario.skillsets)), known, tuple(route.waypoints))

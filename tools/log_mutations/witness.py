@@ -1,0 +1,110 @@
+"""Proves that a log is legal: finds what to ask of a real engine, asks it, and compares what the engine tells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from run_analysis.conformance import SkillsetMonitor
+from run_analysis.conformance.beliefs import Ask, Stimulus
+from skill_model.execution_state import ExecutionState as S
+from skill_model.model import Skillset
+from skill_runtime.core import SkillsetEngine
+from skill_runtime.core.events import EngineEvent, TransitionEvent
+from skill_runtime.core.execution import Execution
+from skill_runtime.hooks import SkillHooks
+
+
+class _Hooks(SkillHooks):
+    """A function that does nothing by itself."""
+
+    refusal = ""
+
+    def validate(self, inputs: object) -> str:  # noqa: ARG002 - the hook's signature
+        """Refuse while told to."""
+        return self.refusal
+
+    def on_interrupt(self, execution: Execution) -> bool | None:  # noqa: ARG002
+        """Take until ``interrupted`` is called."""
+        return False
+
+    def on_pause(self, execution: Execution) -> str | None:  # noqa: ARG002
+        """Pause."""
+        return ""
+
+    def on_resume(self, execution: Execution) -> str | None:  # noqa: ARG002
+        """Go on."""
+        return ""
+
+
+def stimuli_of(skillset: Skillset, log: Sequence[EngineEvent]) -> list[Stimulus] | None:
+    """Return what has asked for the steps of a log, one by one; None for a log that the monitor does not believe."""
+    monitor, found, under_way = SkillsetMonitor(skillset), [], False
+    for event in log:
+        if monitor.take(event) is not None:
+            return None
+        belief = monitor.belief
+        if not under_way and belief.stimulus is not None:
+            found.append(belief.stimulus)
+        elif belief.stimulus is not None:
+            found[-1] = belief.stimulus
+        under_way = bool(belief.expected)
+    return found
+
+
+def legal(skillset: Skillset, log: Sequence[EngineEvent]) -> bool:
+    """Tell whether an engine can be brought to tell this log; False may also mean that nobody has found out how."""
+    stimuli = stimuli_of(skillset, log)
+    return stimuli is not None and [_key(event) for event in _played(skillset, stimuli)][: len(log)] == [_key(event) for event in log]
+
+
+def _key(event: EngineEvent) -> tuple[object, ...]:
+    if isinstance(event, TransitionEvent):
+        return event.sequence, event.resource, event.from_state, event.to_state, event.cause
+    return event.sequence, event.skill, event.id, event.state, event.result
+
+
+def _played(skillset: Skillset, stimuli: Sequence[Stimulus]) -> list[EngineEvent]:
+    """Return what an engine tells when it is asked all this."""
+    told: list[EngineEvent] = []
+    hooks = {skill.name: _Hooks() for skill in skillset.skills}
+    engine = SkillsetEngine(skillset, lambda: 0, hooks, told.extend)
+    for stimulus in stimuli:
+        _ask(engine, hooks, stimulus)
+    return told
+
+
+def _ask(engine: SkillsetEngine, hooks: dict[str, _Hooks], stimulus: Stimulus) -> None:
+    names = stimulus.subject
+    match stimulus.ask:
+        case Ask.EXTERN:
+            engine.transition(*names)
+        case Ask.EVENT:
+            engine.trigger(*names)
+        case Ask.REQUEST:
+            engine.register(names[0], {}, execution_id=names[1])
+        case Ask.START | Ask.REFUSE:
+            engine.run(names[1])
+        case Ask.PHASE:
+            _enter(engine, hooks, *names)
+        case Ask.RESULT:
+            engine.terminate(names[1], names[2])
+        case Ask.INTERRUPTED:
+            engine.interrupted(names[1])
+        case Ask.FAIL:
+            engine.fail(names[1], "asked to")
+
+
+def _enter(engine: SkillsetEngine, hooks: dict[str, _Hooks], skill: str, execution_id: str, state: str) -> None:
+    if S(state) is S.NOT_VALIDATED:
+        hooks[skill].refusal = "asked to"
+        engine.run(execution_id)
+        hooks[skill].refusal = ""
+        return
+    ways: dict[S, Callable[[], object]] = {
+        S.PAUSED: lambda: engine.pause(execution_id),
+        S.RUNNING: lambda: engine.resume(execution_id),
+        S.INTERRUPTING: lambda: engine.interrupt(execution_id),
+        S.INTERRUPTED: lambda: engine.interrupt(execution_id),
+        S.FAILED: lambda: engine.fail(execution_id, "asked to"),
+    }
+    ways[S(state)]()
