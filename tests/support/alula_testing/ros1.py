@@ -15,7 +15,7 @@ import pytest
 from alula_common.network import free_port
 
 StartNode = Callable[..., "subprocess.Popen[bytes]"]
-MASTER_START_S = 20.0
+MASTER_START_S = 120.0
 
 
 def wait_until(condition: Callable[[], bool], *, timeout_s: float, what: str) -> None:

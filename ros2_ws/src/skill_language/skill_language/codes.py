@@ -48,6 +48,7 @@ CODES: Mapping[str, str] = {
     "ALU222": "unknown skill",
     "ALU223": "an execution asked where only properties may",
     "ALU224": "unknown skillset",
+    "ALU225": "a unit of another kind than the data's",
     "ALU301": "an effect that is never used",
     "ALU302": "a state that can't be reached",
     "ALU303": "a type that is never used",

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from alula_common.suggestions import nearest
 from skill_language import side_files
-from skill_language.errors import Diagnostic, LanguageError, Severity, has_errors, nearest
+from skill_language.errors import Diagnostic, LanguageError, Severity, has_errors
 from skill_language.models import about, check_files
 from skill_language.notation import SUFFIXES
 from skill_language.robot import Bindings, Robot

@@ -14,8 +14,9 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
+from alula_common.suggestions import nearest
 from skill_language.check import MAX_FINDINGS, check
-from skill_language.errors import Diagnostic, LanguageError, Severity, nearest
+from skill_language.errors import Diagnostic, LanguageError, Severity
 from skill_language.lexer import MAX_CHARACTERS, Source, tokenize
 from skill_language.notation import SUFFIXES, Notation, read
 from skill_language.syntax.document import Document, typed_elements, with_known_types

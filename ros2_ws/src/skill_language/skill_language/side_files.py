@@ -9,7 +9,8 @@ from typing import TypeVar
 
 import yaml
 
-from skill_language.errors import Diagnostic, nearest, quoted
+from alula_common.suggestions import nearest, quoted
+from skill_language.errors import Diagnostic
 from skill_language.lexer import MAX_CHARACTERS
 from skill_language.robot import Bindings, BridgedService, BridgedTopic, DataSource
 from skill_model.model import Span

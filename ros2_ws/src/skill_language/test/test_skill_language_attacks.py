@@ -318,6 +318,21 @@ PLACES = [
         (4, 1, 6),
         "the block opened in line 3 has no `}` before `start` begins",
     ),
+    (
+        "skillset s {\ndata fps: float64 period 1 s // Hz, shown to the pilot\nskill f { invariant i: fps >= 1 km success OK } }",
+        "ALU225",
+        (3, 33, 35),
+        "`fps` is compared in `km`, a length, but is in `Hz`, a frequency",
+    ),
+    (
+        "skillset s { type B data b: B\nskill f { precondition p: b.high > 3 m\ninvariant i: b.high < 9 m recovers at (2 s) success OK } }",
+        "ALU225",
+        (3, 42, 43),
+        "`b.high` is compared in `s`, a time, but is in `m`, a length",
+    ),
+    ("skillset s { data d: float64\nskill f { precondition p: d > 3 furlong/h success OK } }", "ALU103", (2, 33, 40), "found `furlong`"),
+    ("skillset s { data d: float64\nskill f { precondition p: (d > 3 furlong/h) success OK } }", "ALU219", (2, 34, 43), "`furlong/h`"),
+    ("skillset s {\n  data fps\n}", "ALU103", (3, 1, 2), "expected `:`"),
     (f"skillset s {{ data {'a' * 5000}: bool }}", "ALU110", (1, 19, 219), "a name of 5000 characters"),
 ]
 
@@ -341,6 +356,17 @@ def test_hints_name_the_notation_and_what_can_be_asked(tmp_path):
     (tmp_path / "s.rl").write_text("skillset s { skill f { precondition { p: a.r == A } success OK } }")
     (file,) = check_files([tmp_path / "s.rl"])
     assert "those of another skillset can't be asked" in file.findings[0].hint
+
+
+def test_units_of_one_kind_go_together(tmp_path):
+    text = """skillset s {
+      data way: float64 // m, since the start
+      data rate: float64 // min and max in turn: no unit
+      data battery: float64
+      skill f { precondition { a: way > 1 km  b: way > 3  c: rate > 3 m  d: battery > 20 %  e: battery < 12 V } success OK }
+    }"""
+    assert checked(tmp_path, text) == [[("ALU225", 5)]]
+    assert checked(tmp_path, text.replace("12 V", "12 %")) == [[]]
 
 
 def test_a_wait_that_is_shorter_than_the_period_of_its_data_is_told(tmp_path):

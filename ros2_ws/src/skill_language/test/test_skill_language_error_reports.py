@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from skill_language.errors import Diagnostic, LanguageError, nearest
+from alula_common.suggestions import nearest
+from skill_language.errors import Diagnostic, LanguageError
 from skill_language.paper import parse
 from skill_model.model import Span
 

@@ -155,11 +155,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Data:
-    """A value that the functional layer publishes. ``period_s`` is None where no period is promised."""
+    """A value that the functional layer publishes. ``period_s`` is None where no period is promised, ``unit`` empty where none is told."""
 
     name: str
     type: str
     period_s: float | None = None
+    unit: str = ""
     span: Span = field(default=NOWHERE, compare=False)
 
 

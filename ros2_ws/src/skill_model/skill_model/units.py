@@ -21,6 +21,18 @@ UNIT_IN_SI: Mapping[str, float] = {
     "rad": 1.0,
     "deg": math.pi / 180,
     "V": 1.0,
+    "Hz": 1.0,
     "%": 0.01,
 }
 """By what to multiply a number in a unit to have it in SI units."""
+
+KIND_OF_UNIT: Mapping[str, str] = {
+    **dict.fromkeys(("m", "km", "cm", "mm"), "a length"),
+    **dict.fromkeys(("m/s", "km/h"), "a speed"),
+    **dict.fromkeys(("s", "sec", "ms", "min", "h"), "a time"),
+    **dict.fromkeys(("rad", "deg"), "an angle"),
+    "V": "a voltage",
+    "Hz": "a frequency",
+    "%": "a part of a whole",
+}
+"""What a unit measures; one kind is never compared with another."""

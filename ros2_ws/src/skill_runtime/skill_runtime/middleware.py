@@ -24,6 +24,8 @@ from skill_runtime.waiting import Host
 
 Job = Callable[[], object]
 OnValue = Callable[[Any], None]
+OnSign = Callable[[str, int], None]
+"""Gets the life of the managers, and when they gave the sign (mission clock, ns); 0 where the middleware does not tell."""
 OnReply = Callable[[Any, int], None]
 """Gets the answer, and how often it was asked for: an answer to the first request may have got lost."""
 OnError = Callable[[str], None]
@@ -297,8 +299,8 @@ class Middleware(Protocol):
         """
         ...
 
-    def watch(self, on_sign: OnValue, on_doubt: Job) -> None:
-        """Have ``on_sign(life)`` called when managers are heard of, and ``on_doubt()`` when their signs of life stay away."""
+    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
+        """Have ``on_sign`` called when managers are heard of, and ``on_doubt()`` when their signs of life stay away."""
         ...
 
     def close_hooks(self, timeout_s: float) -> bool:

@@ -15,7 +15,7 @@ from action_msgs.msg import GoalStatus  # noqa: E402
 from navigation_managers.model import SKILLSET  # noqa: E402
 from rclpy.action import ActionClient  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from skill_runtime_rig import SOON_S, Navigation, until  # noqa: E402
+from skill_runtime_rig import READY_S, SOON_S, Navigation, until  # noqa: E402
 from skillset_interfaces.msg import SkillStates  # noqa: E402
 from skillset_interfaces.srv import SetPaused, Why  # noqa: E402
 
@@ -53,6 +53,17 @@ def test_a_late_client_learns_the_last_result_of_every_skill(anyhow):
     assert json.loads(last.inputs_json)["target"] == {"x": 1.0, "y": 2.5, "z": 3.0}
     assert 0 < last.requested_ns <= last.started_ns <= last.ended_ns
     assert (skills["land"].open, skills["land"].last) == ([], [])
+
+
+def test_managers_that_answer_after_they_were_given_up_are_found_again(anyhow):
+    navigation, go_on = anyhow, threading.Event()
+    try:
+        navigation.managers.executor.create_task(lambda: go_on.wait(READY_S))
+        navigation.node.executor.create_task(navigation.client._connection.on_doubt)
+        until(lambda: not navigation.client.ready, "managers that say nothing are given up")
+    finally:
+        go_on.set()
+    until(lambda: navigation.client.ready, "their late answer is a sign of life")
 
 
 def test_why_answers_over_the_graph(anyhow):

@@ -8,7 +8,7 @@ from skill_runtime_models import flying_skillset
 from skill_model.execution_state import ExecutionState
 from skill_model.json_form import to_json
 from skill_runtime.client import Client
-from skill_runtime.client.connection import RIVALS_NS
+from skill_runtime.client.connection import DESCRIBE_S, DOUBT_S, RIVALS_NS
 from skill_runtime.client.goal import ACKNOWLEDGE_LIMIT, ACKNOWLEDGE_S, GRACE_S, SILENCE_S
 from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 from skill_runtime.local import VirtualClock
@@ -187,6 +187,17 @@ def test_what_was_given_up_with_managers_that_were_only_frozen_is_cancelled(grap
     assert (client.ready, client.resources) == (True, {"sdk": "AVAILABLE"})
 
 
+def test_managers_that_are_slow_to_describe_themselves_are_asked_until_they_do(graph, client):
+    graph.silent = True
+    graph.sign("two")
+    graph.states("two", sdk="UNAVAILABLE")
+    graph.run_for(3 * DESCRIBE_S)
+    assert not client.ready
+    graph.silent = False
+    graph.run_for(DESCRIBE_S + DOUBT_S)
+    assert (client.ready, client.resources) == (True, {"sdk": "UNAVAILABLE"})
+
+
 def test_nothing_is_cancelled_at_managers_that_are_others(graph, client):
     handle = running(graph, client)
     gone(graph)
@@ -210,6 +221,15 @@ def test_two_managers_at_a_time_are_told(graph, client):
     assert graph.errors == []  # late, or not
     graph.run_for(2 * RIVALS_NS / 1e9)
     graph.states("one")
+    assert graph.errors == ["two processes manage the skillset flying; end one of them"]
+
+
+def test_a_late_sign_of_life_of_managers_that_were_killed_is_no_second_process(graph, client):
+    graph.states("two", sdk="AVAILABLE")
+    graph.run_for(2 * RIVALS_NS / 1e9)
+    graph.sign("one")  # DDS says that others live before it says who
+    assert graph.errors == []
+    graph.sign("one", graph.clock.now_ns)
     assert graph.errors == ["two processes manage the skillset flying; end one of them"]
 
 

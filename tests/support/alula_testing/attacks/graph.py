@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
 from alula_testing import waits
 from alula_testing.ros1 import end_process
@@ -33,15 +33,23 @@ class LiveGraph:
 
     def __init__(self, world: str, make_client: Callable[[], Any]) -> None:
         self._world = world
-        self._make_client = make_client
+        self.make_client = make_client
         self._client: Any = None
-        self.managers = self.start("server")
-        self.read_until_ready(self.managers)
+        self._managers: subprocess.Popen[str] | None = None
+
+    @property
+    def managers(self) -> subprocess.Popen[str]:
+        """The process of the managers; started when it is first needed."""
+        if self._managers is None:
+            self._managers = self.start("server")
+            self.read_until_ready(self._managers)
+        return self._managers
 
     def client(self) -> Any:
         """Return the one client of this process, ready."""
+        assert self.managers.poll() is None, "the managers have ended"
         if self._client is None:
-            self._client = self._make_client()
+            self._client = self.make_client()
         assert self._client.wait_ready(PATIENCE_S), "the managers are not there"
         return self._client
 
@@ -49,10 +57,10 @@ class LiveGraph:
         """Wait until the condition holds (wall clock)."""
         waits.until(condition, what, patience_s)
 
-    def start(self, program: str) -> subprocess.Popen[str]:
-        """Start a program of this package in this world."""
-        command = [sys.executable, "-m", f"alula_testing.attacks.{program}", self._world]
-        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    def start(self, program: str, *words: str, log: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
+        """Start a program of this package in this world; what it says on stderr goes to ``log``."""
+        command = [sys.executable, "-m", f"alula_testing.attacks.{program}", self._world, *words]
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": log}
         return subprocess.Popen(command, text=True, start_new_session=True, env=os.environ.copy(), **pipes)
 
     @staticmethod
@@ -63,7 +71,8 @@ class LiveGraph:
 
     def close(self) -> None:
         """End the managers."""
-        end_process(self.managers)  # type: ignore[arg-type]  # of text or bytes, it is ended
+        if self._managers is not None:
+            end_process(self._managers)  # type: ignore[arg-type]  # of text or bytes, it is ended
 
 
 def answer(found: dict[str, Any]) -> str:

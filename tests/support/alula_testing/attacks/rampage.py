@@ -1,30 +1,29 @@
-"""Clients that do anything at any time, hooks that misbehave at random, managers that are killed: in virtual time, by a seed.
+"""Clients that do anything at any time, hooks that misbehave at random, managers that are killed and frozen.
 
-``python -m alula_testing.attacks.rampage [ROUNDS] [SEED]`` prints what was found, as JSON.
+``python -m alula_testing.attacks.rampage [local|ros1|ros2] [--rounds N] [--kills N] [--freezes N] [--seed N]`` prints what was found,
+as JSON, and ends with 1 when something is wrong. In virtual time the same seed makes the same run.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import random
 import sys
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from navigation_managers.hooks import ABSTRACT_HOOKS
-from navigation_managers.model import SKILLSET
-
-from alula_testing.misbehaviours import MISBEHAVIOURS, Misbehaviour
-from alula_testing.navigation import FLYING
-from skill_runtime.core import Execution
+from alula_testing.attacks.stages import LiveStage, LocalStage, Stage
+from alula_testing.attacks.worlds import WORLDS
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.handle import SkillHandle
-from skill_runtime.hooks import SkillHooks
-from skill_runtime.local import LocalManagers, LocalWorld
 
 CLIENTS = 8
-TAME = Misbehaviour("", lambda _: None)
+END_S = 60.0
+"""How long all that is asked to end may take; a hook that hangs twice and a stop that is never done take 12 s."""
+FREEZE_S = (0.2, 6.0)
 CALLS: Mapping[str, Mapping[str, object]] = {
     "goto": {"target": (1, 2, 3), "speed": 1},
     "goto_straight": {"target": (1, 2, 3), "speed": 1},
@@ -32,110 +31,59 @@ CALLS: Mapping[str, Mapping[str, object]] = {
     "rotate_head": {"heading": 1, "rate": 0.5},
 }
 """Not the takeoff: its violation keeps the axes, as in the paper."""
-
-
-class RandomHooks(SkillHooks):
-    """Each execution misbehaves in a way of its own, in one hook; every other one ends by itself."""
-
-    def __init__(self, inputs_type: type, managers: LocalManagers, chance: random.Random) -> None:
-        self.inputs_type = inputs_type  # type: ignore[misc]  # a class variable where hooks are written by hand
-        self._managers = managers
-        self._chance = chance
-        self._next = TAME
-        self._of: dict[str, Misbehaviour] = {}
-
-    def validate(self, inputs: object) -> str:
-        """Choose the misbehaviour."""
-        self._next = self._chance.choice([TAME, self._chance.choice(list(MISBEHAVIOURS.values()))])
-        answer: str = self._next.act(inputs) if self._next.hook == "validate" else ""
-        return answer
-
-    def on_dispatch(self, execution: Execution) -> None:
-        """Start."""
-        self._of[execution.id] = self._next
-        if self._chance.random() < 0.5:
-            self._managers.after(self._chance.uniform(0.0, 2.0), lambda: execution.terminate("DONE"))
-        self._do("on_dispatch", execution)
-
-    def progress(self, execution: Execution) -> float:
-        """Tell of some progress."""
-        answer: float = self._do("progress", execution, self._chance.random())
-        return answer
-
-    def on_interrupt(self, execution: Execution) -> bool | None:
-        """Stop, at once or not; never, perhaps."""
-        answer: bool | None = self._do("on_interrupt", execution, self._chance.choice([None, False]))
-        return answer
-
-    def on_pause(self, execution: Execution) -> str | None:
-        """Rest."""
-        answer: str | None = self._do("on_pause", execution, "")
-        return answer
-
-    def on_resume(self, execution: Execution) -> str | None:
-        """Go on."""
-        answer: str | None = self._do("on_resume", execution, "")
-        return answer
-
-    def on_violation(self, execution: Execution) -> None:
-        """Stop."""
-        self._do("on_violation", execution)
-
-    def on_failure(self, execution: Execution) -> None:
-        """Stop."""
-        self._do("on_failure", execution)
-
-    def _do(self, hook: str, execution: Execution, otherwise: object = None) -> Any:
-        misbehaviour = self._of.get(execution.id, TAME)
-        return misbehaviour.act(execution) if misbehaviour.hook == hook else otherwise
+WRONG = ("open", "ended twice", "running on", "unanswered", "held", "not done", "died")
 
 
 class Rampage:
-    """One world, eight clients, and what became of everything that they asked for."""
+    """One stage, its clients, and what became of everything that they asked for."""
 
-    def __init__(self, seed: int) -> None:
-        self._chance = random.Random(seed)  # noqa: S311 - the same seed makes the same run
-        self._world = LocalWorld(latency_s=0.01)
-        self._managers = self._serve()
-        self._clients = [self._world.client(SKILLSET.name) for _ in range(CLIENTS)]
+    def __init__(self, stage: Stage, chance: random.Random) -> None:
+        self._stage = stage
+        self._chance = chance
+        self._clients = stage.clients
         self._handles: list[SkillHandle] = []
         self._answers: list[Any] = []
         self._ends: Counter[str] = Counter()
-        self._errors: list[str] = []
-        self._kills = 0
         self._clients[0].on_event(self._hear)
-        self._world.run_for(1.0)
 
-    def run(self, rounds: int) -> dict[str, Any]:
-        """Do so many things, end everything, and return what is wrong (empty lists: nothing) and how much there was."""
+    def run(self, rounds: int, *, kills: int = 0, freezes: int = 0) -> dict[str, Any]:
+        """Do so many things, end everything, and return what is wrong (empty: nothing) and how much there was."""
         moves: list[Callable[[], None]] = [self._start] * 8 + [self._interrupt] * 3 + [self._pause] * 2 + [self._transition] * 2
+        disasters = [self._stage.kill] * kills + [self._freeze] * freezes
+        when = dict(zip(sorted(self._chance.sample(range(rounds), len(disasters))), self._shuffled(disasters), strict=True))
         for number in range(rounds):
             self._chance.choice(moves)()
-            if number % 500 == 499:
-                self._kill()
-            self._world.run_for(self._chance.choice([0.0, 0.0, 0.3]))
+            if number in when:
+                when[number]()
+            self._stage.rest(self._chance.choice([0.0, 0.0, 0.3]))
+        return self._judge() | {"kills": kills, "freezes": freezes}
+
+    def _judge(self) -> dict[str, Any]:
+        """End everything, and see what does not."""
         for handle in self._handles:
             handle.interrupt()
-        self._world.run_for(30.0)
-        self._errors += self._managers.errors
+        self._stage.until(lambda: all(handle.done for handle in self._handles), END_S)
+        # What callers believe ended has ended: clients hear of it a moment later.
+        self._stage.until(lambda: not self._open() and not self._held(), END_S)
+        self._stage.until(lambda: all(answer.done for answer in self._answers), END_S)
         return {
             "open": [str(handle) for handle in self._handles if not handle.done],
             "ended twice": [execution for execution, times in self._ends.items() if times > 1],
-            "running on": [str(execution) for execution in self._managers.engine.executions],
+            "running on": self._open(),
             "unanswered": sum(not answer.done for answer in self._answers),
-            "not told": [error for error in self._errors if "listener" in error],
-            "held": {name: status.state for name, status in self._managers.engine.resources.items() if status.state == "USED"},
+            "held": self._held(),
+            **self._stage.close(),
             "executions": len(self._handles),
             "outcomes": dict(sorted(Counter(handle.outcome for handle in self._handles).items())),
-            "kills": self._kills,
         }
 
-    def _serve(self) -> LocalManagers:
-        make = lambda managers: {n: RandomHooks(h.inputs_type, managers, self._chance) for n, h in ABSTRACT_HOOKS.items()}  # noqa: E731
-        managers = self._world.serve(SKILLSET, make)
-        for resource, state in FLYING.items():
-            managers.transition(resource, state)
-        return managers
+    def _open(self) -> list[str]:
+        """Return the executions that the managers have open, as every client knows it."""
+        known = [record for client in self._clients for skill in client.skills.values() for record in skill.open]
+        return sorted({f"{record.skill} {record.id} {record.state.value}" for record in known})
+
+    def _held(self) -> dict[str, str]:
+        return {name: state for client in self._clients for name, state in client.resources.items() if state == "USED"}
 
     def _hear(self, event: EngineEvent) -> None:
         if isinstance(event, ExecutionEvent) and event.state.terminal:
@@ -155,22 +103,43 @@ class Rampage:
             self._answers.append(self._chance.choice([handle.pause, handle.resume])())
 
     def _transition(self) -> None:
-        state = self._chance.choice(["AVAILABLE", "AVAILABLE", "UNAVAILABLE"])
+        state = self._chance.choice(["AVAILABLE"] * 4 + ["UNAVAILABLE"])
         self._answers.append(self._chance.choice(self._clients).transition("SDK_authority", state))
 
-    def _kill(self) -> None:
-        self._errors += self._managers.errors
-        self._world.kill(SKILLSET.name)
-        self._kills += 1
-        self._world.run_for(self._chance.uniform(0.0, 2.0))
-        self._managers = self._serve()
-        self._world.run_for(1.0)
+    def _freeze(self) -> None:
+        self._stage.freeze(self._chance.uniform(*FREEZE_S))
+
+    def _shuffled(self, disasters: list[Callable[[], None]]) -> list[Callable[[], None]]:
+        return self._chance.sample(disasters, len(disasters))
+
+
+def rampage(world: str, rounds: int, *, kills: int, freezes: int = 0, seed: int = 0) -> dict[str, Any]:
+    """Run one in a world and return what was found."""
+    chance = random.Random(seed)  # noqa: S311 - the same seed makes the same run
+    if world == "local":
+        return Rampage(LocalStage(CLIENTS, chance), chance).run(rounds, kills=kills)
+    with WORLDS[world]() as graph:
+        began_s = time.monotonic()
+        stage = LiveStage(graph, CLIENTS, chance)
+        try:
+            found = Rampage(stage, chance).run(rounds, kills=kills, freezes=freezes)
+        finally:
+            stage.end()
+        return found | {"minutes": round((time.monotonic() - began_s) / 60.0, 1)}
 
 
 def main() -> None:
     """Run for a while."""
-    rounds, seed = (int(word) for word in (*sys.argv[1:], "10000", "0")[:2])
-    sys.stdout.write(json.dumps(Rampage(seed).run(rounds), indent=1) + "\n")
+    parser = argparse.ArgumentParser(prog="python -m alula_testing.attacks.rampage", description=__doc__)
+    parser.add_argument("world", nargs="?", choices=["local", *WORLDS], default="local")
+    parser.add_argument("--rounds", type=int, default=10_000, help="things that clients do")
+    parser.add_argument("--kills", type=int, default=20, help="SIGKILLs of the managers")
+    parser.add_argument("--freezes", type=int, default=10, help=f"SIGSTOPs of the managers, for {FREEZE_S[0]:g} to {FREEZE_S[1]:g} s")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    found = rampage(options.world, options.rounds, kills=options.kills, freezes=options.freezes, seed=options.seed)
+    sys.stdout.write(json.dumps(found, indent=1) + "\n")
+    sys.exit(1 if any(found.get(what) for what in WRONG) else 0)
 
 
 if __name__ == "__main__":

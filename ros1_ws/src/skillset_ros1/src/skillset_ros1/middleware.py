@@ -17,8 +17,8 @@ import rospy
 from roslib.message import get_message_class
 from std_msgs.msg import Header
 
-from skill_runtime.codecs import SERVICES, TOPICS, set_stamp
-from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnValue, Serve, Topic
+from skill_runtime.codecs import SERVICES, TOPICS, set_stamp, stamp_ns_of
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnSign, OnValue, Serve, Topic
 from skill_runtime.plain import message_class
 from skill_runtime.views import Sample
 from skill_runtime.waiting import Host
@@ -226,14 +226,14 @@ class RospyMiddleware:
 
         threading.Thread(target=beat, name=f"{self._place}_alive", daemon=True).start()
 
-    def watch(self, on_sign: OnValue, on_doubt: Job) -> None:
+    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
         """Be told of the life of managers, and of their silence, once in a lease."""
         heard_s: list[float] = []
 
         def hear(sign: Any) -> None:
             self.server = sign._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell who sent it
             heard_s[:] = [time.monotonic()]
-            on_sign(sign.frame_id)
+            on_sign(sign.frame_id, stamp_ns_of(sign.stamp))
 
         signs = self.listen(self.name("alive"), Header, hear)
 

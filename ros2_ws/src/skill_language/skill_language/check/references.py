@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from skill_language.errors import Diagnostic, Severity, nearest, quoted
+from alula_common.suggestions import nearest, quoted
+from skill_language.errors import Diagnostic, Severity
 from skill_model import ros_types
 from skill_model.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, SkillRuns, Skillset, Span, atoms
 from skill_model.units import UNIT_IN_SI
@@ -70,7 +71,7 @@ def _data(skillset: Skillset, atom: DataIs) -> Iterator[Diagnostic]:
     if isinstance(atom.value, bool | str) and atom.comparison not in {Comparison.EQ, Comparison.NE}:
         kind = "a truth value" if isinstance(atom.value, bool) else "a text"
         yield error("ALU214", f"`{atom.comparison.value}` doesn't compare {kind}; use == or !=", atom.span)
-    yield from unit_findings(atom.unit, atom.span)
+    yield from unit_findings(atom.unit, last_word(atom.span, atom.unit))
     python = ros_types.PRIMITIVES.get(data.type)
     if python is None:
         return

@@ -13,6 +13,7 @@ from skill_language.check.references import (
     effect_findings,
     error,
     for_generator,
+    last_word,
     names_of_types,
     ros_name,
     unit_findings,
@@ -81,7 +82,7 @@ def _hold(invariant: Invariant, hold: Hold) -> Iterator[Diagnostic]:
         yield error("ALU221", f"invariant `{invariant.name}` holds for {hold.for_s:g} s; it must be positive", hold.span)
     if hold.hysteresis is None:
         return
-    yield from unit_findings(hold.unit, hold.span)
+    yield from unit_findings(hold.unit, last_word(hold.span, hold.unit))
     condition = invariant.condition
     below = {Comparison.LT: True, Comparison.LE: True, Comparison.GT: False, Comparison.GE: False}
     if not isinstance(condition, DataIs) or condition.comparison not in below or not isinstance(condition.value, float):

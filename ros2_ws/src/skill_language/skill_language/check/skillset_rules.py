@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from alula_common.suggestions import nearest
 from skill_language.check.references import (
     Named,
     condition_findings,
@@ -20,7 +21,8 @@ from skill_language.check.references import (
     unknown_state,
     warning,
 )
-from skill_language.errors import Diagnostic, nearest
+from skill_language.check.units import unit_kinds
+from skill_language.errors import Diagnostic
 from skill_language.syntax.document import typed_elements
 from skill_language.syntax.resources import occurring
 from skill_model import ros_types
@@ -142,4 +144,12 @@ def _properties(skillset: Skillset) -> Iterator[Diagnostic]:
                 yield from condition_findings(skillset, condition, where, data_allowed=False, executions_allowed=True)
 
 
-RULES: Sequence[Callable[[Skillset], Iterable[Diagnostic]]] = (_skillset_names, _resources, _types, _periods, _events, _properties)
+RULES: Sequence[Callable[[Skillset], Iterable[Diagnostic]]] = (
+    _skillset_names,
+    _resources,
+    _types,
+    _periods,
+    unit_kinds,
+    _events,
+    _properties,
+)

@@ -115,7 +115,7 @@ def hold_text(hold: Hold | None) -> str:
 
 def _data(data: Data) -> str:
     period = "" if data.period_s is None else f" period = {data.period_s!r}"
-    return f"data {data.name}: {data.type}{period}"
+    return f"data {data.name}: {data.type}{period}{comment_text(data.unit)}"
 
 
 def _resource(resource: Resource, *, in_block: bool) -> Iterator[str]:

@@ -9,7 +9,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from skill_language.errors import LanguageError, nearest
+from alula_common.suggestions import nearest
+from skill_language.errors import LanguageError
 from skill_language.lexer import Kind, Source, Token
 from skill_language.syntax.cursor import Cursor, SyntaxFault, starts_member
 from skill_language.syntax.elements import one_or_block, read_changes, read_data, read_parameter

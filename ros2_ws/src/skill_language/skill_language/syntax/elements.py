@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from skill_language.lexer import Kind
 from skill_language.syntax.cursor import Cursor
 from skill_language.syntax.quantities import quantity, setting
 from skill_model.model import Assignment, Data, Parameter
+from skill_model.units import KIND_OF_UNIT
 
 
 def one_or_block(cursor: Cursor, entry: Callable[[], None], outer: Callable[[], bool]) -> None:
@@ -44,14 +46,20 @@ def _literal(cursor: Cursor) -> str:
 
 
 def read_data(cursor: Cursor) -> Data:
-    """Read `name: Type`, `name: Type period 1 sec` or `name: Type period = 0.5`."""
+    """Read `name: Type`, `name: Type period 1 sec` or `name: Type period = 0.5`, and behind it `// unit`."""
     name = cursor.name("the name of data")
     cursor.expect(":", hint="data is written `name: Type period 0.5 s`")
     kind = cursor.name("a type")
     # `data { a: T  period: U }` has a second data of that name.
     another = cursor.ahead().text == ":" and cursor.ahead(2).kind is Kind.NAME
     period = setting(cursor, "period") if cursor.at("period") and not another else None
-    return Data(name.text, kind.text, period, span=cursor.span(name, kind))
+    return Data(name.text, kind.text, period, _told_unit(cursor.previous.comment), span=cursor.span(name, kind))
+
+
+def _told_unit(comment: str) -> str:
+    """Return the unit that a comment begins with, as `Hz` or `m/s, over the ground`; else nothing."""
+    unit = re.split(r"[,;:]", comment, maxsplit=1)[0].strip()
+    return unit if unit in KIND_OF_UNIT else ""
 
 
 def read_change(cursor: Cursor) -> Assignment:

@@ -59,6 +59,7 @@ def hold(cursor: Cursor) -> Hold | None:
     cursor.expect("at")
     enclosed = cursor.accept("(") is not None
     value, unit = quantity(cursor, enclosed=enclosed)
+    span = cursor.span(first, cursor.previous)
     if enclosed:
         cursor.expect(")")
-    return Hold(for_s, value, unit, span=cursor.span(first, cursor.previous))
+    return Hold(for_s, value, unit, span=span)

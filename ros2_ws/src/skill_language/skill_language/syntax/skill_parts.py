@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from skill_language.errors import nearest
+from alula_common.suggestions import nearest
 from skill_language.lexer import Source, Token
 from skill_model.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, Skill
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from skill_language.errors import nearest
+from alula_common.suggestions import nearest
 from skill_language.lexer import Kind, Token
 from skill_language.syntax.cursor import Cursor, SyntaxFault
 from skill_language.syntax.elements import read_change

@@ -45,6 +45,7 @@ class Connection:
         self._on_alive = on_alive
         self._on_gone = on_gone
         self._alive = False
+        self._doubted = False
         self._described = ""
         self._states_heard = ""
         self._asking = False
@@ -72,10 +73,11 @@ class Connection:
             self._states_heard = self.life
             self._look()
 
-    def on_sign(self, life: str) -> None:
-        """Take a sign of life."""
-        if not self.heard(life, self._middleware.now_ns()):
+    def on_sign(self, life: str, stamp_ns: int = 0) -> None:
+        """Take a sign of life; ``stamp_ns``: when it was given (mission clock), 0 where that is not known."""
+        if not self.heard(life, stamp_ns):
             return
+        self._doubted = False
         if not self._alive:
             self._alive, self.gone = True, False
             self._on_alive()
@@ -86,6 +88,7 @@ class Connection:
     def on_doubt(self) -> None:
         """Ask managers whose signs of life stay away."""
         if self._alive:
+            self._doubted = True
             self._ask(DOUBT_S)
 
     def close(self) -> None:
@@ -101,7 +104,7 @@ class Connection:
             self._middleware.call("describe", {}, lambda text, _: self._use(life, text), self._on_silence, timeout_s=timeout_s)
 
     def _use(self, life: str, model_json: str) -> None:
-        self._asking = False
+        self._asking = self._doubted = False
         model = from_json(model_json)
         if model != self.model:
             for skill in model.skills:
@@ -115,10 +118,17 @@ class Connection:
 
     def _on_silence(self, reason: str) -> None:  # noqa: ARG002 - that they have gone is all there is to say
         self._asking = False
-        if self._alive:
+        if self._alive and not self._doubted:
+            # They live, and are slow or hardly there yet: should they end, the middleware will doubt them.
+            self._middleware.later(DOUBT_S, self._ask_again)
+        elif self._alive:
             self._alive, self.gone = False, True
             self.ready.clear()
             self._on_gone()
+
+    def _ask_again(self) -> None:
+        if self._alive and self._described != self.life:
+            self._ask(DESCRIBE_S)
 
     def _look(self) -> None:
         """Be ready once the managers are alive and known, and connected in both directions."""

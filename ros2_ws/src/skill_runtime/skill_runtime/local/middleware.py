@@ -17,7 +17,7 @@ from skill_model.model import Skill, Skillset
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.local.clock import Job, Timer, VirtualClock, WorldError
 from skill_runtime.local.values import Types, complete, fit, ros_type
-from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnReply, OnValue, Serve, Topic
+from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
 from skill_runtime.waiting import CannotWaitError, Host
 
 _LOG = logging.getLogger(__name__)
@@ -51,7 +51,7 @@ class Bus:
         self.clock = clock
         self.types = types
         self.served: dict[str, Served] = {}
-        self.watchers: dict[str, list[tuple[OnValue, Job]]] = {}
+        self.watchers: dict[str, list[tuple[OnSign, Job]]] = {}
         self.ids = itertools.count(1)
         self._run = run
         self._latency_s = latency_s
@@ -221,17 +221,17 @@ class VirtualMiddleware:
         """Tell all who watch that these managers live."""
         self._served.life = life
         for on_sign, _ in self.bus.watchers.get(self.skillset, ()):
-            self.bus.send(functools.partial(on_sign, life))
+            self.bus.send(functools.partial(on_sign, life, 0))
 
-    def watch(self, on_sign: OnValue, on_doubt: Job) -> None:
+    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
         """Be told of the life of the managers."""
-        signed: OnValue = lambda life: self.do(lambda: on_sign(life))  # noqa: E731
+        signed: OnSign = lambda life, stamp_ns: self.do(lambda: on_sign(life, stamp_ns))  # noqa: E731
         doubted: Job = lambda: self.do(on_doubt)  # noqa: E731
         self.bus.watchers.setdefault(self.skillset, []).append((signed, doubted))
         served = self.bus.served.get(self.skillset)
         if served is not None and served.life:
             life = served.life
-            self.bus.send(lambda: signed(life))
+            self.bus.send(lambda: signed(life, 0))
 
     def close_hooks(self, timeout_s: float) -> bool:  # noqa: ARG002 - hooks are jobs of the clock, and can't hang
         """Tell that no hook is left behind."""

@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
 from skill_runtime.codecs import SERVICES, TOPICS, set_stamp, stamp_ns_of
-from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnValue, Serve, Topic
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnSign, OnValue, Serve, Topic
 from skill_runtime.plain import message_class
 from skill_runtime.ros2.actions import ID_DIGITS, RclpyLink, RclpyServer
 from skill_runtime.ros2.alarms import Alarm, Alarms
@@ -83,6 +83,7 @@ class RclpyMiddleware:
         self._workers = Workers(f"{skillset}_hooks", self.log)
         self._calls: dict[str, Calls] = {}
         self._closed = False
+        self._give_sign: Job = lambda: None
         self._ended_ns = 0
         """When this was closed, mission clock: the node may be destroyed afterwards."""
 
@@ -236,6 +237,9 @@ class RclpyMiddleware:
         def take(request: Any, header: Any) -> None:
             fields = {name: getattr(request, name) for name in codec.fields}
             handler(fields, functools.partial(reply, header))
+            if service == "describe":
+                # Who asks may have given these managers up before this answer comes, and DDS tells of no change.
+                self._give_sign()
 
         # What rclpy takes for the sending of the callback's return value is where the request is dealt with.
         made.send_response = self.on_loop(take)
@@ -310,23 +314,25 @@ class RclpyMiddleware:
                 self.log(f"second managers of {self._skillset} were started; they have to end")
 
         self._listen(self.name("alive"), Header, hear, latched(1))
-        self._sign: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE)
-        self._sign.publish(sign)
+        publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE)
+        self._give_sign = lambda: publisher.publish(sign)
+        self._give_sign()
 
-    def watch(self, on_sign: OnValue, on_doubt: Job) -> None:
+    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
         """Be told of the life of managers, by DDS."""
         last: list[str] = []
 
         def hear(sign: Any) -> None:
             last[:] = [sign.frame_id]
-            on_sign(sign.frame_id)
+            on_sign(sign.frame_id, 0)
 
         def changed(info: Any) -> None:
             # By the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).
             if info.alive_count_change < 0 or info.not_alive_count_change > 0:
                 on_doubt()
             elif info.alive_count_change > 0 and last:
-                on_sign(last[0])
+                # Those who were heard last, perhaps: it may be others that live, whose name comes in a moment.
+                on_sign(last[0], 0)
 
         self.node.create_subscription(
             Header,
