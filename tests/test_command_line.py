@@ -37,6 +37,7 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["panel", "--run", "no/such/run"], "no/such/run"),
         (["new", "robot", "Small-Rover"], "Small-Rover"),
         (["conform", "no/such/run"], "no/such/run"),
+        (["expect", "no/such/run"], "no/such/run"),
         (["bridge", "--config", "no/such/file.yaml"], "no/such/file.yaml"),
     ],
 )
