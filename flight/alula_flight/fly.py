@@ -42,7 +42,7 @@ PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
 MISSION_NODE = "mission"
-SENSORS_MB_S = 7.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
+SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
 
 
 class Arguments(argparse.Namespace):

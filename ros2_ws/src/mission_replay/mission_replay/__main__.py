@@ -9,14 +9,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from alula_common.files import write_json, write_text
+from alula_common.record import Entry
 from mission_replay.asked import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
 from mission_replay.recorded import Recorded, ReplayError, load
 from mission_replay.replay import Replay, Result
+from mission_replay.vehicle import RecordedSkills, Vehicle
 from skill_missions.record import MissionRecord
+from skill_model.model import Skillset
+from skill_runtime.mock import Behaviour
 from uav_missions.plan import write_route
 from uav_missions.route import Route
 
@@ -26,8 +30,8 @@ SAME, OTHERWISE, CANNOT_REPLAY = 0, 1, 2
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="alula replay", description="Make the decisions of a recorded mission again.")
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run's folder, or its skills.mcap")
-    parser.add_argument("--from", dest="depth", choices=["skills"], default="skills", help="what is taken from the record")
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run's folder, its skills.mcap or its functional.bag")
+    parser.add_argument("--from", dest="depth", choices=["functional", "skills"], default="skills", help="what is taken from the record")
     parser.add_argument("--tree", default="", metavar="FILE.py|MODULE[:FUNCTION]", help="another tree: function plan(route) -> MissionPlan")
     parser.add_argument("--model", type=Path, action="append", default=[], metavar="FILE", help="another model of a skillset")
     parser.add_argument(
@@ -53,21 +57,30 @@ def prepare(recorded: Recorded, options: argparse.Namespace) -> Replay:
     skillsets = skillsets_for(plan, options.model)
     behaviour = behaviour_for(recorded, skillsets, options.behaviour)
     parameters = parameters_for(recorded, plan, options.settings)
+    faults = faults_for(behaviour, options.fail)
+    vehicle, entries = vehicle_at(options, recorded, skillsets, behaviour)
+    for fault in faults:
+        vehicle.fail(fault)
     make_record = None
     if options.out is not None:
         make_folder(options.out)
         make_record = lambda clock_ns: MissionRecord(options.out, plan, clock_ns, parameters)  # noqa: E731
-    return Replay(
-        recorded,
-        plan,
-        skillsets,
-        behaviour,
-        parameters=parameters,
-        faults=faults_for(behaviour, options.fail),
-        go_on=options.on,
-        record=make_record,
-        rate=options.rate,
-    )
+    return Replay(recorded, vehicle, entries, plan, parameters=parameters, go_on=options.on, record=make_record, rate=options.rate)
+
+
+def vehicle_at(
+    options: argparse.Namespace, recorded: Recorded, skillsets: list[Skillset], behaviour: Behaviour
+) -> tuple[Vehicle, Iterable[Entry]]:
+    """Return what answers the tree, and what is told it, at the depth that is asked for; raises ReplayError."""
+    if options.depth == "skills":
+        start_s = min(entry.stamp_s for entry in recorded.entries)
+        return RecordedSkills(skillsets, recorded, behaviour, start_s=start_s), recorded.entries
+    # Late: it needs the interfaces, which a replay of skills does without.
+    from mission_replay.functional import RecordedFunctions, bag_of, begin_of, entries_of
+
+    bag = bag_of(recorded, options.run)
+    functions = RecordedFunctions(skillsets, bag, behaviour, start_s=begin_of(recorded, bag))
+    return functions, entries_of(recorded, bag, functions.topics)
 
 
 def make_folder(out: Path) -> None:

@@ -29,7 +29,8 @@ class Difference:
     def lines(self, zero_s: float) -> list[str]:
         """Return what a person wants to read; times count from ``zero_s``."""
         said = [f"decisions differ at {self.t_s - zero_s:.2f} s{f': {self.why}' if self.why else ''}"]
-        for title, decision, knew in (("then", self.then, self.knew_then), ("now", self.now, self.knew_now)):
+        sides = (("then", self.then, self.knew_then), ("now", self.now, self.knew_now))
+        for title, decision, knew in sides if self.then is not None or self.now is not None else ():
             what = "nothing" if decision is None else f"{decision.words()} at {decision.t_s - zero_s:.2f} s"
             said.append(f"  {title + ':':5} {what}{f'   [{knew.path}]' if knew.path else ''}")
         said += [f"  {line}" for line in _apart("resource", self.knew_then.resources, self.knew_now.resources)]
@@ -58,6 +59,7 @@ class Comparison:
         self._recorded = recorded
         self._knowledge = knowledge
         self._next = 0
+        self._below: tuple[float, str] | None = None
 
     @property
     def expected(self) -> Decision | None:
@@ -85,12 +87,21 @@ class Comparison:
         then = self.expected
         if then is not None and now_s > then.t_s + LATE_S:
             self._differ(then, None)
+        if self.difference is None and self._below is not None and now_s > self._below[0] + LATE_S:
+            self.difference = self._made(self._below[0], None, None, self._below[1])
 
-    def over(self, now_s: float) -> None:
-        """Take note that nothing more will be decided."""
+    def told(self, why: str, now_s: float) -> None:
+        """Take a difference below the decisions; it counts unless a decision differs soon, which tells more."""
+        if self._below is None:
+            self._below = now_s, why
+
+    def over(self, now_s: float, *, whole: bool) -> None:
+        """Take note that nothing more will be decided; ``whole``: what was decided then is all known."""
         then = self.expected
-        if then is not None:
+        if then is not None and whole:
             self.difference = self._made(now_s, then, None, "")
+        elif self.difference is None and self._below is not None:
+            self.difference = self._made(self._below[0], None, None, self._below[1])
 
     def _differ(self, then: Decision | None, now: Decision | None, why: str = "") -> None:
         t_s = now.t_s if now is not None else then.t_s if then is not None else 0.0

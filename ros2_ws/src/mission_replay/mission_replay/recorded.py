@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from alula_common.record import BLACKBOARD, DECISIONS, EVENTS, FILE, MISSION, REPORTS, TICKS, TREE, Entry, RecordError, RecordFollower
+from alula_common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, REPORTS, TICKS, TREE, Entry, RecordError, RecordFollower
 from skill_model.execution_state import ExecutionState
-from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, read_event
 
 EXTERN = "extern"
 
@@ -128,14 +128,15 @@ class Recorded:
 
 
 def load(path: Path) -> Recorded:
-    """Read a run's folder or its ``skills.mcap``, up to where it breaks off.
+    """Read a run's folder, its ``skills.mcap``, or the one beside a bag, up to where it breaks off.
 
     Raises:
         ReplayError: there is no such file, it is no record, or there is no mission in it.
     """
-    file = path / FILE if path.is_dir() else path
+    file = path / FILE if path.is_dir() else path.with_name(FILE) if path.suffix == ".bag" else path
     if not file.is_file():
-        raise ReplayError(f"{file}: there is no such record")
+        bag = f"; {path.name} alone does not tell which mission was flown" if path.suffix == ".bag" else ""
+        raise ReplayError(f"{file}: there is no such record{bag}")
     follower = RecordFollower(file)
     try:
         entries = follower.poll()
@@ -145,6 +146,7 @@ def load(path: Path) -> Recorded:
     if not missions:
         raise ReplayError(f"{file}: there is no mission in it")
     try:
+        _check(entries)
         return Recorded(file, entries, missions[-1], list(_decisions(entries)), _answers(entries), follower.ended)
     except (KeyError, TypeError, ValueError) as error:
         raise ReplayError(f"{file}: is no record of a mission: {type(error).__name__} {error}") from error
@@ -169,6 +171,16 @@ def path_to(tree: Mapping[str, Any], skill: str) -> str:
     if tree:
         walk(tree, ())
     return found.get("RUNNING", next(iter(found.values()), ""))
+
+
+def _check(entries: Iterable[Entry]) -> None:
+    """Raise KeyError, TypeError or ValueError where an entry has not what a replay reads of it."""
+    for entry in entries:
+        value = entry.value
+        if entry.topic == REPORTS:
+            str(value["id"]), float(value.get("progress") or 0.0), ExecutionState(value["state"]), dict(value.get("outputs") or {})
+        elif entry.topic == DATA:
+            str(value["skillset"]), str(value["data"]), value["value"]
 
 
 def _decisions(entries: Iterable[Entry]) -> Iterable[Decision]:
@@ -198,14 +210,6 @@ def _advance(before: Answer | None, event: ExecutionEvent) -> Answer:
     ended_s = event.stamp_s if event.state.terminal else None
     values = {"state": event.state, "result": event.result, "message": event.message, "outputs": dict(event.outputs), "ended_s": ended_s}
     return Answer(**{**vars(answer), **values})
-
-
-def extern_transition(entry: Entry) -> TransitionEvent | None:
-    """Return the extern transition that an entry tells of, or None."""
-    if entry.topic != EVENTS or entry.value.get("kind") != "TRANSITION":
-        return None
-    event = event_of(entry)
-    return event if isinstance(event, TransitionEvent) and event.cause == EXTERN else None
 
 
 def _short(value: Any) -> str:

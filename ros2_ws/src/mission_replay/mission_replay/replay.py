@@ -1,6 +1,6 @@
 """A recorded mission again, in virtual time and without ROS: its own tree, or another, is ticked when it was and told what it was told.
 
-1. What the record says of the vehicle happens in real managers in virtual time: extern transitions, data, ends of executions.
+1. What the record says of the vehicle happens under real managers in virtual time (``vehicle``, ``functional``).
 2. The tree is ticked when it was ticked.
 3. What it asks for is held against what it asked for. As long as both agree, the record answers.
 4. At the first difference the replay stops; or it goes on over mocks, the tree ticked at 10 Hz and whenever something happens.
@@ -9,25 +9,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from alula_common.faults import FaultRequest
-from alula_common.record import DATA, OPERATOR, REPORTS, TICKS, Entry
+from alula_common.record import OPERATOR, TICKS, Entry
 from mission_replay.comparison import Comparison, Difference
-from mission_replay.recorded import Decision, Knowledge, Recorded, ReplayError, event_of, extern_transition, path_to
+from mission_replay.recorded import Decision, Knowledge, Recorded, path_to
 from mission_replay.vehicle import Vehicle
 from skill_missions.director import Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
 from skill_missions.skillset import MissionClient, Recorder
-from skill_model.execution_state import ExecutionState
-from skill_model.model import Skillset
 from skill_runtime.client import Client
-from skill_runtime.core.events import EngineEvent, ExecutionEvent
+from skill_runtime.core.events import EngineEvent
 from skill_runtime.handle import SkillHandle
-from skill_runtime.mock import Behaviour
 from skill_runtime.plain import to_plain
 
 TICK_PERIOD_S = 0.1
@@ -64,11 +60,10 @@ class Replay:
 
     Args:
         recorded: what is replayed.
+        vehicle: what answers the tree, serving the plan's skillsets.
+        entries: what the vehicle and the tree are told, in order.
         plan: the mission, its own or another.
-        skillsets: the models, its own or others.
-        behaviour: of the mocks that answer what the record does not.
         parameters: of the mission.
-        faults: what happens that did not happen.
         go_on: go on after the first difference.
         record: makes what keeps this replay's own record, given its clock.
         rate: mission clock a second of wall clock at most; 0: no limit.
@@ -77,41 +72,38 @@ class Replay:
     def __init__(
         self,
         recorded: Recorded,
+        vehicle: Vehicle,
+        entries: Iterable[Entry],
         plan: MissionPlan,
-        skillsets: Sequence[Skillset],
-        behaviour: Behaviour,
         *,
         parameters: Mapping[str, float],
-        faults: Sequence[FaultRequest] = (),
         go_on: bool = False,
         record: Callable[[Callable[[], int]], MissionRecord] | None = None,
         rate: float = 0.0,
     ) -> None:
-        if not recorded.entries:
-            raise ReplayError(f"{recorded.path}: is empty")
         self._recorded = recorded
+        self._entries = entries
         self._go_on = go_on
         self._rate = rate
         self._ticked = recorded.started
-        self.vehicle = Vehicle(skillsets, recorded.answers, behaviour, start_s=min(entry.stamp_ns for entry in recorded.entries) / 1e9)
+        self.vehicle = vehicle
         self.decisions: list[Decision] = []
         self._world = self.vehicle.world
         self._free = False
         self._due = False
         clock_ns = lambda: self._world.clock.now_ns  # noqa: E731
         self._record = None if record is None else record(clock_ns)
-        clients = {s.name: ReplayClient(self._world.client(s.name), self._wake, self, self.vehicle.handles) for s in skillsets}
+        clients = {name: ReplayClient(self._world.client(name), self._wake, self, vehicle.handles) for name in plan.skillsets}
         mission, blackboard = plan.make(clients, clock_ns, parameters)
         self.director = Director(mission, blackboard)
         self._comparison = Comparison(recorded, self._knowledge)
-        for fault in faults:
-            self.vehicle.fail(fault)
+        vehicle.differs = lambda why: self._comparison.told(why, self._world.now_s)
         self._world.on_event(self._on_event)
 
     def run(self) -> Result:
         """Replay to the end, to the first difference, or to where the record breaks off."""
         begun, start_s = time.monotonic(), self._world.now_s
-        for entry in self._recorded.entries:
+        for entry in self._entries:
             self._advance_to(entry.stamp_ns, begun, start_s)
             self._take(entry)
             self._world.run_for(0.0)
@@ -135,33 +127,19 @@ class Replay:
             time.sleep(max(0.0, begun + (self._world.now_s - start_s) / self._rate - time.monotonic()))
 
     def _take(self, entry: Entry) -> None:
-        event = extern_transition(entry)
-        if event is not None:
-            self.vehicle.transition(event, diverged=self._free)
-        elif entry.topic == REPORTS:
-            value = entry.value
-            progress, outputs = float(value.get("progress") or 0.0), value.get("outputs") or {}
-            self.vehicle.report(str(value["id"]), progress, ExecutionState(value["state"]), outputs)
-        elif entry.topic == DATA:
-            self.vehicle.sample(str(entry.value["skillset"]), str(entry.value["data"]), entry.value["value"])
-        elif entry.topic == TICKS and not self._free:
-            if not (self._ticked and entry.value.get("unmet")):
+        if entry.topic == TICKS:
+            if not self._free and not (self._ticked and entry.value.get("unmet")):
                 self._tick()
-        elif entry.topic == OPERATOR and entry.value.get("command") == "abort" and entry.value.get("by") == "mission":
-            self.director.abort(str(entry.value.get("reason", "")))
-        elif not self._recorded.reported:
-            self._take_event(entry)
-
-    def _take_event(self, entry: Entry) -> None:
-        """Take the end of an execution from its event, where the record does not say what the tree was told."""
-        event = event_of(entry) if entry.value.get("kind") == "EXECUTION" else None
-        if isinstance(event, ExecutionEvent) and event.state.terminal:
-            self.vehicle.report(event.id, 1.0, event.state, event.outputs)
+        elif entry.topic == OPERATOR:
+            if entry.value.get("command") == "abort" and entry.value.get("by") == "mission":
+                self.director.abort(str(entry.value.get("reason", "")))
+        else:
+            self.vehicle.take(entry, diverged=self._comparison.difference is not None)
 
     def _after_the_record(self) -> None:
         """Go on without it, where that was asked for; what was expected and did not come is a difference."""
-        if self.director.end is None and self._recorded.whole and self._comparison.difference is None:
-            self._comparison.over(self._world.now_s)
+        if self._comparison.difference is None:
+            self._comparison.over(self._world.now_s, whole=self._recorded.whole and self.director.end is None)
         if self._go_on and self.director.end is None:
             self._set_free()
             self.vehicle.over()
@@ -216,7 +194,7 @@ class Replay:
             self.decisions.append(now)
         then = self._comparison.decided(now, self.vehicle.recorded_id(execution_id))
         if kind == "start":
-            self.vehicle.requested(skillset, skill, execution_id, None if then is None else then.id)
+            self.vehicle.requested(skillset, skill, execution_id, then)
         if self._record is not None:
             self._record.decision(kind, skillset, skill, execution_id, inputs)
 

@@ -1,17 +1,18 @@
-"""The recorded vehicle: real managers in virtual time whose functions answer as they did, and as mocks where nothing was recorded."""
+"""The recorded vehicle under the tree: real managers in virtual time; below them what was recorded, and mocks where nothing was."""
 
 from __future__ import annotations
 
 import random
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from alula_common.faults import FaultRequest
-from mission_replay.recorded import Answer
+from alula_common.record import DATA, EVENTS, REPORTS, Entry
+from mission_replay.recorded import EXTERN, Answer, Decision, Recorded, event_of
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Skill, Skillset
-from skill_runtime.core.events import TransitionEvent
+from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.core.execution import Execution
 from skill_runtime.handle import SkillHandle
 from skill_runtime.local import LocalWorld
@@ -21,7 +22,9 @@ from skill_runtime.mock import NEVER, Behaviour, Choice, Ending, LocalStage, Moc
 class ReplayedSkill(MockSkill):
     """The hooks of one skill: a call that was recorded is answered by the record, any other one by the mock's rules."""
 
-    def __init__(self, vehicle: Vehicle, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
+    def __init__(
+        self, vehicle: RecordedSkills, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
+    ) -> None:
         super().__init__(play, skillset, skill, rules, chance)
         self._vehicle = vehicle
 
@@ -72,56 +75,83 @@ class ReplayStage(LocalStage):
 
 
 class Vehicle:
-    """Answers the tree's requests.
+    """What there is at every depth: a world, the mocks' play, and which execution is which of the record.
 
     Args:
-        skillsets: the models that the managers execute.
-        answers: of the record, by its ids.
-        behaviour: of the mocks that answer what was not recorded; what it has happen by the clock is left out.
+        behaviour: of the mocks; what it has happen by the clock is left out, as the record tells it.
         start_s: mission clock at the beginning.
     """
 
-    def __init__(self, skillsets: Sequence[Skillset], answers: Mapping[str, Answer], behaviour: Behaviour, *, start_s: float) -> None:
+    def __init__(self, behaviour: Behaviour, *, start_s: float) -> None:
         self.world = LocalWorld(start_s=start_s)
         self.stage = ReplayStage(self.world)
         self.play = Play(replace(behaviour, timeline=()), self.stage)
         self.handles: dict[str, SkillHandle] = {}
-        self._answers = answers
+        self.differs: Callable[[str], None] = lambda _: None
+        """Is told, in words, what was not done then, below the decisions of the tree."""
+        rules = [rule for found in behaviour.rules.values() for rule in found]
+        self.caused = {place for rule in rules for change in rule.changes or () for place in change.states}
+        """The resources that skills have change."""
         self._recorded: dict[str, str] = {}
         """The record's id of an execution of this replay."""
-        self._here: dict[str, str] = {}
-        """The other way round."""
-        self._calls: dict[str, deque[Answer | None]] = {}
-        self._running: dict[str, tuple[Execution, MockSkill]] = {}
-        self._progress: dict[str, float] = {}
-        self._passed: set[str] = set()
-        self._caused = {
-            place for rules in behaviour.rules.values() for rule in rules for change in rule.changes or () for place in change.states
-        }
-        serve_play(self.world, self.play, skillsets, self._make_skill)
-
-    def _make_skill(self, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
-        return ReplayedSkill(self, play, skillset, skill, rules, chance)
 
     def fail(self, request: FaultRequest) -> None:
         """Have a fault happen that was not recorded; raises SkillRuntimeError where there is none."""
         self.play.fail(request)
 
-    # --- requests ----------------------------------------------------------------------------------------------------
+    def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
+        """Take note of a request; ``then``: the same one in the record, None where there is none."""
+        raise NotImplementedError
 
-    def requested(self, skillset: str, skill: str, execution_id: str, recorded_id: str | None) -> None:
-        """Take note of a request; ``recorded_id``: the same one in the record, None where there is none."""
-        answer = None if recorded_id is None else self._answers.get(recorded_id)
-        if answer is not None and (answer.ended_s is None and not self._goes_on(answer)):
-            answer = None
-        if answer is not None and recorded_id is not None:
-            self._recorded[execution_id] = recorded_id
-            self._here[recorded_id] = execution_id
-        self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
+    def take(self, entry: Entry, *, diverged: bool) -> None:
+        """Have happen what an entry of the record tells; ``diverged``: the tree has decided otherwise than then."""
+        raise NotImplementedError
 
     def recorded_id(self, execution_id: str) -> str | None:
         """Return the record's id of an execution of this replay."""
         return self._recorded.get(execution_id)
+
+    def over(self) -> None:
+        """Take note that the record has no more to say."""
+        self.stage.mocked |= set(self.world.managers)
+
+
+class RecordedSkills(Vehicle):
+    """Skills end as they did, resources and data change as they did.
+
+    Args:
+        skillsets: the models that the managers execute.
+        recorded: the record.
+        behaviour: of the mocks that answer what was not recorded.
+        start_s: mission clock at the beginning.
+    """
+
+    def __init__(self, skillsets: Sequence[Skillset], recorded: Recorded, behaviour: Behaviour, *, start_s: float) -> None:
+        super().__init__(behaviour, start_s=start_s)
+        self._answers = recorded.answers
+        self._reported = recorded.reported
+        self._here: dict[str, str] = {}
+        """The execution of this replay that has an id in the record."""
+        self._calls: dict[str, deque[Answer | None]] = {}
+        self._running: dict[str, tuple[Execution, MockSkill]] = {}
+        self._progress: dict[str, float] = {}
+        self._passed: set[str] = set()
+        serve_play(self.world, self.play, skillsets, self._make_skill)
+
+    def _make_skill(self, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
+        return ReplayedSkill(self, play, skillset, skill, rules, chance)
+
+    # --- requests ----------------------------------------------------------------------------------------------------
+
+    def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
+        """Take note of a request."""
+        answer = None if then is None else self._answers.get(then.id)
+        if answer is not None and not (answer.state.terminal or answer.state.active):
+            answer = None  # the record broke off before anything came of it
+        if answer is not None:
+            self._recorded[execution_id] = answer.id
+            self._here[answer.id] = execution_id
+        self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
 
     def next_answer(self, name: str) -> Answer | None:
         """Return the record's answer to the next call of a skill; None where a mock answers."""
@@ -161,10 +191,27 @@ class Vehicle:
         if handle is not None and state is ExecutionState.RUNNING and not handle.done:
             handle.run(progress, dict(outputs))
 
+    def take(self, entry: Entry, *, diverged: bool) -> None:
+        """Have happen what an entry of the record tells."""
+        value = entry.value
+        if entry.topic == EVENTS:
+            self._take_event(event_of(entry), diverged=diverged)
+        elif entry.topic == REPORTS:
+            self.report(str(value["id"]), float(value.get("progress") or 0.0), ExecutionState(value["state"]), value.get("outputs") or {})
+        elif entry.topic == DATA:
+            self.sample(str(value["skillset"]), str(value["data"]), value["value"])
+
+    def _take_event(self, event: EngineEvent, *, diverged: bool) -> None:
+        if isinstance(event, TransitionEvent):
+            if event.cause == EXTERN:
+                self.transition(event, diverged=diverged)
+        elif event.state.terminal and not self._reported:  # it does not say what the tree was told
+            self.report(event.id, 1.0, event.state, event.outputs)
+
     def transition(self, event: TransitionEvent, *, diverged: bool) -> None:
         """Have a resource change as it did; after the decisions have diverged only where no other course of things explains it."""
         place = (event.skillset, event.resource)
-        if diverged and place in self._caused and not self._explained(event.skillset):
+        if diverged and place in self.caused and not self._explained(event.skillset):
             return
         self.play.take({place: event.to_state})
 
@@ -174,15 +221,7 @@ class Vehicle:
             self.stage.mocked.add(skillset)
         self.stage.publish_recorded(skillset, data, value)
 
-    def over(self) -> None:
-        """Take note that the record has no more to say."""
-        self.stage.mocked |= set(self.world.managers)
-
     # --- inside ------------------------------------------------------------------------------------------------------
-
-    def _goes_on(self, answer: Answer) -> bool:
-        """Tell whether an execution of the record had not ended when it broke off."""
-        return answer.state.active
 
     def _explained(self, skillset: str) -> bool:
         """Tell whether an execution of the skillset runs whose course is the recorded one."""

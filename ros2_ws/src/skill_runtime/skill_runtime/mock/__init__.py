@@ -3,7 +3,7 @@
 from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, Fault, Happening, Rule, Value
 from skill_runtime.mock.errors import BehaviourError
 from skill_runtime.mock.formula import Formula, FormulaError
-from skill_runtime.mock.local_stage import LocalStage, mock_world, serve_play
+from skill_runtime.mock.local_stage import LocalStage, follow, mock_world, serve_play
 from skill_runtime.mock.play import Play
 from skill_runtime.mock.reading import load_behaviour
 from skill_runtime.mock.skill import Choice, MockSkill
@@ -28,6 +28,7 @@ __all__ = [
     "Rule",
     "Stage",
     "Value",
+    "follow",
     "load_behaviour",
     "mock_world",
     "serve_play",

@@ -69,11 +69,12 @@ def serve_play(world: LocalWorld, play: Play, skillsets: Iterable[Skillset], mak
         for resource in skillset.resources:
             play.on_state(skillset.name, resource.name, resource.initial)
         # At once, whatever the world's latency: the functional layer is nearer than any client.
-        world.serve(skillset, play.hooks_of(skillset, make)).on_step(functools.partial(_follow, play, skillset.name))
+        world.serve(skillset, play.hooks_of(skillset, make)).on_step(functools.partial(follow, play, skillset.name))
     world.clock.soon(play.begin)
 
 
-def _follow(play: Play, skillset: str, events: Sequence[EngineEvent]) -> None:
+def follow(play: Play, skillset: str, events: Sequence[EngineEvent]) -> None:
+    """Tell a play of the states that resources enter: to be called at each step."""
     for event in events:
         if isinstance(event, TransitionEvent):
             play.on_state(skillset, event.resource, event.to_state)

@@ -1,0 +1,91 @@
+"""Flights in the simulator, recorded by the project's own stack (``tests/recordings/make``), decided again at two depths."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from alula_common.record import DECISIONS, FILE, MISSION, read_record
+from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
+
+RECORDINGS = Path(os.environ["ALULA_ROOT"]) / "tests" / "recordings"
+FLIGHTS = sorted(path.parent.name for path in RECORDINGS.glob("*/skills.mcap"))
+OTHERS = Path(os.environ["ALULA_ROOT"]).parent / "shared" / "data" / "bags"
+
+
+def decided(run: Path) -> list[tuple]:
+    """Return what was decided, without ids and times."""
+    found = [entry.value for entry in read_record(run) if entry.topic == DECISIONS]
+    return [(value["kind"], value["skill"], value["inputs"]) for value in found]
+
+
+def mission(run: Path) -> dict:
+    """Return how it ended."""
+    return dict([entry.value for entry in read_record(run) if entry.topic == MISSION][-1])
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_flight_is_decided_as_it_was_by_its_skills(name, tmp_path, capsys):
+    assert main([str(RECORDINGS / name), "--out", str(tmp_path / "again")]) == SAME, capsys.readouterr().err
+    assert decided(tmp_path / "again") == decided(RECORDINGS / name)
+    assert mission(tmp_path / "again")["outcome"] == mission(RECORDINGS / name)["outcome"]
+
+
+@pytest.mark.parametrize("name", ["mapping-zed", "inspection-radio"])
+def test_the_real_hooks_decide_as_they_did(name, tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    traces = set()
+    for number in range(2):
+        out = tmp_path / f"again{number}"
+        assert main([str(RECORDINGS / name), "--from", "functional", "--json", "--out", str(out)]) == SAME, capsys.readouterr().err
+        traces.add(capsys.readouterr().out)
+        assert decided(out) == decided(RECORDINGS / name)
+        # The same ends by the same results: hooks saw the same reports of the functional layer.
+        assert mission(out)["outcome"] == mission(RECORDINGS / name)["outcome"]
+    assert len(traces) == 1
+
+
+@pytest.mark.parametrize("depth", ["skills", "functional"])
+def test_a_failure_that_was_not_flown_is_decided_as_the_one_that_was(depth, tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    flown = RECORDINGS / "mapping-zed"
+    assert main([str(RECORDINGS / "mapping"), "--from", depth, "--fail", "zed@6", "--on", "--out", str(tmp_path / "changed")]) == OTHERWISE
+    assert decided(tmp_path / "changed") == decided(flown), capsys.readouterr().err
+    changed, then = mission(tmp_path / "changed"), mission(flown)
+    assert (changed["outcome"], changed["reason"].split(" (")[0]) == (then["outcome"], then["reason"].split(" (")[0])
+    difference = json.loads((tmp_path / "changed/replay.json").read_text())["difference"]
+    assert (difference["now"]["kind"], difference["now"]["skill"]) == ("interrupt", "goto_straight")
+
+
+@pytest.mark.parametrize("content", [b"", b"#ROSBAG V2.0\n", b"#ROSBAG V2.0\n" + b"\xff" * 4000, "cut", None])
+def test_a_bag_that_can_not_be_read_is_refused_in_a_line(content, tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    shutil.copy(RECORDINGS / "mapping" / FILE, tmp_path / FILE)
+    bag = tmp_path / "functional.bag"
+    if content == "cut":
+        bag.write_bytes((RECORDINGS / "mapping/functional.bag").read_bytes()[:30000])
+    elif content is not None:
+        bag.write_bytes(content)
+    assert main([str(tmp_path), "--from", "functional"]) == CANNOT_REPLAY
+    said = capsys.readouterr().err
+    assert said.startswith("alula replay: ")
+    assert "functional.bag" in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.skipif(not OTHERS.is_dir(), reason=f"there are no bags of others in {OTHERS}")
+def test_bags_of_others_are_refused_in_a_line(tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    bags = sorted(OTHERS.glob("*.bag"))
+    assert bags
+    for bag in bags:
+        assert main([str(bag), "--from", "functional"]) == CANNOT_REPLAY
+        assert "does not tell which mission was flown" in capsys.readouterr().err
+        shutil.copy(RECORDINGS / "mapping" / FILE, tmp_path / FILE)
+        shutil.copy(bag, tmp_path / bag.name)
+        assert main([str(tmp_path / bag.name), "--from", "functional"]) == CANNOT_REPLAY
+        assert "holds no calls of services" in capsys.readouterr().err
