@@ -17,6 +17,7 @@ MEANING = {
     "running": "the mission's process ended before the mission did",
 }
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
+SAME_MOMENT_S = 0.5
 PICTURES = ("timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
 
 
@@ -75,6 +76,15 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def what_failed(summary: Mapping[str, Any]) -> str:
+    """Return what the vehicle had to recover from: what was broken at that moment, else the radio that ended the video."""
+    failure_s = summary["recovery"]["failure_s"]
+    for fault in summary.get("injected") or ():
+        if fault["t_s"] is not None and abs(fault["t_s"] - failure_s) < SAME_MOMENT_S:
+            return f"{fault['sensor']} failed"
+    return "radio lost" if summary.get("video") else "sensor failed"
+
+
 def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
     """Return the verdict, a line each."""
     reason = summary.get("reason")
@@ -84,7 +94,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:
         failure = recovery["failure_s"]
-        steps = [f"{'radio lost' if summary.get('video') else 'sensor failed'} at {failure:.2f} s"]
+        steps = [f"{what_failed(summary)} at {failure:.2f} s"]
         for key, words in (("detected_s", "detected"), ("fallback_running_s", "fallback running"), ("moving_again_s", "moving again")):
             if recovery.get(key) is not None:
                 steps.append(f"{words} {recovery[key] - failure:.2f} s later")

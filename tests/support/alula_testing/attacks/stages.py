@@ -175,11 +175,20 @@ class LiveStage:
         return managers
 
     def _fly(self) -> None:
-        assert self.until(lambda: all(client.ready for client in self.clients), PATIENCE_S), "clients do not find the managers"
+        found = self.until(lambda: all(client.ready for client in self.clients), PATIENCE_S)
+        assert found, f"clients do not find the managers: {[what_is_known(client) for client in self.clients if not client.ready]}"
         for resource, state in FLYING.items():
             asked = self.clients[0].transition(resource, state)
             assert asked.wait(PATIENCE_S)
             assert not asked.failure, asked.failure
+
+
+def what_is_known(client: Any) -> dict[str, object]:
+    """Return why a client is not ready."""
+    connection = client._connection
+    known = {name: value for name, value in vars(connection).items() if isinstance(value, bool | str)}
+    missing = [name for name, link in connection.links.items() if not link.connected]
+    return known | {"not connected": missing, "not subscribed": sum(not connected() for connected in connection.subscriptions)}
 
 
 def threads_of(pid: int) -> int:

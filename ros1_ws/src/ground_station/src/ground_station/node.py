@@ -51,8 +51,9 @@ class GroundStationNode:
         self._receiver.reference(message.header.stamp.to_nsec(), pixels(message))
 
     def _on_datagram(self, _socket: int, data: bytes) -> None:
-        self._loop.send(data, self._settings.player_port)
-        self._receiver.datagram(data, self._loop.now_ns)
+        # A player believes whatever comes: it gets the drone's packets alone, each once.
+        if self._receiver.datagram(data, self._loop.now_ns):
+            self._loop.send(data, self._settings.player_port)
 
     def _on_tick(self) -> None:
         now_ns = self._loop.now_ns

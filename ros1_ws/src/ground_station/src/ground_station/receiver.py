@@ -59,17 +59,19 @@ class VideoReceiver:
         while len(self._references) > REFERENCES:
             self._references.popitem(last=False)
 
-    def datagram(self, data: bytes, now_ns: int) -> None:
-        """Take what came; what is not ours is counted and forgotten."""
+    def datagram(self, data: bytes, now_ns: int) -> bool:
+        """Take what came and tell whether it is a new packet of the video; what is not ours is counted and forgotten."""
         try:
             packet = VideoPacket.parse(data, self._seal)
         except WireError as error:
             self.refused += 1
             self.last_refusal = str(error)
-            return
-        if self._assembler.add(packet, now_ns):
+            return False
+        new = self._assembler.add(packet, now_ns)
+        if new:
             self._losses.add(packet.sequence, now_ns)
             self._window.receive(now_ns, len(data), now_ns - packet.mark.stamp_ns)
+        return new
 
     def pictures(self, now_ns: int) -> list[Picture]:
         """Return the frames to be shown now."""

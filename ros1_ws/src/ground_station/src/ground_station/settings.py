@@ -12,7 +12,7 @@ class GroundSettings:
     video_port: int = 42001  # of this node: where RTP arrives from the radio
     report_port: int = 42002  # of the radio: where reports go
     control_port: int = 42004  # of the radio: where the telepilot's MAVLink goes
-    player_port: int = 42006  # where the RTP that arrives is passed on to any player
+    player_port: int = 42006  # where the RTP that is the drone's is passed on to any player
     key: str = "alula"  # shared with the drone
     reference: str = ""  # topic of the camera that the drone films with, to compare with; only a simulation has it here
     width: int = 640

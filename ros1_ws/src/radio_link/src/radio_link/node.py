@@ -9,6 +9,7 @@ from typing import TextIO
 import rospy
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import String
+from uav_msgs.msg import GuidanceState
 
 from alula_common.faults import FaultError, parse_faults
 from perception_core.ros import read_settings
@@ -17,6 +18,7 @@ from radio_link.laws import LAWS, LinkBudget, Point, condition_by_law
 from radio_link.loop import NS, MissionLoop
 from radio_link.radio import FAULTS, Place, Radio, Situation, by_zones
 from radio_link.settings import RadioSettings
+from radio_link.vehicle import Vehicle
 from uav_simulator.errors import ConfigError
 from uav_simulator.world.config import WorldConfig, load_world
 
@@ -53,20 +55,20 @@ def _least_bps(quality: Quality) -> float:
 
 
 class RadioLinkNode:
-    """Wires the radio to sockets, the mission clock, and what the simulator knows of the vehicle."""
+    """Wires the radio to sockets, the mission clock, and what simulator or guidance know of the vehicle."""
 
     def __init__(self, settings: RadioSettings) -> None:
         base = settings.base_port
         self._to = {VIDEO: base + 1, REPORT: base + 3, CONTROL: settings.control_to or base + 5, TELEMETRY: base + 7}
         self._radio = Radio(make_place(settings), parse_faults(settings.faults, FAULTS), seed=settings.seed)
-        self._point: Point | None = None
-        self._lift_off_s: float | None = None
+        self._vehicle = Vehicle()
         self._told: Situation | None = None
         self._state_due_ns = 0
         self._log = _open_log(Path(settings.log_path)) if settings.log_path else None
         self._state = rospy.Publisher("~state", String, queue_size=5, latch=True)
         self._pose = rospy.Subscriber("/sim/true_pose", PoseStamped, self._on_pose, queue_size=1)
         self._simulator = rospy.Subscriber("/sim/state", String, self._on_simulator, queue_size=5)
+        self._guidance = rospy.Subscriber("/uav_guidance/state", GuidanceState, self._on_guidance, queue_size=1)
         self._loop: MissionLoop[None] = MissionLoop([base, base + 2, base + 4, 0], on_tick=self._on_tick, on_datagram=self._on_datagram)
 
     def run(self) -> None:
@@ -75,10 +77,14 @@ class RadioLinkNode:
 
     def _on_pose(self, message: PoseStamped) -> None:
         p = message.pose.position
-        self._point = (p.x, p.y, p.z)
+        self._vehicle.simulated_at((p.x, p.y, p.z))
 
     def _on_simulator(self, message: String) -> None:
-        self._lift_off_s = json.loads(message.data).get("lift_off_s")
+        self._vehicle.simulated_lift_off(json.loads(message.data).get("lift_off_s"))
+
+    def _on_guidance(self, message: GuidanceState) -> None:
+        p = message.position_enu_m
+        self._vehicle.guided((p.x, p.y, p.z), message.landed_state, message.header.stamp.to_sec())
 
     def _on_datagram(self, flow: int, data: bytes) -> None:
         if flow in {CONTROL, TELEMETRY} and self._radio.control_lost:
@@ -88,8 +94,8 @@ class RadioLinkNode:
 
     def _on_tick(self) -> None:
         now_ns = self._loop.now_ns
-        since_s = None if self._lift_off_s is None else now_ns / NS - self._lift_off_s
-        self._radio.look(self._point, since_s)
+        lift_off_s = self._vehicle.lift_off_s
+        self._radio.look(self._vehicle.point, None if lift_off_s is None else now_ns / NS - lift_off_s)
         for channel in (self._radio.down, self._radio.up):
             for data in channel.due(now_ns):
                 self._loop.send(data[1:], self._to[data[0]], by=TELEMETRY if data[0] == CONTROL else VIDEO)

@@ -1,0 +1,186 @@
+"""Drone, radio and ground station as nodes on a live graph: every UDP port under attack, and a foreign player that watches."""
+
+from __future__ import annotations
+
+import json
+import random
+import socket
+import threading
+import time
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+import rospy
+from radio_link.loop import LARGEST_DATAGRAM, udp_socket
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+from uav_msgs.srv import Stream
+from video_stream.wire import NS, Seal, VideoPacket
+
+from alula_common.network import free_port
+from alula_testing.ros1 import wait_until
+
+SOURCES = Path(__file__).parents[2]
+WIDTH, HEIGHT = 320, 180
+TICK_NS, FRAME_NS = NS // 50, NS // 20
+PATIENCE_S = 60.0
+SHOWN = 40
+PLAYED = 10
+KEY = "a secret of this test"
+NODES = RADIO, STREAM, GROUND = "radio_link", "video_stream", "ground_station"
+
+
+def scenery() -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return cv2.resize(rng.integers(0, 255, (20, 200, 3), dtype=np.uint8), (4 * WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
+
+
+class Tamperer:
+    """Stands between a sender and the radio: passes everything on, in disorder, with what it has heard before and with noise."""
+
+    def __init__(self, to: int, others: tuple[int, ...]) -> None:
+        self.port = free_port()
+        self.heard: list[bytes] = []
+        self._to, self._others = to, others
+        self._chance = random.Random(9)  # noqa: S311 - no secret
+        self._socket = udp_socket(self.port)
+        self._socket.settimeout(0.1)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self._socket.close()
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            try:
+                came = [self._socket.recv(LARGEST_DATAGRAM)]
+            except TimeoutError:
+                continue
+            while len(came) < 3:
+                try:
+                    came.append(self._socket.recv(LARGEST_DATAGRAM, socket.MSG_DONTWAIT))
+                except (BlockingIOError, TimeoutError):
+                    break
+            self.heard += came
+            chance = self._chance
+            forged = bytearray(chance.choice(came))
+            forged[chance.randrange(len(forged))] ^= 1 << chance.randrange(8)
+            mixed = [*came, bytes(forged), chance.randbytes(chance.randrange(1500)), b"", *chance.choices(self.heard, k=2)]
+            chance.shuffle(mixed)
+            for data in mixed:
+                self._socket.sendto(data, ("127.0.0.1", self._to))
+            # The same rubbish, and what is right in another place, into the ports that nobody but the radio should use.
+            for port in self._others:
+                for data in (bytes(forged), chance.randbytes(40), chance.choice(self.heard)):
+                    self._socket.sendto(data, ("127.0.0.1", port))
+
+
+class Flight:
+    """The mission clock and a camera; after each tick the nodes have worked."""
+
+    def __init__(self, done: dict[str, int]) -> None:
+        self.now_ns = 10 * NS
+        self.filmed = 0
+        self._done = done
+        self._scenery = scenery()
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._camera = rospy.Publisher("/camera/image_raw", Image, queue_size=10)
+
+    def connected(self) -> bool:
+        """Let time pass, and tell whether every node hears and is heard."""
+        self._pass()
+        return len(self._done) == len(NODES) and self._clock.get_num_connections() >= 3 and self._camera.get_num_connections() >= 2
+
+    def _pass(self) -> None:
+        self.now_ns += TICK_NS
+        self._clock.publish(Clock(rospy.Time(*divmod(self.now_ns, NS))))
+
+    def tick(self) -> None:
+        """Let time pass until all nodes have followed; film when a picture is due."""
+        if (self.now_ns + TICK_NS) % FRAME_NS < TICK_NS:
+            x = 5 * self.filmed % (3 * WIDTH)
+            pixels = np.ascontiguousarray(self._scenery[:, x : x + WIDTH])
+            image = Image(height=HEIGHT, width=WIDTH, encoding="rgb8", step=3 * WIDTH, data=pixels.tobytes())
+            image.header.stamp = rospy.Time(*divmod(self.now_ns + TICK_NS, NS))
+            self._camera.publish(image)
+            self.filmed += 1
+        self._pass()
+        wait_until(lambda: min(self._done.values()) >= self.now_ns, timeout_s=PATIENCE_S, what="the nodes follow the clock")
+
+
+class Player(threading.Thread):
+    """A foreign player: opens the session description and decodes what comes."""
+
+    def __init__(self, session: Path) -> None:
+        super().__init__(daemon=True)
+        self.pictures: list[np.ndarray] = []
+        self.error = ""
+        self._session = session
+
+    def run(self) -> None:
+        try:
+            options = {"protocol_whitelist": "file,rtp,udp", "analyzeduration": "100000", "probesize": "20000"}
+            with av.open(str(self._session), format="sdp", options=options, timeout=PATIENCE_S) as stream:
+                for frame in stream.decode(video=0):
+                    self.pictures.append(frame.to_ndarray(format="rgb24"))
+                    if len(self.pictures) >= PLAYED:
+                        return
+        except av.FFmpegError as error:
+            self.error = str(error)
+
+
+@pytest.fixture
+def stage(ros_master, start_node, tmp_path):
+    """Start the nodes with a tamperer on both ways; yield flight, processes and tamperers."""
+    rospy.set_param("/use_sim_time", True)
+    base = next(port for port in iter(free_port, None) if port < 60_000)
+    video = Tamperer(base, (base + 1, base + 2, base + 3, base + 4, base + 5))
+    report = Tamperer(base + 2, (base, base + 3))
+    done: dict[str, int] = {}
+    note = lambda header, name: done.update({name: header.stamp.to_nsec()})  # noqa: E731
+    subscribers = [rospy.Subscriber(f"/{name}/done", Header, note, name) for name in NODES]
+    parameters = {
+        RADIO: [f"_base_port:={base}"],
+        STREAM: [f"_video_port:={video.port}", f"_report_port:={base + 3}", f"_key:={KEY}"],
+        GROUND: [f"_video_port:={base + 1}", f"_report_port:={report.port}", f"_control_port:={base + 4}", f"_player_port:={base + 6}"],
+    }
+    parameters[GROUND] += [f"_key:={KEY}", "_reference:=/camera/image_raw", f"_width:={WIDTH}", f"_height:={HEIGHT}"]
+    parameters[GROUND] += [f"_video_path:={tmp_path}"]
+    nodes = {name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *words]) for name, words in parameters.items()}
+    flight = Flight(done)
+    wait_until(flight.connected, timeout_s=PATIENCE_S, what="the nodes are up")
+    yield flight, nodes, video
+    for subscriber in subscribers:
+        subscriber.unregister()
+    for tamperer in (video, report):
+        tamperer.close()
+    rospy.set_param("/use_sim_time", False)
+
+
+def test_garbage_replays_and_disorder_in_every_port_show_no_wrong_picture_and_a_foreign_player_watches(stage, tmp_path):
+    flight, nodes, video = stage
+    player = Player(tmp_path / "stream.sdp")
+    player.start()
+    rospy.wait_for_service("/video_stream/stream", PATIENCE_S)
+    assert rospy.ServiceProxy("/video_stream/stream", Stream)(True, 5.0, 0.3, 5.0).accepted
+    end_s = time.monotonic() + PATIENCE_S
+    log = tmp_path / "shown.jsonl"
+    while (player.is_alive() or log.read_text().count("\n") < SHOWN) and time.monotonic() < end_s:
+        flight.tick()
+    assert {name: node.poll() for name, node in nodes.items()} == dict.fromkeys(nodes), "all nodes live"
+    shown = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [line["id"] for line in shown] == sorted({line["id"] for line in shown}), "each frame once, in order"
+    assert len(shown) >= SHOWN
+    assert min(line["ssim"] for line in shown) > 0.5
+    sent = {VideoPacket.parse(data, Seal(KEY.encode())).mark.frame_id for data in video.heard}
+    assert {line["id"] for line in shown} <= sent
+    assert (player.error, len(player.pictures)) == ("", PLAYED)
+    assert {picture.shape for picture in player.pictures} == {(HEIGHT, WIDTH, 3)}
