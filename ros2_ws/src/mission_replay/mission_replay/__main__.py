@@ -7,8 +7,10 @@ expectation failed), 2 (could not be replayed).
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
+import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -18,6 +20,9 @@ from mission_replay.asked import behaviour_for, faults_for, parameters_for, plan
 from mission_replay.recorded import Recorded, ReplayError, load
 from mission_replay.replay import Replay, Result
 from mission_replay.vehicle import RecordedSkills, Vehicle
+from run_analysis.errors import AnalysisError
+from run_analysis.expectations import Checked, check, junit, load_expectations
+from run_analysis.run import load_run
 from skill_missions.record import MissionRecord
 from skill_model.model import Skillset
 from skill_runtime.mock import Behaviour
@@ -44,8 +49,12 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--on", action="store_true", help="go on over mocks after the first difference")
     parser.add_argument("--rate", type=float, default=0.0, help="mission clock a second at most (default 0: no limit)")
     parser.add_argument("--out", type=Path, help="folder for the replay's own record")
+    parser.add_argument("--expect", type=Path, metavar="FILE", help="hold the replay against expectations; they decide how it ends")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="with --expect: write the results as JUnit XML, too")
     parser.add_argument("--json", action="store_true", help="decisions and difference as JSON, a line each")
     options = parser.parse_args(words)
+    if options.junit is not None and options.expect is None:
+        parser.error("--junit tells of expectations; add --expect FILE")
     if not 0.0 <= options.rate <= 1e6:
         parser.error(f"--rate {options.rate:g}: must be 0 (no limit) or a positive factor")
     return options
@@ -137,24 +146,46 @@ def write_out(out: Path, recorded: Recorded, result: Result, zero_s: float) -> N
     )
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Replay; return the exit code."""
-    options = parse(sys.argv[1:] if words is None else words)
-    try:
-        recorded = load(options.run)
-        result = prepare(recorded, options).run()
-        zero_s = zero_of(recorded)
-        if options.out is not None:
-            write_out(options.out, recorded, result, zero_s)
-    except (ReplayError, OSError) as error:
-        sys.stderr.write(f"alula replay: {error}\n")
-        return CANNOT_REPLAY
+def replay(options: argparse.Namespace) -> int:
+    """Replay as asked and tell; return the exit code; raises ReplayError."""
+    expectations = None if options.expect is None else load_expectations(options.expect)
+    recorded = load(options.run)
+    result = prepare(recorded, options).run()
+    zero_s = zero_of(recorded)
+    if options.out is not None:
+        write_out(options.out, recorded, result, zero_s)
     for line, decision in zip(trace_of(result, zero_s), result.decisions, strict=True):
         text = json.dumps(line) if options.json else f"{decision.t_s - zero_s:9.2f} s  {decision.words()}"
         sys.stdout.write(f"{text}\n")
     for text in verdict(recorded, result, zero_s):
         sys.stderr.write(f"{text}\n")
-    return SAME if same(recorded, result) else OTHERWISE
+    if expectations is None:
+        return SAME if same(recorded, result) else OTHERWISE
+    return hold(options, check(expectations, load_run(options.out)))
+
+
+def hold(options: argparse.Namespace, checked: Sequence[Checked]) -> int:
+    """Tell which expectations were not fulfilled; return the exit code."""
+    failed = [one for one in checked if one.problem]
+    for one in failed:
+        sys.stderr.write(f"{one}\n")
+    sys.stderr.write(f"{len(checked) - len(failed)} of {len(checked)} expectations fulfilled\n")
+    if options.junit is not None:
+        write_text(options.junit, junit(str(options.run), checked))
+    return OTHERWISE if failed else SAME
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Replay; return the exit code."""
+    options = parse(sys.argv[1:] if words is None else words)
+    try:
+        with contextlib.ExitStack() as stack:
+            if options.expect is not None and options.out is None:  # expectations are held against a record
+                options.out = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            return replay(options)
+    except (ReplayError, AnalysisError, OSError) as error:
+        sys.stderr.write(f"alula replay: {error}\n")
+        return CANNOT_REPLAY
 
 
 if __name__ == "__main__":

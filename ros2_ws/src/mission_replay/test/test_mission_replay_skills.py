@@ -13,6 +13,7 @@ from mcap.writer import Writer
 from alula_common.record import DECISIONS, FILE, MISSION, RecordWriter, read_record
 from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
 from mission_replay.comparison import alike
+from run_analysis import expect
 from uav_missions import mock_flight
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
@@ -142,6 +143,19 @@ def test_a_weakened_invariant_is_told(zed_dead, tmp_path, capsys):
     said = capsys.readouterr().err
     assert "then: interrupt navigation.goto_straight" in said
     assert "now:  nothing" in said
+
+
+def test_expectations_of_a_run_hold_for_its_replay_and_not_for_another(nominal, tmp_path, capsys):
+    assert expect.main([str(nominal)]) == 0
+    file = tmp_path / "nominal.yaml"
+    file.write_text(capsys.readouterr().out)
+    assert main([str(nominal), "--expect", str(file)]) == SAME, capsys.readouterr().err
+    capsys.readouterr()
+    assert main([str(nominal), "--expect", str(file), "--fail", "zed@20", "--on", "--junit", str(tmp_path / "junit.xml")]) == OTHERWISE
+    said = capsys.readouterr().err
+    assert "nominal.yaml:" in said
+    assert "expectations fulfilled" in said
+    assert "<failure" in (tmp_path / "junit.xml").read_text()
 
 
 def test_another_parameter_is_another_input(nominal, capsys):
