@@ -36,6 +36,7 @@ ROS2_PACKAGES = (
 )
 TYPED = [
     "flight/alula_flight",
+    "flight/sensor_replay",
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
     "tools/skill_bench",

@@ -7,7 +7,6 @@ expectation failed), 2 (could not be replayed).
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import sys
 import tempfile
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from alula_common.files import write_json, write_text
 from alula_common.record import Entry
+from mission_replay.again import bag_of, is_perception, perceive
 from mission_replay.asked import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
 from mission_replay.recorded import Recorded, ReplayError, load
 from mission_replay.replay import Replay, Result
@@ -36,7 +36,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="alula replay", description="Make the decisions of a recorded mission again.")
     parser.add_argument("run", type=Path, metavar="RUN", help="a run's folder, its skills.mcap or its functional.bag")
-    parser.add_argument("--from", dest="depth", choices=["functional", "skills"], default="skills", help="what is taken from the record")
+    parser.add_argument(
+        "--from", dest="depth", choices=["sensors", "functional", "skills"], default="skills", help="what is taken from the record"
+    )
     parser.add_argument("--tree", default="", metavar="FILE.py|MODULE[:FUNCTION]", help="another tree: function plan(route) -> MissionPlan")
     parser.add_argument("--model", type=Path, action="append", default=[], metavar="FILE", help="another model of a skillset")
     parser.add_argument(
@@ -65,6 +67,10 @@ def prepare(recorded: Recorded, options: argparse.Namespace) -> Replay:
     plan = plan_for(recorded, options.tree)
     skillsets = skillsets_for(plan, options.model)
     behaviour = behaviour_for(recorded, skillsets, options.behaviour)
+    if options.depth == "sensors":  # what fails and is set there is the perception's business
+        perception = [text for text in options.settings if is_perception(text)]
+        options.run = perceive(bag_of(recorded, options.run), options.folder, options.fail, perception)
+        options.settings, options.fail = [text for text in options.settings if text not in perception], []
     parameters = parameters_for(recorded, plan, options.settings)
     faults = faults_for(behaviour, options.fail)
     vehicle, entries = vehicle_at(options, recorded, skillsets, behaviour)
@@ -85,7 +91,7 @@ def vehicle_at(
         start_s = min(entry.stamp_s for entry in recorded.entries)
         return RecordedSkills(skillsets, recorded, behaviour, start_s=start_s), recorded.entries
     # Late: it needs the interfaces, which a replay of skills does without.
-    from mission_replay.functional import RecordedFunctions, bag_of, begin_of, entries_of
+    from mission_replay.functional import RecordedFunctions, begin_of, entries_of
 
     bag = bag_of(recorded, options.run)
     functions = RecordedFunctions(skillsets, bag, behaviour, start_s=begin_of(recorded, bag))
@@ -179,9 +185,10 @@ def main(words: Sequence[str] | None = None) -> int:
     """Replay; return the exit code."""
     options = parse(sys.argv[1:] if words is None else words)
     try:
-        with contextlib.ExitStack() as stack:
+        with tempfile.TemporaryDirectory() as folder:
+            options.folder = Path(folder)
             if options.expect is not None and options.out is None:  # expectations are held against a record
-                options.out = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+                options.out = options.folder / "replay"
             return replay(options)
     except (ReplayError, AnalysisError, OSError) as error:
         sys.stderr.write(f"alula replay: {error}\n")

@@ -32,7 +32,6 @@ from skill_runtime.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from skill_runtime.plain import to_plain
 from skill_runtime.ros2.convert import fill, values_of
 
-BAG = "functional.bag"
 CALLS = "/calls"
 MESSAGE = "message"
 
@@ -45,14 +44,6 @@ class Call:
     request: Mapping[str, Any]
     response: Mapping[str, Any] | None
     end_s: float
-
-
-def bag_of(recorded: Recorded, given: Path) -> Path:
-    """Return the bag that was given, or the one beside the record; raises ReplayError."""
-    path = given if given.suffix == ".bag" else recorded.path.parent / BAG
-    if not path.is_file():
-        raise ReplayError(f"{path}: there is no such bag; a flight over mocks has none, replay it with --from skills")
-    return path
 
 
 def read_bag(path: Path, topics: Iterable[str]) -> Iterator[Entry]:

@@ -77,6 +77,13 @@ def test_a_bag_that_can_not_be_read_is_refused_in_a_line(content, tmp_path, caps
     assert said.count("\n") == 1
 
 
+def test_a_flight_whose_measurements_were_not_recorded_is_not_perceived_again(capsys):
+    assert main([str(RECORDINGS / "mapping"), "--from", "sensors"]) == CANNOT_REPLAY
+    said = capsys.readouterr().err
+    assert "holds no measurements" in said
+    assert said.count("\n") == 1
+
+
 @pytest.mark.skipif(not OTHERS.is_dir(), reason=f"there are no bags of others in {OTHERS}")
 def test_bags_of_others_are_refused_in_a_line(tmp_path, capsys):
     pytest.importorskip("uav_msgs")

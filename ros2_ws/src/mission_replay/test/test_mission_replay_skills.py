@@ -145,8 +145,10 @@ def test_a_weakened_invariant_is_told(zed_dead, tmp_path, capsys):
     assert "now:  nothing" in said
 
 
-def test_expectations_of_a_run_hold_for_its_replay_and_not_for_another(nominal, tmp_path, capsys):
-    assert expect.main([str(nominal)]) == 0
+def test_expectations_of_a_replay_hold_for_the_next_and_not_for_another(nominal, tmp_path, capsys):
+    assert main([str(nominal), "--out", str(tmp_path / "again")]) == SAME
+    capsys.readouterr()
+    assert expect.main([str(tmp_path / "again")]) == 0
     file = tmp_path / "nominal.yaml"
     file.write_text(capsys.readouterr().out)
     assert main([str(nominal), "--expect", str(file)]) == SAME, capsys.readouterr().err

@@ -1,0 +1,171 @@
+"""``python3 -m sensor_replay BAG OUT [--fail zed@20] [--set zed_depth.NAME=VALUE]``: perceive a recorded flight again.
+
+The real nodes zed_depth, lidar_obstacles and lidar_mapping get the measurements of a bag (``./alula fly --record sensors``); OUT is the
+bag with what they say now in place of what they said then. Ends with 0, or 2 with one line on standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import importlib
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import rosbag
+import rospy
+import yaml
+
+from alula_common.faults import FaultError
+from sensor_replay import offline
+from sensor_replay.faults import TOPICS, Faults, read_faults
+
+NODES = {
+    "zed_depth": ("ZedDepthNode", "ZedSettings"),
+    "lidar_obstacles": ("LidarObstaclesNode", "LidarSettings"),
+    "lidar_mapping": ("LidarMappingNode", "MappingSettings"),
+}
+"""The nodes that perceive: by package, the classes of node and settings in its module ``node``."""
+AGAIN = ("/perception/transition", "/mapping/transition")
+"""Calls that the nodes make again."""
+
+
+class PerceptionError(Exception):
+    """A bag can't be perceived again; the message says why, in one line."""
+
+
+def settings_of(texts: Sequence[str]) -> dict[str, dict[str, object]]:
+    """Read ``NODE.NAME=VALUE`` into parameters by node; raises PerceptionError."""
+    found: dict[str, dict[str, object]] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        node, _, parameter = name.removeprefix("perception.").removeprefix("mapping.").partition(".")
+        if node not in NODES or not parameter:
+            raise PerceptionError(f"--set {text}: write NODE.NAME=VALUE; nodes are {', '.join(NODES)}")
+        found.setdefault(node, {})[parameter] = yaml.safe_load(value)
+    return found
+
+
+def lift_off_of(bag: rosbag.Bag) -> int:
+    """Return when flight_status became IN_AIR first, nanoseconds; 0 where it never did."""
+    for _, message, _ in bag.read_messages(topics=[offline.CALLS]):
+        call = json.loads(message.data)
+        if call["request"].get("resource") == "flight_status" and call["request"].get("to") == "IN_AIR":
+            return round(float(call["end_s"]) * 1e9)
+    return 0
+
+
+def make_nodes(graph: offline.Graph, map_path: str) -> list[object]:
+    """Make the nodes as their executables do, on the offline graph."""
+    setattr(importlib.import_module("perception_core.ros.health"), "ResourceReporter", offline.OfflineReporter)  # noqa: B010
+    read_settings = importlib.import_module("perception_core.ros").read_settings
+    made: list[object] = []
+    for name, (node, settings) in NODES.items():
+        module = importlib.import_module(f"{name}.node")
+        replaced = {"NewestWorker": offline.OfflineWorker, "TunableSettings": _untuned, "ResourceReporter": offline.OfflineReporter}
+        for attribute, replacement in replaced.items():
+            setattr(module, attribute, replacement)
+        defaults = getattr(module, settings)()
+        if hasattr(defaults, "map_path"):
+            defaults = replace(defaults, map_path=map_path)
+        with graph.node(name):
+            made.append(getattr(module, node)(read_settings(defaults)))
+    return made
+
+
+def _untuned(_settings: object, _apply: object) -> None:
+    """Nobody changes parameters on the way."""
+
+
+class Perception:
+    """Feeds the nodes from one bag, and writes the other."""
+
+    def __init__(self, source: rosbag.Bag, target: rosbag.Bag, faults: Faults, parameters: dict[str, dict[str, object]]) -> None:
+        self._source = source
+        self._target = target
+        self._faults = faults
+        self._graph = offline.Graph(self._publish)
+        self._graph.parameters = parameters
+        offline.install(self._graph)
+
+    def run(self) -> None:
+        """Perceive all of it."""
+        with tempfile.TemporaryDirectory() as folder:
+            self._graph.now_ns = round(self._source.get_start_time() * 1e9)
+            nodes = make_nodes(self._graph, str(Path(folder) / "map.ply"))
+            for topic, (kind, data, *_, message_class), time in self._source.read_messages(raw=True):
+                self._graph.advance_to(time.to_nsec())
+                self._take(topic, kind, data, message_class)
+            del nodes
+
+    def _take(self, topic: str, kind: str, data: bytes, message_class: Any) -> None:
+        now_ns = self._graph.now_ns
+        if topic in TOPICS:
+            for message, at_ns in self._faults.arriving(topic, message_class().deserialize(data), now_ns):
+                wire = BytesIO()
+                message.serialize(wire)
+                self._graph.after((at_ns - now_ns) / 1e9, functools.partial(self._graph.deliver, topic, kind, wire.getvalue()))
+            self._graph.advance_to(now_ns)
+        elif topic == offline.CALLS:
+            self._take_call(message_class().deserialize(data))
+        elif not topic.startswith(tuple(f"/{name}/" for name in NODES)):
+            self._target.write(topic, message_class().deserialize(data), self._time())
+            self._graph.deliver(topic, kind, data)
+
+    def _take_call(self, message: Any) -> None:
+        call = json.loads(message.data)
+        if call["service"] in AGAIN:
+            return
+        self._target.write(offline.CALLS, message, self._time())
+        if not call["service"].endswith("/save"):
+            self._graph.call(call["service"], call["request"])
+
+    def _publish(self, topic: str, message: Any) -> None:
+        if topic == offline.CALLS and json.loads(message.data)["service"] not in AGAIN:
+            return  # a call from the bag, which is written already
+        if not topic.endswith("/done") and topic != "/tf":
+            self._target.write(topic, message, self._time())
+
+    def _time(self) -> rospy.Time:
+        return rospy.Time(self._graph.now_ns // 1_000_000_000, self._graph.now_ns % 1_000_000_000)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Perceive again; return the exit code."""
+    parser = argparse.ArgumentParser(prog="sensor_replay", description="Perceive a recorded flight again.")
+    parser.add_argument("bag", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--fail", action="append", default=[])
+    parser.add_argument("--set", action="append", default=[], dest="settings")
+    options = parser.parse_args(words)
+    try:
+        perceive(options.bag, options.out, options.fail, options.settings)
+    except (PerceptionError, FaultError, rosbag.ROSBagException, OSError, ValueError) as error:
+        sys.stderr.write(f"{str(error) or type(error).__name__}\n".replace("\n", " ").strip() + "\n")
+        return 2
+    return 0
+
+
+def perceive(source: Path, target: Path, fail: Sequence[str], settings: Sequence[str]) -> None:
+    """Write ``target``: the bag ``source`` with what the perception says of its measurements now.
+
+    Raises:
+        PerceptionError: there are no measurements in it, or a setting does not exist.
+        FaultError: there is no such failure.
+    """
+    requests, parameters = read_faults(fail), settings_of(settings)
+    with rosbag.Bag(str(source)) as bag:
+        if not any(topic in TOPICS and topic != "/imu/data" for topic in bag.get_type_and_topic_info().topics):
+            raise PerceptionError(f"{source}: holds no measurements; record them with ./alula fly SCENARIO --record sensors")
+        with rosbag.Bag(str(target), "w") as out:
+            Perception(bag, out, Faults(requests, lift_off_of(bag)), parameters).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
