@@ -16,8 +16,8 @@ case "$1" in
     export ROS_PACKAGE_PATH="$ALULA_ROOT/ros1_ws/src:/usr/share"
     export CMAKE_PREFIX_PATH="$ALULA_STATE/ros1/devel:/usr"
     export PYTHONPATH="$ALULA_STATE/ros1/devel/lib/python3/dist-packages:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support:$ALULA_ROOT/tools"
-    # Plain Python that both worlds share: what stands below everything, the model, the language, the core of the runtime, what analyses logs, the generated managers.
-    for _alula_package in "$ALULA_ROOT"/ros2_ws/src/{alula_common,skill_model,skill_language,skill_runtime,run_analysis} "$ALULA_STATE"/generated/*_managers; do
+    # Plain Python that both worlds share: what stands below everything, the model, the language, the core of the runtime, what analyses logs, the page, the generated managers.
+    for _alula_package in "$ALULA_ROOT"/ros2_ws/src/{alula_common,skill_model,skill_language,skill_runtime,run_analysis,mission_console} "$ALULA_STATE"/generated/*_managers; do
       PYTHONPATH="$PYTHONPATH:$_alula_package"
     done
     export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}" ROS_IP="${ROS_IP:-127.0.0.1}"

@@ -28,6 +28,7 @@ ROS2_PACKAGES = (
     "skill_language",
     "skill_runtime",
     "skill_panel",
+    "mission_console",
     "skill_missions",
     "mission_replay",
     "uav_skills",

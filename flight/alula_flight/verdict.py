@@ -18,7 +18,7 @@ MEANING = {
 }
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
 SAME_MOMENT_S = 0.5
-PICTURES = ("timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
+PICTURES = ("report.html", "timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
 
 
 def number(value: float | None, unit: str, digits: int = 2) -> str:

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from alula_flight.report.files import Problems
+from alula_flight.report.page import page_entries
 from alula_flight.report.recording import Fault, read_recording
+from mission_console.entries import FAULT, HEALTH, PATH
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, path_through, write_bag
@@ -34,6 +36,21 @@ def test_a_whole_bag(tmp_path):
     assert (recording.simulator.min_clearance_m, recording.simulator.collisions) == (1.25, 0)
     assert recording.guidance[0].landing
     assert recording.map_points == 77
+
+
+def test_what_the_page_is_told_of_the_bag(tmp_path):
+    fault = {"sensor": "zed", "mode": "dead", "t_s": LIFT_OFF_S + 5.0}
+    health = [(LIFT_OFF_S + t_s / 10, "silent" if t_s >= 53 else "") for t_s in range(100)]
+    write_bag(tmp_path / "functional.bag", poses=STRAIGHT, states=[{**STATE, "faults": [fault]}], health=health)
+    entries = list(page_entries(read_recording(tmp_path, Problems()), None))
+    path = [(t_s, place) for topic, t_s, place in entries if topic == PATH]
+    assert len(path) == pytest.approx(5 * 10.0, abs=2)
+    assert path[-1][1] == pytest.approx([20.0, 0.0, 3.0], abs=0.5)
+    assert [entry for entry in entries if entry[0] != PATH] == [
+        (FAULT, LIFT_OFF_S + 5.0, {"sensor": "zed", "mode": "dead"}),
+        (HEALTH, LIFT_OFF_S, {"sensor": "zed", "ok": True, "fault": "", "reason": ""}),
+        (HEALTH, LIFT_OFF_S + 5.3, {"sensor": "zed", "ok": False, "fault": "silent", "reason": "it is silent"}),
+    ]
 
 
 def test_the_last_whole_state_of_the_simulator_counts(tmp_path):

@@ -16,7 +16,7 @@ import rosbag
 from geometry_msgs.msg import PoseStamped
 from numpy.typing import NDArray
 from std_msgs.msg import String
-from uav_msgs.msg import GuidanceState, MappingState
+from uav_msgs.msg import GuidanceState, MappingState, SensorHealth
 
 from alula_common.record import EVENTS, RecordWriter
 
@@ -85,6 +85,7 @@ def write_bag(
     states: Sequence[dict[str, Any] | str] = (),
     guidance: Sequence[dict[str, Any]] = (),
     map_points: int | None = None,
+    health: Sequence[tuple[float, str]] = (),
     cut_at: int | None = None,
 ) -> None:
     """Write a bag; with ``cut_at`` as a killed recorder leaves it: no index, and nothing behind so many bytes."""
@@ -102,6 +103,10 @@ def write_bag(
         told.header.stamp = genpy.Time.from_sec(values["t_s"])
         told.reference, told.mode, told.landed_state = values.get("reference", "idle"), values.get("mode", "GUIDED"), values["landed_state"]
         bag.write("/uav_guidance/state", told, told.header.stamp)
+    for t_s, fault in health:
+        said = SensorHealth(sensor="zed", ok=not fault, fault=fault, reason=f"it is {fault}" if fault else "")
+        said.header.stamp = genpy.Time.from_sec(t_s)
+        bag.write("/zed_depth/health", said, said.header.stamp)
     if map_points is not None:
         bag.write("/lidar_mapping/state", MappingState(points=map_points), genpy.Time.from_sec(LIFT_OFF_S))
     if cut_at is None:

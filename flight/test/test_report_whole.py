@@ -22,7 +22,7 @@ from alula_flight.verdict import verdict_lines
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, Log, failing_flight, write_bag, write_map, write_world
 
-OUTPUTS = {"summary.json", "timeline.json", "timeline.svg", "map.png"}
+OUTPUTS = {"report.html", "summary.json", "timeline.json", "timeline.svg", "map.png"}
 ROUTE = [[0.0, 0.0, 3.0], [22.0, 0.0, 3.0], [22.0, 14.0, 3.0], [44.0, 14.0, 3.0], [44.0, -4.0, 3.0]]
 # Seconds since lift-off and places of the flight that `failing_flight` tells of.
 FLOWN = [

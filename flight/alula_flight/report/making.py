@@ -14,6 +14,7 @@ from alula_flight.report.files import Problems
 from alula_flight.report.map_picture import MapScene, draw_map
 from alula_flight.report.map_quality import Floats, MapQuality, judge_map, load_map, load_route
 from alula_flight.report.mocked import read_mock
+from alula_flight.report.page import page_entries
 from alula_flight.report.phases import Phases, find_phases
 from alula_flight.report.recording import Recording, read_recording
 from alula_flight.report.recovery import find_recovery, injected
@@ -24,6 +25,7 @@ from alula_flight.report.truth import Encounter, disagreements, encounter, rests
 from alula_flight.report.video import Video, radio_lost_s, read_video
 from alula_flight.report.video_picture import draw_video
 from alula_flight.report.world import World
+from mission_console.page import write_report
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Truth:
 
 
 def make_report(facts: RunFacts) -> Summary:
-    """Make ``timeline.json``, ``timeline.svg``, ``map.png`` and ``summary.json`` in the run's folder and return the summary.
+    """Make ``timeline.json``, ``timeline.svg``, ``map.png``, ``summary.json`` and ``report.html`` in the run's folder; return the summary.
 
     Whatever is missing, cut off, makes no sense or can't be written is named in the summary's ``problems``; numbers that depend on it
     are None.
@@ -95,11 +97,23 @@ def make_report(facts: RunFacts) -> Summary:
         video=video.summary,
         problems=problems,
     )
+    _write_summary(folder, summary)
+
+    # 6. The page, of all that is in the folder by now.
+    doubts = Problems()
+    with doubts.survive("report.html"):
+        write_report(folder, page_entries(recording, truth.world), title=_title(facts))
+    if doubts.sentences:
+        summary["problems"] = [*summary["problems"], *doubts.sentences]
+        _write_summary(folder, summary)
+    return summary
+
+
+def _write_summary(folder: Path, summary: Summary) -> None:
     try:
         write_json(folder / "summary.json", summary)
     except OSError as error:
         summary["problems"].append(f"summary.json could not be written: {error.strerror or error}")
-    return summary
 
 
 def _compare(folder: Path, recording: Recording, phases: Phases, problems: Problems, *, mapped: bool) -> Truth:

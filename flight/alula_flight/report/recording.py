@@ -19,6 +19,7 @@ TRUE_POSE = "/sim/true_pose"
 SIM_STATE = "/sim/state"
 GUIDANCE = "/uav_guidance/state"
 MAPPING = "/lidar_mapping/state"
+HEALTH = {"/zed_depth/health": "zed", "/lidar_obstacles/health": "lidar"}
 ON_GROUND = 1  # uav_msgs/GuidanceState.landed_state
 LANDING = 4
 
@@ -85,6 +86,17 @@ class GuidanceAccount:
 
 
 @dataclass(frozen=True)
+class HealthChange:
+    """A watch changed its mind about a sensor at ``t_s``, absolute; ``fault`` is one of uav_msgs/SensorHealth, empty when ``ok``."""
+
+    t_s: float
+    sensor: str
+    ok: bool
+    fault: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class Recording:
     """The bag, as far as a report needs it. ``estimate`` is the guidance's own idea of the path."""
 
@@ -93,6 +105,7 @@ class Recording:
     simulator: SimulatorAccount | None = None
     guidance: tuple[GuidanceAccount, ...] = ()
     map_points: int | None = None
+    health: tuple[HealthChange, ...] = ()
 
     @property
     def path(self) -> Track | None:
@@ -133,6 +146,7 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
     truth, estimate = _Samples(), _Samples()
     guidance: list[GuidanceAccount] = []
     simulator: list[str] = []
+    health: dict[str, list[HealthChange]] = {sensor: [] for sensor in HEALTH.values()}
     map_points: int | None = None
     with problems.survive(f"{path.name} could be read in part only"):
         for topic, message in _messages(path):
@@ -144,6 +158,10 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
                 guidance.append(GuidanceAccount(t_s, message.reference, message.mode, message.landed_state))
             elif topic == SIM_STATE:
                 simulator.append(message.data)
+            elif topic in HEALTH:
+                said = HealthChange(message.header.stamp.to_sec(), HEALTH[topic], message.ok, message.fault, message.reason)
+                if not health[said.sensor] or health[said.sensor][-1].fault != said.fault:
+                    health[said.sensor].append(said)
             elif topic == MAPPING:
                 map_points = int(message.points)
     return Recording(
@@ -152,12 +170,13 @@ def read_recording(folder: Path, problems: Problems) -> Recording:
         simulator=_simulator_account(simulator, problems),
         guidance=tuple(guidance),
         map_points=map_points,
+        health=tuple(sorted((change for changes in health.values() for change in changes), key=lambda change: change.t_s)),
     )
 
 
 def _messages(path: Path) -> Iterator[tuple[str, Any]]:
     with rosbag.Bag(str(path)) as bag:
-        for topic, message, _ in bag.read_messages(topics=[TRUE_POSE, SIM_STATE, GUIDANCE, MAPPING]):
+        for topic, message, _ in bag.read_messages(topics=[TRUE_POSE, SIM_STATE, GUIDANCE, MAPPING, *HEALTH]):
             yield topic, message
 
 

@@ -1,0 +1,98 @@
+"""What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock; without a time for what holds for the whole run.
+
+Topics of the record (``alula_common.record``) keep their names and contents, with three exceptions. Of the tree the page gets the shape
+once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what keeps
+the mission from starting; of the reports none, because the events tell how executions go.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from alula_common.files import strict
+from alula_common.record import DATA, REPORTS, TICKS, TREE, Entry
+
+RUN = "/run"
+"""What was asked for: the values of ``run.json``, and the ``name`` of its folder."""
+ROUTE = "/route"
+"""The waypoints that the mission means to reach: ``[[x, y, z], ...]``, frame map, metres."""
+MAP = "/map"
+"""Points of the map, see ``clouds.packed``."""
+WORLD = "/world"
+"""Edges of the true surfaces: ``[[x, y, z, x, y, z], ...]``, frame map, metres."""
+SUMMARY = "/summary"
+"""The values of ``summary.json``."""
+PATH = "/path"
+"""Where the vehicle was: ``[x, y, z]``, frame map, metres."""
+FAULT = "/fault"
+"""Something was made to fail: ``{sensor, mode}``."""
+HEALTH = "/health"
+"""A watch changed its mind about a sensor: ``{sensor, ok, fault, reason}``."""
+NODES = "/nodes"
+"""Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""
+
+Wire = tuple[str, float | None, object]
+"""An entry as the page gets it."""
+
+DATA_PERIOD_S = 0.2
+"""Samples of one data are thinned to this."""
+
+
+def written(entry: Wire) -> str:
+    """Return an entry as JSON; what JSON does not have (NaN, infinities) becomes null."""
+    return json.dumps(strict(list(entry)), allow_nan=False, separators=(",", ":"))
+
+
+class Converter:
+    """Turns the entries of a record into those of the page."""
+
+    def __init__(self) -> None:
+        self._shape: list[tuple[int, str, str, str]] = []
+        self._nodes: list[tuple[str, str]] = []
+        self._sampled_s: dict[tuple[object, object], float] = {}
+        self._unmet: object = None
+
+    def convert(self, entry: Entry) -> Iterator[Wire]:
+        """Yield what the page gets of an entry."""
+        t_s = round(entry.stamp_s, 3)
+        if entry.topic == TREE:
+            yield from self._tree(t_s, entry.value)
+        elif self._wanted(t_s, entry):
+            yield entry.topic, t_s, entry.value
+
+    def _wanted(self, t_s: float, entry: Entry) -> bool:
+        if entry.topic == TICKS:
+            before, self._unmet = self._unmet, entry.value.get("unmet")
+            return before != self._unmet
+        return entry.topic != REPORTS and (entry.topic != DATA or self._due(t_s, entry.value))
+
+    def _due(self, t_s: float, sample: Mapping[str, Any]) -> bool:
+        key = (sample.get("skillset"), sample.get("data"))
+        last_s = self._sampled_s.get(key)
+        if last_s is not None and 0.0 <= t_s - last_s < DATA_PERIOD_S - 1e-6:
+            return False
+        self._sampled_s[key] = t_s
+        return True
+
+    def _tree(self, t_s: float, view: Mapping[str, Any]) -> Iterator[Wire]:
+        rows = list(_rows(view, 0))
+        shape, nodes = [row for row, _ in rows], [node for _, node in rows]
+        if shape != self._shape:
+            self._shape, self._nodes = shape, [("INVALID", "")] * len(shape)
+            yield TREE, t_s, shape
+        changed = [[index, *node] for index, (node, before) in enumerate(zip(nodes, self._nodes, strict=True)) if node != before]
+        self._nodes = nodes
+        if changed:
+            yield NODES, t_s, changed
+
+
+def _rows(view: Mapping[str, Any], depth: int) -> Iterator[tuple[tuple[int, str, str, str], tuple[str, str]]]:
+    """Yield of each node, top to bottom, (depth, kind, name, skill) and (status, message)."""
+    words = {key: str(view.get(key) or "") for key in ("kind", "name", "skill", "status", "message")}
+    yield (depth, words["kind"], words["name"], words["skill"]), (words["status"] or "INVALID", words["message"])
+    children = view.get("children")
+    for child in children if isinstance(children, list | tuple) else ():
+        if isinstance(child, Mapping):
+            yield from _rows(child, depth + 1)

@@ -1,0 +1,80 @@
+"""Follows what a run leaves in its folder, while it goes on or afterwards: the record, and the files beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from alula_common.record import FILE, Entry, RecordError, RecordFollower
+from mission_console.clouds import CloudError, packed, read_points
+from mission_console.entries import MAP, ROUTE, RUN, SUMMARY, Converter, Wire
+from mission_console.journal import JournalFollower
+
+
+class RunFollower:
+    """Follows one run. ``problems`` names what could not be read."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.problems: list[str] = []
+        self._converter = Converter()
+        self._record = RecordFollower(folder / FILE)
+        self._journal = JournalFollower(folder)
+        self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
+            (folder / "run.json", RUN, self._run),
+            (folder / "route.json", ROUTE, self._route),
+            (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
+            (folder / "summary.json", SUMMARY, _json),
+        ]
+        self._seen: dict[Path, tuple[int, int]] = {}
+
+    def poll(self) -> list[Wire]:
+        """Return what came since the last call, what belongs to the whole run first."""
+        return [*self._changed_files(), *self._new_entries()]
+
+    def _changed_files(self) -> Iterator[Wire]:
+        for path, topic, read in self._files:
+            try:
+                stat = path.stat()
+                version = (stat.st_mtime_ns, stat.st_size)
+                if self._seen.get(path) == version:
+                    continue
+                self._seen[path] = version
+                yield topic, None, read(path)
+            except FileNotFoundError:
+                continue
+            except (OSError, ValueError, TypeError, CloudError) as error:
+                self._note(f"{path.name}: {error}")
+
+    def _new_entries(self) -> list[Wire]:
+        entries: list[Entry] = []
+        for source in (self._record, self._journal):
+            try:
+                entries += source.poll()
+            except (RecordError, OSError) as error:
+                self._note(str(error))
+        if self._record.broken:
+            self._note(f"{FILE}: {self._record.broken}")
+        return [wire for entry in entries for wire in self._converter.convert(entry)]
+
+    def _note(self, sentence: str) -> None:
+        if sentence not in self.problems:
+            self.problems.append(sentence)
+
+    def _run(self, path: Path) -> dict[str, Any]:
+        keep = ("scenario", "seed", "faults", "world", "mock", "rate", "autopilot", "imperfections")
+        values = _json(path)
+        world = Path(str(values.get("world") or "")).stem
+        return {**{key: values.get(key) for key in keep}, "world": world, "name": self.folder.name}
+
+    def _route(self, path: Path) -> list[list[float]]:
+        return [[float(number) for number in waypoint[:3]] for waypoint in _json(path)["route"]]
+
+
+def _json(path: Path) -> Any:
+    value = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(value, dict):
+        raise TypeError("is no JSON object")
+    return value

@@ -1,0 +1,130 @@
+// Numbers in time, a small chart each: height and speed of the path, and what the skillsets' data hold.
+
+const PREFERRED = [/guidance_state\.distance_to_go_m$/, /guidance_state\.obstacle_m$/, /_obstacle\.distance_m$/, /picture\.fps$/, /picture\.quality$/, /picture\.delay_s$/, /mapping_state\.points$/, /mapping_state\.uncertainty_m$/];
+const MAX_CHARTS = 9;
+const CHART = { width: 320, height: 96, left: 40, bottom: 16 };
+
+class FiguresView {
+  constructor(choose) {
+    this.choose = choose;
+    this.added = [];
+    byId("more").addEventListener("change", (event) => {
+      if (event.target.value) this.added.unshift(event.target.value);
+      event.target.value = "";
+      this.draw(this.run, this.t);
+    });
+  }
+
+  draw(run, t) {
+    [this.run, this.t] = [run, t];
+    const names = this.names();
+    if (String(names) !== String(this.shown)) {
+      this.shown = names;
+      this.charts = new Map(names.map((name) => [name, this.frame(name)]));
+      byId("charts").replaceChildren(...[...this.charts.values()].map(({ figure }) => figure));
+      if (!names.length) byId("charts").append(el("p", { class: "hint" }, "The record holds no figures: a flight over mocks measures nothing."));
+    }
+    if (this.count !== run.count) this.offer();
+    for (const [name, chart] of this.charts) this.update(name, chart);
+    this.count = run.count;
+  }
+
+  names() {
+    const all = this.all();
+    const wanted = PREFERRED.flatMap((pattern) => all.filter((name) => pattern.test(name)));
+    const path = this.run.path.t.length ? ["height", "ground speed"] : [];
+    return [...new Set([...this.added.filter((name) => all.includes(name)), ...path, ...wanted])].slice(0, MAX_CHARTS);
+  }
+
+  all() {
+    return [...this.run.data].flatMap(([name, { columns }]) => [...columns].filter(([, column]) => column.some((value) => typeof value === "number")).map(([field]) => `${name}.${field}`));
+  }
+
+  offer() {
+    const all = this.all();
+    if (String(all) === String(this.offered)) return;
+    this.offered = all;
+    byId("more").replaceChildren(el("option", { value: "" }, "a figure …"), ...all.map((name) => el("option", { value: name }, name)));
+  }
+
+  /** Times and values of a figure. */
+  series(name) {
+    const { path, data } = this.run;
+    if (name === "height") return { t: path.t, v: path.v.map((place) => place[2]), unit: "m" };
+    if (name === "ground speed") {
+      const speed = path.v.map((place, index) => {
+        const before = Math.max(0, index - 2);
+        const dt = path.t[index] - path.t[before];
+        return dt > 0 ? Math.hypot(place[0] - path.v[before][0], place[1] - path.v[before][1]) / dt : 0;
+      });
+      return { t: path.t, v: speed, unit: "m/s" };
+    }
+    const [skillset, sample, ...field] = name.split(".");
+    const samples = data.get(`${skillset}.${sample}`);
+    return { t: samples.t, v: samples.columns.get(field.join(".")), unit: unitOf(name) };
+  }
+
+  frame(name) {
+    const value = el("b", {}, "–");
+    const drawing = svg("svg", { viewBox: `0 0 ${CHART.width} ${CHART.height}`, preserveAspectRatio: "none", role: "img", "aria-label": `${name} in time` });
+    const figure = el("figure", {}, el("figcaption", {}, el("span", { title: name }, name), value), drawing);
+    drawing.addEventListener("click", (event) => {
+      const box = drawing.getBoundingClientRect();
+      const share = ((event.clientX - box.left) / box.width - CHART.left / CHART.width) / (1 - CHART.left / CHART.width);
+      this.choose(this.run.begin + share * (this.run.end - this.run.begin));
+    });
+    return { figure, drawing, value, count: -1, cursor: svg("line", { y1: 4, y2: CHART.height - CHART.bottom, stroke: "var(--ink)", "stroke-width": 1.2 }) };
+  }
+
+  update(name, chart) {
+    const { t, v, unit } = this.series(name);
+    if (chart.count !== this.run.count) this.curve(chart, t, v, unit);
+    chart.count = this.run.count;
+    const index = indexAt(t, this.t);
+    const value = index < 0 ? null : v[index];
+    setText(chart.value, typeof value === "number" ? `${short(Number(fixed(value, 2)))} ${unit}` : "–");
+    const x = this.x(this.t);
+    chart.cursor.setAttribute("x1", x);
+    chart.cursor.setAttribute("x2", x);
+  }
+
+  x(t) {
+    const span = Math.max(this.run.end - this.run.begin, 1e-6);
+    return CHART.left + ((t - this.run.begin) / span) * (CHART.width - CHART.left - 2);
+  }
+
+  curve(chart, t, v, unit) {
+    const numbers = v.filter((value) => typeof value === "number");
+    let [low, high] = [Math.min(0, ...extremes(numbers)), Math.max(...extremes(numbers), 0)];
+    if (high - low < 1e-9) high = low + 1;
+    const y = (value) => 6 + (1 - (value - low) / (high - low)) * (CHART.height - CHART.bottom - 8);
+    const step = Math.max(1, Math.floor(t.length / 900));
+    let drawn = "";
+    let open = false;
+    for (let index = 0; index < t.length; index += step) {
+      if (typeof v[index] !== "number") open = false;
+      else {
+        drawn += `${open ? "L" : "M"}${this.x(t[index]).toFixed(1)} ${y(v[index]).toFixed(1)}`;
+        open = true;
+      }
+    }
+    const zero = origin(this.run);
+    const tidy = (value) => short(Number((Math.abs(value) < (high - low) / 100 ? 0 : value).toPrecision(3)));
+    const text = (x, at, words_, anchor = "end") => svg("text", { x, y: at, "text-anchor": anchor }, words_);
+    chart.drawing.replaceChildren(
+      svg("line", { x1: CHART.left, x2: CHART.width, y1: y(low), y2: y(low), stroke: "var(--line)" }),
+      svg("path", { d: drawn, fill: "none", stroke: "var(--path)", "stroke-width": 1.6, "vector-effect": "non-scaling-stroke" }),
+      text(CHART.left - 4, 12, tidy(high)),
+      text(CHART.left - 4, CHART.height - CHART.bottom + 2, `${tidy(low)} ${unit}`),
+      text(CHART.left, CHART.height - 2, seconds(this.run.begin - zero, 0), "start"),
+      text(CHART.width - 2, CHART.height - 2, seconds(this.run.end - zero, 0)),
+      chart.cursor,
+    );
+  }
+}
+
+/** Least and greatest of numbers, however many. */
+function extremes(numbers) {
+  if (!numbers.length) return [0, 1];
+  return numbers.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+}

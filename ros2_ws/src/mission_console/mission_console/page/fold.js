@@ -1,0 +1,223 @@
+// What a run was, folded from its entries [topic, t_s, value]. Live they come over a socket, in a report they are inside the page: one fold.
+//
+// The fold only appends: to tracks (what something was, from when on), to lists, to facts of the whole run. What was so at a moment is
+// looked up in the tracks by bisection, so the slider costs the same at any moment of a flight of hours.
+
+const TERMINAL = new Set(["NOT_VALIDATED", "NOT_READY", "RESOURCE_INVARIANT_VIOLATED", "INTERRUPTED", "TERMINATED", "FAILED"]);
+
+function newTrack() {
+  return { t: [], v: [] };
+}
+
+/** Adds a value from t on; what comes late counts from the last one on, so a track's times never fall. */
+function push(track, t, value) {
+  const last = track.t.length ? track.t[track.t.length - 1] : t;
+  track.t.push(Math.max(t, last));
+  track.v.push(value);
+}
+
+/** Index of the last moment that is not after t, or -1. */
+function indexAt(times, t) {
+  let low = 0;
+  let high = times.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= t) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+function valueAt(track, t) {
+  const index = indexAt(track.t, t);
+  return index < 0 ? undefined : track.v[index];
+}
+
+const last = (list) => list[list.length - 1];
+
+function newRun() {
+  return {
+    begin: null, // first and last moment, seconds of mission clock
+    end: null,
+    count: 0,
+    facts: {}, // topic -> value, of the whole run
+    mission: newTrack(),
+    unmet: newTrack(), // what keeps the mission from starting
+    trees: [], // {t, nodes: [{index, depth, parent, children, kind, name, skill, track}]}
+    executions: new Map(), // skillset/skill/id -> {skillset, skill, id, inputs, outputs, changes}
+    resources: new Map(), // skillset.resource -> track of {state, from, cause}
+    data: new Map(), // skillset.data -> {t, columns}
+    blackboard: new Map(),
+    path: { t: [], v: [] },
+    told: false, // whether the path comes from the run's other recordings
+    faults: [],
+    health: new Map(),
+    decisions: [],
+    operator: [],
+    moments: [], // what the list of events shows: {t, kind, text, bad}
+    departure: null, // when the vehicle left the ground
+  };
+}
+
+const FOLDERS = {
+  "/mission": (run, t, value) => {
+    const before = last(run.mission.v);
+    push(run.mission, t, value);
+    if (value.lift_off_s != null) run.departure = value.lift_off_s;
+    if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.reason ? `: ${value.reason}` : ""}`);
+  },
+  "/ticks": (run, t, { unmet }) => push(run.unmet, t, Array.isArray(unmet) ? unmet.map(String) : []),
+  "/events": (run, t, value) => (value.kind === "TRANSITION" ? foldTransition(run, t, value) : foldExecution(run, t, value)),
+  "/tree": (run, t, shape) => foldTree(run, t, shape),
+  "/nodes": (run, t, changes) => {
+    const nodes = last(run.trees)?.nodes ?? [];
+    for (const [index, status, message] of changes) if (nodes[index]) push(nodes[index].track, t, { status, message });
+  },
+  "/data": (run, t, value) => foldData(run, t, value),
+  "/path": (run, t, place) => {
+    if (!run.told) run.path = { t: [], v: [] };
+    run.told = true;
+    push(run.path, t, place);
+  },
+  "/fault": (run, t, value) => {
+    run.faults.push({ t, ...value });
+    moment(run, t, "fault", `failure injected: ${value.sensor} ${value.mode}`, true);
+  },
+  "/health": (run, t, value) => {
+    if (!run.health.has(value.sensor)) run.health.set(value.sensor, newTrack());
+    push(run.health.get(value.sensor), t, value);
+    moment(run, t, "measurement", value.ok ? `${value.sensor} is fine` : `${value.sensor} ${value.fault}: ${value.reason}`, !value.ok);
+  },
+  "/blackboard": (run, t, values) => {
+    for (const [name, value] of Object.entries(values)) {
+      if (!run.blackboard.has(name)) run.blackboard.set(name, newTrack());
+      push(run.blackboard.get(name), t, value);
+    }
+  },
+  "/decisions": (run, t, value) => run.decisions.push({ t, ...value }),
+  "/operator": (run, t, value) => {
+    run.operator.push({ t, ...value });
+    moment(run, t, "operator", `operator ${value.by ?? ""}: ${value.command}${value.answer || value.reason ? ` (${value.answer || value.reason})` : ""}`);
+  },
+};
+
+/** Adds one entry to what is known. */
+function fold(run, [topic, t, value]) {
+  run.count += 1;
+  if (t === null) {
+    run.facts[topic] = value;
+    return run;
+  }
+  run.begin = run.begin === null ? t : Math.min(run.begin, t);
+  run.end = run.end === null ? t : Math.max(run.end, t);
+  FOLDERS[topic]?.(run, t, value);
+  return run;
+}
+
+/** Adds to the list of moments, in order of time: skillsets' events cross by some milliseconds. */
+function moment(run, t, kind, text, bad = false) {
+  const entry = { t, kind, text, bad };
+  let place = run.moments.length;
+  while (place > 0 && run.moments[place - 1].t > t) place -= 1;
+  run.moments.splice(place, 0, entry);
+}
+
+function foldTransition(run, t, value) {
+  const name = `${value.skillset}.${value.resource}`;
+  if (!run.resources.has(name)) run.resources.set(name, newTrack());
+  const track = run.resources.get(name);
+  if (!track.t.length) push(track, run.begin, { state: value.from_state, from: "", cause: "" });
+  push(track, t, { state: value.to_state, from: value.from_state, cause: value.cause });
+  if (value.resource === "flight_status" && value.from_state === "ON_GROUND" && run.departure === null) run.departure = t;
+  const bad = /BROKEN|LOST|FAILED|ERROR/.test(value.to_state);
+  if (value.cause === "extern" || bad) moment(run, t, "resource", `${name}: ${value.from_state} → ${value.to_state} (${value.cause})`, bad);
+}
+
+function foldExecution(run, t, value) {
+  const key = `${value.skillset}/${value.skill}/${value.id}`;
+  if (!run.executions.has(key)) {
+    run.executions.set(key, { skillset: value.skillset, skill: value.skill, id: value.id, inputs: value.inputs ?? {}, outputs: {}, start: t, running: null, end: null, state: "", result: "", message: "" });
+  }
+  const execution = run.executions.get(key);
+  if (execution.end !== null) return; // the first end counts
+  Object.assign(execution, { state: value.state, result: value.result || execution.result, message: value.message || execution.message });
+  if (value.state === "RUNNING" && execution.running === null) execution.running = t;
+  if (TERMINAL.has(value.state)) Object.assign(execution, { end: t, outputs: value.outputs ?? {} });
+  if (value.state === "RUNNING") moment(run, t, "skill", `${value.skillset}.${value.skill} runs`);
+  else if (TERMINAL.has(value.state)) {
+    const ending = endingOf(execution);
+    const why = value.message ? `: ${value.message}` : "";
+    moment(run, t, "skill", `${value.skillset}.${value.skill} ${ENDINGS[ending].words}${value.result && !why ? ` (${value.result})` : ""}${why}`, ending === "violated" || ending === "failure");
+  }
+}
+
+function foldTree(run, t, shape) {
+  const nodes = [];
+  const open = [];
+  for (const [depth, kind, name, skill] of shape) {
+    const node = { index: nodes.length, depth, kind, name, skill, parent: depth ? open[depth - 1] : null, children: [], track: newTrack() };
+    node.parent?.children.push(node);
+    open[depth] = node;
+    nodes.push(node);
+  }
+  run.trees.push({ t, nodes });
+}
+
+function foldData(run, t, { skillset, data, value }) {
+  const name = `${skillset}.${data}`;
+  if (!run.data.has(name)) run.data.set(name, { t: [], columns: new Map() });
+  const samples = run.data.get(name);
+  samples.t.push(Math.max(t, last(samples.t) ?? t));
+  for (const [field, leaf] of leaves(value, "")) {
+    if (!samples.columns.has(field)) samples.columns.set(field, new Array(samples.t.length - 1).fill(null));
+    samples.columns.get(field).push(leaf);
+  }
+  for (const column of samples.columns.values()) if (column.length < samples.t.length) column.push(null);
+  const place = value?.position_enu_m;
+  if (place && !run.told && [place.x, place.y, place.z].every(Number.isFinite)) push(run.path, t, [place.x, place.y, place.z]);
+}
+
+/** Numbers, words and truths in a value, by path; message headers say nothing to people. */
+function* leaves(value, path) {
+  if (value === null || value === undefined || Array.isArray(value)) return;
+  if (typeof value !== "object") yield [path, value];
+  else for (const [name, part] of Object.entries(value)) if (name !== "header" && !/^[A-Z_]+$/.test(name)) yield* leaves(part, path ? `${path}.${name}` : name);
+}
+
+// --- what follows from it ------------------------------------------------------------------------------------------------
+
+// The paper's notation does not tell good results from bad ones; these names say it by themselves.
+const FAILURE_WORDS = /BLOCKED|ABORT|FAIL|ERROR|LOST|TIMEOUT|REFUSED|DRIFT|UNREACH|STUCK|REJECT|INVALID/;
+const ENDINGS = {
+  running: { words: "runs", mark: "…" },
+  success: { words: "ended by itself", mark: "✓" },
+  interrupted: { words: "was interrupted", mark: "◦" },
+  violated: { words: "lost an invariant", mark: "✗" },
+  failure: { words: "failed or was refused", mark: "!" },
+};
+
+/** How an execution ended, in one of the five words above. */
+function endingOf({ state, result }) {
+  if (!TERMINAL.has(state)) return "running";
+  if (state === "TERMINATED") return FAILURE_WORDS.test(result.toUpperCase()) ? "failure" : "success";
+  return { RESOURCE_INVARIANT_VIOLATED: "violated", INTERRUPTED: "interrupted" }[state] ?? "failure";
+}
+
+/** Lift-off, the origin of all times that are shown; the first moment where nothing left the ground. */
+function origin(run) {
+  return run.facts["/summary"]?.lift_off?.stamp_s ?? run.departure ?? run.begin ?? 0;
+}
+
+/** The tree that was ticked at t. */
+function treeAt(run, t) {
+  const index = indexAt(run.trees.map((tree) => tree.t), t);
+  return run.trees[Math.max(index, 0)];
+}
+
+/** Status, message and since when, of a node at t. */
+function nodeAt(node, t) {
+  const index = indexAt(node.track.t, t);
+  return index < 0 ? { status: "INVALID", message: "", since: null } : { ...node.track.v[index], since: node.track.t[index] };
+}
+
+const words = (text) => String(text ?? "").replaceAll("_", " ").toLowerCase();

@@ -1,0 +1,252 @@
+// The page: entries in, one moment out. Every view draws the run at `moment()`; the slider, the keys and clicks choose it.
+
+const run = newRun();
+let cursor = null; // the moment that was chosen; null: the last one, whatever comes
+let playing = null;
+let drawn = false;
+
+const moment_ = () => cursor ?? run.end ?? 0;
+const choose = (t) => {
+  cursor = t === null || (run.end !== null && t >= run.end - 0.01) ? null : Math.max(t, run.begin ?? 0);
+  draw();
+};
+const views = [new TimelineView(choose), new TreeView(choose), new MapView(), new FiguresView(choose)];
+
+/** Asks for a drawing with the next picture of the screen; many changes in between are one. */
+function draw() {
+  if (drawn) return;
+  drawn = true;
+  requestAnimationFrame(() => {
+    drawn = false;
+    show();
+  });
+}
+
+function show() {
+  const t = moment_();
+  showStory();
+  showScrub(t);
+  if (run.begin !== null) for (const view of views) view.draw(run, t);
+  showMoments(t);
+}
+
+function showStory() {
+  if (showStory.count === run.count) return;
+  showStory.count = run.count;
+  const { text, tone, reason } = headline(run);
+  setText(byId("headline"), text);
+  setText(byId("reason"), reason);
+  byId("story").style.setProperty("--tone", `var(--${tone})`);
+  const asked = run.facts["/run"] ?? {};
+  const parts = [asked.scenario, asked.world && `world ${asked.world}`, asked.seed != null && `seed ${asked.seed}`, asked.faults?.length && `failing ${asked.faults.join(", ")}`, asked.mock ? "over mocks" : asked.autopilot ? "a real autopilot" : "in the simulator"];
+  setText(byId("title"), asked.name ? `Alula · ${asked.name}` : "Alula");
+  setText(byId("subtitle"), parts.filter(Boolean).join(" · "));
+  rewrite(byId("figures-row"), keyFigures(run), ([label, value]) => el("div", {}, el("dt", {}, label), el("dd", {}, value)));
+  const zero = origin(run);
+  const go = (t) => el("button", { type: "button", onclick: () => choose(t), "aria-label": `go to ${seconds(t - zero)}` }, seconds(t - zero, 2));
+  rewrite(byId("lines"), story(run), ({ t, text: sentence, kind }) => el("li", { class: kind }, go(t), el("span", {}, sentence)));
+  rewrite(byId("costs"), costs(run), (sentence) => el("li", {}, sentence));
+  byId("cost-title").hidden = !byId("costs").firstChild;
+  const chains = failures(run).map((failure) => chainOf(run, failure));
+  rewrite(byId("chains"), chains.length ? chains : [null], (chain) => (chain ? el("ol", { class: "chain" }, ...chain.map(({ step, t, text: sentence }) => el("li", {}, el("b", {}, step), go(t), el("span", {}, sentence)))) : el("p", {}, "No skill failed.")));
+  rewrite(byId("problems"), run.facts["/summary"]?.problems ?? [], (sentence) => el("li", {}, sentence));
+}
+
+/** Rebuilds a list only when what it shows has changed. */
+function rewrite(node, values, make) {
+  const key = JSON.stringify(values);
+  if (node.dataset.shown === String(key.length) && node.shown === key) return;
+  [node.shown, node.dataset.shown] = [key, key.length];
+  node.replaceChildren(...values.map(make));
+}
+
+function showScrub(t) {
+  const zero = origin(run);
+  const slider = byId("slider");
+  const bounds = { min: (run.begin ?? 0) - zero, max: (run.end ?? 1) - zero };
+  for (const [name, value] of Object.entries(bounds)) if (Number(slider[name]) !== value) slider[name] = value;
+  slider.value = t - zero;
+  slider.setAttribute("aria-valuetext", seconds(t - zero));
+  setText(byId("now"), seconds(t - zero));
+  setText(byId("latest"), live.on ? "now" : "end");
+  byId("latest").setAttribute("aria-pressed", String(cursor === null));
+  const before = momentsUpTo(t);
+  setText(byId("at"), before > 0 ? `${seconds(run.moments[before - 1].t - zero, 2)}  ${run.moments[before - 1].text}` : "before the first event");
+}
+
+/** How many moments are not after t. */
+function momentsUpTo(t) {
+  return indexAt(run.moments.map((entry) => entry.t), t + 1e-6) + 1;
+}
+
+const SHOWN_MOMENTS = 400;
+
+function showMoments(t) {
+  const upTo = momentsUpTo(t);
+  const body = byId("moments").querySelector("tbody");
+  const first = Math.max(0, Math.min(upTo - SHOWN_MOMENTS / 2, run.moments.length - SHOWN_MOMENTS));
+  const zero = origin(run);
+  const key = `${run.count} ${first} ${zero}`;
+  if (body.shown !== key) {
+    body.shown = key;
+    body.replaceChildren(...run.moments.slice(first, first + SHOWN_MOMENTS).map((entry) => el("tr", { class: entry.bad ? "bad" : "", onclick: () => choose(entry.t) }, el("td", {}, el("button", { type: "button" }, seconds(entry.t - zero, 2))), el("td", {}, entry.kind), el("td", {}, entry.text))));
+    body.current = null;
+  }
+  if (body.current === upTo) return;
+  body.current = upTo;
+  [...body.rows].forEach((row, index) => {
+    row.classList.toggle("current", first + index === upTo - 1);
+    row.classList.toggle("later", first + index >= upTo);
+  });
+  const row = body.rows[upTo - 1 - first];
+  const list = byId("moments");
+  if (row && !list.contains(document.activeElement)) list.scrollTop = row.offsetTop - list.clientHeight / 2;
+}
+
+// --- choosing a moment -------------------------------------------------------------------------------------------------
+
+/** Goes to the nearest event before (-1) or after (+1) the moment. */
+function step(direction) {
+  const t = moment_();
+  const times = run.moments.map((entry) => entry.t);
+  const index = direction > 0 ? indexAt(times, t + 1e-6) + 1 : indexAt(times, t - 1e-6);
+  if (times[index] !== undefined) choose(times[index]);
+}
+
+const PLAY_SPEED = 5;
+
+function play() {
+  if (playing !== null) cancelAnimationFrame(playing);
+  byId("play").setAttribute("aria-pressed", String(playing === null));
+  if (playing !== null) return void (playing = null);
+  if (cursor === null) cursor = run.begin;
+  let before = performance.now();
+  const advance = (now) => {
+    if (cursor === null) return void (playing = null, byId("play").setAttribute("aria-pressed", "false"));
+    choose(cursor + (PLAY_SPEED * (now - before)) / 1000);
+    before = now;
+    playing = requestAnimationFrame(advance);
+  };
+  playing = requestAnimationFrame(advance);
+}
+
+byId("slider").addEventListener("input", (event) => choose(Number(event.target.value) + origin(run)));
+byId("previous").addEventListener("click", () => step(-1));
+byId("next").addEventListener("click", () => step(1));
+byId("play").addEventListener("click", play);
+byId("latest").addEventListener("click", () => choose(null));
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA|BUTTON)$/.test(event.target.tagName)) return;
+  const acts = { n: () => step(1), p: () => step(-1), " ": play, Home: () => choose(run.begin), End: () => choose(null) };
+  const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (!act) return;
+  event.preventDefault();
+  act();
+});
+
+// --- light and dark ------------------------------------------------------------------------------------------------------
+
+function paint(theme) {
+  document.documentElement.dataset.theme = theme;
+  setText(byId("theme"), theme === "dark" ? "Light" : "Dark");
+  for (const view of views) if (view instanceof MapView && view.run) view.draw(view.run, view.t, true);
+}
+
+byId("theme").addEventListener("click", () => paint(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+paint(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+
+// --- entries -----------------------------------------------------------------------------------------------------------
+
+function take(entries) {
+  for (const entry of entries) fold(run, entry);
+  draw();
+}
+
+/** The entries inside the page: base64 of gzipped JSON. */
+async function readRecord(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return JSON.parse(await new Response(stream).text());
+}
+
+const live = { on: false, state: "" };
+const STALE_MS = 800; // the server speaks every 0.3 s
+const AGAIN_MS = 250;
+
+/** The live page: a socket that is opened again and again, and says so while what is shown may be old. */
+class Link {
+  constructor() {
+    live.on = true;
+    this.at = { session: "", entries: 0 };
+    this.heard = 0;
+    this.run = new URLSearchParams(location.hash.slice(1)).get("run") ?? "";
+    this.key = sessionStorage.getItem("alula-key") ?? crypto.getRandomValues(new Uint32Array(4)).join("-");
+    sessionStorage.setItem("alula-key", this.key);
+    this.name = `viewer ${this.key.slice(0, 4)}`;
+    this.bar = new OperatorBar((asked) => this.send(asked), (name) => this.watch(name));
+    byId("link").hidden = false;
+    this.open();
+    setInterval(() => this.judge(), 200);
+  }
+
+  open() {
+    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/feed${location.search}`);
+    this.begun = performance.now();
+    this.socket.addEventListener("open", () => this.send({ key: this.key, name: this.name, run: this.run, ...this.at }));
+    this.socket.addEventListener("message", ({ data }) => this.hear(JSON.parse(data)));
+    this.socket.addEventListener("close", () => setTimeout(() => this.open(), AGAIN_MS));
+  }
+
+  send(asked) {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(asked));
+    else this.bar.say("not connected: nothing was asked for");
+  }
+
+  watch(name) {
+    this.run = name;
+    this.send({ watch: name });
+  }
+
+  hear(said) {
+    this.heard = performance.now();
+    if (said.entries) {
+      if (said.reset) clear();
+      this.at = { session: said.session, entries: said.upTo };
+      this.behind = said.of - said.upTo;
+      take(said.entries);
+    }
+    if (said.answer !== undefined) this.bar.say(`${said.command}: ${said.answer}`);
+    if (said.status) {
+      this.status = said.status;
+      if (this.run && said.status.run !== this.run && !said.status.runs.includes(this.run)) this.run = "";
+      this.bar.show(said.status, last(run.unmet.v));
+    }
+    this.judge();
+  }
+
+  /** Says whether what is shown is true now; a server that hangs without closing is left. */
+  judge() {
+    const age = performance.now() - this.heard;
+    const stale = age > STALE_MS;
+    if (stale && this.socket.readyState === WebSocket.OPEN && performance.now() - this.begun > 3000 && age > 3000) this.socket.close();
+    const state = stale ? "stale" : this.behind > 0 ? "catching up" : this.status?.live ? "live" : "over";
+    const since = this.heard ? `disconnected: what is shown is ${seconds(age / 1000, 0)} old` : "connecting …";
+    const problems = this.status?.problems ?? [];
+    setText(byId("link"), stale ? since : { live: "live", over: this.status?.run ? "this run is over" : "no run yet", "catching up": "catching up" }[state] + (problems.length ? ` (${problems.join("; ")})` : ""));
+    byId("link").dataset.state = live.state = state;
+    this.bar.enable();
+  }
+}
+
+/** Forgets what was folded: the server has begun anew, or another run is shown. */
+function clear() {
+  Object.assign(run, newRun());
+  cursor = null;
+  showStory.count = -1;
+  for (const view of views) view.count = -1;
+}
+
+const record = byId("record").textContent.trim();
+if (record) readRecord(record).then(take, (error) => setText(byId("headline"), `The record inside this page can't be read: ${error.message}`));
+else live.link = new Link();
+window.alula = { run, take, choose, step, live, moment: moment_ };

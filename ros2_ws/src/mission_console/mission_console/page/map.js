@@ -1,0 +1,293 @@
+// Map, route, flown path and vehicle, orthographic: from above, or in 3D, which is the same drawing seen from another side.
+
+const ABOVE = { yaw: 0, pitch: Math.PI / 2 };
+const SLANTED = { yaw: -0.6, pitch: 0.65 };
+// Dark blue to yellow by height, of even steps in lightness (after Smith and van der Walt's viridis): colour-blind people see heights, too.
+const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+
+class MapView {
+  constructor() {
+    this.canvas = byId("map");
+    this.cloud = document.createElement("canvas");
+    this.view = { ...ABOVE };
+    this.scale = null; // pixels a metre; null: everything fits
+    this.shift = [0, 0];
+    byId("map-above").addEventListener("click", () => this.turn(ABOVE));
+    byId("map-3d").addEventListener("click", () => this.turn(SLANTED));
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.drag = [event.clientX, event.clientY, event.shiftKey || this.view.pitch === ABOVE.pitch];
+      this.canvas.setPointerCapture(event.pointerId);
+    });
+    this.canvas.addEventListener("pointermove", (event) => this.move(event));
+    this.canvas.addEventListener("pointerup", () => (this.drag = null));
+    this.canvas.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey) return;
+      event.preventDefault();
+      this.enlarge(event.deltaY > 0 ? 0.85 : 1.18);
+    }, { passive: false });
+    this.canvas.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.run && this.draw(this.run, this.t, true)).observe(this.canvas);
+    const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
+    const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
+    byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
+  }
+
+  turn(view) {
+    this.view = { ...view };
+    [this.scale, this.shift] = [null, [0, 0]];
+    this.draw(this.run, this.t, true);
+  }
+
+  enlarge(factor) {
+    this.scale = (this.scale ?? this.fitted) * factor;
+    this.draw(this.run, this.t, true);
+  }
+
+  move(event) {
+    if (!this.drag) return;
+    const [dx, dy] = [event.clientX - this.drag[0], event.clientY - this.drag[1]];
+    if (this.drag[2]) this.shift = [this.shift[0] + dx, this.shift[1] + dy];
+    else {
+      this.view.yaw += dx * 0.008;
+      this.view.pitch = Math.min(Math.PI / 2, Math.max(0.05, this.view.pitch + dy * 0.008));
+    }
+    [this.drag[0], this.drag[1]] = [event.clientX, event.clientY];
+    this.draw(this.run, this.t, true);
+  }
+
+  key(event) {
+    const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+    if (event.key === "+") this.enlarge(1.18);
+    else if (event.key === "-") this.enlarge(0.85);
+    else if (turns[event.key]) {
+      this.view.yaw += turns[event.key][0];
+      this.view.pitch = Math.min(Math.PI / 2, Math.max(0.05, this.view.pitch + turns[event.key][1]));
+      this.draw(this.run, this.t, true);
+    } else return;
+    event.preventDefault();
+  }
+
+  draw(run, t, anew = false) {
+    [this.run, this.t] = [run, t];
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    if (!width) return;
+    const sized = this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio);
+    if (sized) for (const canvas of [this.canvas, this.cloud]) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+    const facts = [run.facts["/map"], run.facts["/world"], run.facts["/route"]];
+    const changed = facts.some((fact, index) => fact !== this.facts?.[index]);
+    if (facts[0] !== this.facts?.[0]) this.points = unpack(facts[0]);
+    this.facts = facts;
+    this.size = [width, height];
+    const box = this.box();
+    if (sized || anew || changed || String(box) !== String(this.boxed)) {
+      this.boxed = box;
+      this.fit(box);
+      this.drawCloud(ratio);
+    }
+    this.drawMoment(ratio);
+    this.tell();
+  }
+
+  box() {
+    const corners = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+    const stretchBy = (x, y, z) => [x, y, z].forEach((value, axis) => {
+      corners[0][axis] = Math.min(corners[0][axis], Math.floor(value) - 1);
+      corners[1][axis] = Math.max(corners[1][axis], Math.ceil(value) + 1);
+    });
+    for (const place of this.run.facts["/route"] ?? []) stretchBy(...place);
+    for (const place of this.run.path.v) stretchBy(...place);
+    for (let at = 0; at < (this.points?.length ?? 0); at += 30) stretchBy(this.points[at], this.points[at + 1], this.points[at + 2]);
+    if (corners[0][0] === Infinity) stretchBy(0, 0, 0);
+    return [...corners[0], ...corners[1]];
+  }
+
+  fit(box) {
+    this.centre = [0, 1, 2].map((axis) => (box[axis] + box[axis + 3]) / 2);
+    const [width, height] = this.size;
+    const spans = [0, 1].map(() => 0);
+    this.fitted = 1;
+    const held = [this.scale, this.shift];
+    [this.scale, this.shift] = [1, [0, 0]];
+    for (const x of [box[0], box[3]]) for (const y of [box[1], box[4]]) for (const z of [box[2], box[5]]) {
+      const [u, v] = this.project(x, y, z);
+      spans[0] = Math.max(spans[0], Math.abs(u - width / 2));
+      spans[1] = Math.max(spans[1], Math.abs(v - height / 2));
+    }
+    [this.scale, this.shift] = held;
+    this.fitted = Math.min((width / 2 - 12) / spans[0], (height / 2 - 12) / spans[1]);
+  }
+
+  /** Pixel of a place in the frame map: turned by yaw about the vertical, then seen from the pitch. */
+  project(x, y, z) {
+    const scale = this.scale ?? this.fitted;
+    const [dx, dy, dz] = [x - this.centre[0], y - this.centre[1], z - this.centre[2]];
+    const { yaw, pitch } = this.view;
+    const east = dx * Math.cos(yaw) - dy * Math.sin(yaw);
+    const north = dx * Math.sin(yaw) + dy * Math.cos(yaw);
+    return [this.size[0] / 2 + this.shift[0] + scale * east, this.size[1] / 2 + this.shift[1] - scale * (north * Math.sin(pitch) + dz * Math.cos(pitch))];
+  }
+
+  colour(name) {
+    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  }
+
+  drawCloud(ratio) {
+    const pen = this.cloud.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, ...this.size);
+    this.grid(pen);
+    if (this.points) {
+      const side = Math.max(1.4, Math.min(3.5, (this.scale ?? this.fitted) * 0.16));
+      pen.globalAlpha = 0.8;
+      for (const at of this.order()) {
+        pen.fillStyle = heightColour((this.points[at + 2] - this.low) / (this.high - this.low));
+        const [u, v] = this.project(this.points[at], this.points[at + 1], this.points[at + 2]);
+        pen.fillRect(u, v, side, side);
+      }
+      pen.globalAlpha = 1;
+    }
+    pen.strokeStyle = this.colour("--edge");
+    pen.lineWidth = 0.8;
+    pen.beginPath();
+    for (const [x1, y1, z1, x2, y2, z2] of this.run.facts["/world"] ?? []) {
+      pen.moveTo(...this.project(x1, y1, z1));
+      pen.lineTo(...this.project(x2, y2, z2));
+    }
+    pen.stroke();
+    this.line(pen, this.run.facts["/route"] ?? [], "--route", 1.6, [6, 5]);
+    for (const place of this.run.facts["/route"] ?? []) this.dot(pen, place, "--route", 3);
+  }
+
+  /** Points from low to high: what is high is seen from above. */
+  order() {
+    const heights = Array.from({ length: this.points.length / 3 }, (_, index) => this.points[3 * index + 2]).sort((a, b) => a - b);
+    this.low = heights[Math.floor(0.01 * heights.length)];
+    this.high = Math.max(this.low + 0.5, heights[Math.floor(0.99 * (heights.length - 1))]);
+    this.sorted ??= new WeakMap();
+    if (!this.sorted.has(this.points)) this.sorted.set(this.points, Array.from({ length: this.points.length / 3 }, (_, index) => 3 * index).sort((a, b) => this.points[a + 2] - this.points[b + 2]));
+    return this.sorted.get(this.points);
+  }
+
+  grid(pen) {
+    const scale = this.scale ?? this.fitted;
+    const step = [1, 2, 5, 10, 20, 50, 100, 200, 500].find((metres) => metres * scale > 46) ?? 1000;
+    const [x1, y1, , x2, y2] = this.boxed;
+    pen.strokeStyle = this.colour("--line");
+    pen.fillStyle = this.colour("--soft");
+    pen.font = "11px system-ui, sans-serif";
+    pen.lineWidth = 0.7;
+    pen.beginPath();
+    for (let x = Math.ceil(x1 / step) * step; x <= x2; x += step) {
+      pen.moveTo(...this.project(x, y1, 0));
+      pen.lineTo(...this.project(x, y2, 0));
+      pen.fillText(`${x} m`, ...this.project(x, y1, 0));
+    }
+    for (let y = Math.ceil(y1 / step) * step; y <= y2; y += step) {
+      pen.moveTo(...this.project(x1, y, 0));
+      pen.lineTo(...this.project(x2, y, 0));
+      pen.fillText(`${y} m`, ...this.project(x1, y, 0));
+    }
+    pen.stroke();
+  }
+
+  line(pen, places, colour, width, dashes = []) {
+    pen.strokeStyle = this.colour(colour);
+    pen.lineWidth = width;
+    pen.setLineDash(dashes);
+    pen.beginPath();
+    places.forEach((place, index) => pen[index ? "lineTo" : "moveTo"](...this.project(...place)));
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  dot(pen, place, colour, radius) {
+    pen.fillStyle = this.colour(colour);
+    pen.beginPath();
+    pen.arc(...this.project(...place), radius, 0, 2 * Math.PI);
+    pen.fill();
+  }
+
+  drawMoment(ratio) {
+    const pen = this.canvas.getContext("2d");
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    pen.drawImage(this.cloud, 0, 0);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const { path } = this.run;
+    const index = indexAt(path.t, this.t);
+    pen.globalAlpha = 0.3;
+    this.line(pen, path.v, "--path", 1.5);
+    pen.globalAlpha = 1;
+    this.line(pen, path.v.slice(0, index + 1), "--path", 2.6);
+    for (const entry of marks(this.run).filter(({ kind }) => kind === "failure")) {
+      const where = indexAt(path.t, entry.t);
+      if (where < 0) continue;
+      const [u, v] = this.project(...path.v[where]);
+      pen.strokeStyle = this.colour("--bad");
+      pen.fillStyle = this.colour("--bad");
+      pen.lineWidth = 3;
+      pen.beginPath();
+      for (const [a, b] of [[-6, -6], [-6, 6]]) {
+        pen.moveTo(u + a, v + b);
+        pen.lineTo(u - a, v - b);
+      }
+      pen.stroke();
+      pen.font = "600 12px system-ui, sans-serif";
+      pen.strokeStyle = this.colour("--card");
+      pen.strokeText(entry.label, u + 10, v - 8);
+      pen.fillText(entry.label, u + 10, v - 8);
+    }
+    if (index < 0) return;
+    const here = path.v[index];
+    const ahead = this.obstacle();
+    if (ahead) {
+      this.line(pen, [here, ahead.place], "--bad", 2, [3, 3]);
+      this.dot(pen, ahead.place, "--bad", 4);
+    }
+    if (this.view.pitch !== ABOVE.pitch) this.line(pen, [here, [here[0], here[1], 0]], "--place", 1, [2, 2]);
+    this.dot(pen, here, "--place", 6);
+  }
+
+  /** The obstacle that a sensor sees ahead at the moment: its place and distance. */
+  obstacle() {
+    for (const [name, { t, columns }] of this.run.data) {
+      const index = indexAt(t, this.t);
+      if (index < 0 || this.t - t[index] > 1 || columns.get("detected")?.[index] !== true) continue;
+      const place = ["x", "y", "z"].map((axis) => columns.get(`nearest_enu_m.${axis}`)?.[index]);
+      if (place.every(Number.isFinite)) return { name: name.split(".")[1], place, distance: columns.get("distance_m")?.[index] };
+    }
+    return null;
+  }
+
+  /** Says in words what the picture shows. */
+  tell() {
+    const { path } = this.run;
+    const index = indexAt(path.t, this.t);
+    const map = this.run.facts["/map"];
+    const ahead = this.obstacle();
+    const parts = [index < 0 ? "Nothing is recorded of the vehicle's place." : `Vehicle at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
+    if (ahead) parts.push(`Obstacle ${Number.isFinite(ahead.distance) ? `${fixed(ahead.distance, 1)} m ` : ""}ahead (${ahead.name}).`);
+    if (map) parts.push(`Map: ${map.of} points, ${map.count} drawn${this.run.facts["/summary"] ? ", as it was at the end" : ""}.`);
+    const text = parts.join(" ");
+    setText(byId("map-words"), text);
+    this.canvas.setAttribute("aria-label", `Map. ${text}`);
+  }
+}
+
+function unpack(map) {
+  if (!map?.count) return null;
+  const bytes = Uint8Array.from(atob(map.data), (letter) => letter.charCodeAt(0));
+  const numbers = new Uint16Array(bytes.buffer);
+  return Float32Array.from(numbers, (number, index) => map.origin_m[index % 3] + map.step_m * number);
+}
+
+const SHADES = Array.from({ length: 64 }, (_, index) => {
+  const place = (index / 63) * (RAMP.length - 1);
+  const [low, share] = [Math.min(Math.floor(place), RAMP.length - 2), place - Math.min(Math.floor(place), RAMP.length - 2)];
+  return `rgb(${RAMP[low].map((value, channel) => Math.round(value + share * (RAMP[low + 1][channel] - value))).join(",")})`;
+});
+
+function heightColour(share) {
+  return SHADES[Math.max(0, Math.min(63, Math.round(63 * share)))];
+}

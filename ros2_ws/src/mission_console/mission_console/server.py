@@ -1,0 +1,297 @@
+"""The server of the operator's page: follows runs, sends every viewer what it lacks, and does what the operator asks for.
+
+A process of its own that only reads files: no viewer, slow, hung or hostile, can hold up a mission.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from alula_common.runs import NoRunError, load_run, runs_folder
+from alula_common.scenarios import scenario_names
+from mission_console import acts, journal
+from mission_console.admission import Admission
+from mission_console.feed import Feed, place_of
+from mission_console.page import REPORT, make_page
+
+FEED = "/feed"
+STATUS_S = 0.3
+"""A viewer that hears nothing for longer than a second knows that what it shows is old."""
+STUCK_S = 5.0
+"""A viewer that takes nothing for so long is dropped; it comes back by itself and is sent what it lacks."""
+HELLO_S = 5.0
+MAX_VIEWERS = 64
+MAX_MESSAGE_BYTES = 1 << 14
+MAX_COMMANDS_PER_S = 10
+LOOK_S = 0.5
+SHOWN_RUNS = 20
+
+
+@dataclass(eq=False)
+class Viewer:
+    """One that watches. ``key`` is its own secret: who comes back with it is the same."""
+
+    connection: ServerConnection
+    key: str
+    name: str
+    run: str = ""
+    commands: list[float] = field(default_factory=list)
+
+
+class Console:
+    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest."""
+
+    def __init__(self, admission: Admission, *, fixed: Path | None = None) -> None:
+        self._admission = admission
+        self._fixed = fixed
+        self._scenarios = scenario_names()
+        self._page = make_page(title="Alula", entries=None).encode()
+        self._feeds: dict[Path, tuple[Feed, asyncio.Task[None]]] = {}
+        self._viewers: set[Viewer] = set()
+        self._commander = ""
+        self._runs: list[Path] = []
+        self._live: set[Path] = set()
+        self._busy = asyncio.Lock()
+        self._acts: Mapping[str, Callable[[Mapping[str, Any], Path | None], tuple[Path | None, str]]] = {
+            "start": self._start,
+            "abort": self._abort,
+            "off": self._off,
+        }
+
+    @contextlib.asynccontextmanager
+    async def open(self) -> Any:
+        """Serve as long as the context lasts."""
+        server: Server
+        look = asyncio.create_task(self._look_for_runs())
+        async with serve(
+            self._serve_viewer,
+            self._admission.host,
+            self._admission.port,
+            process_request=self._answer,
+            max_size=MAX_MESSAGE_BYTES,
+            write_limit=1 << 18,
+            open_timeout=3,  # browsers open connections ahead of need
+            close_timeout=1,
+            compression=None,  # it would take the event loop's time, and most viewers are on this machine
+            server_header=None,
+        ) as server:
+            try:
+                yield server
+            finally:
+                look.cancel()
+                for _, task in self._feeds.values():
+                    task.cancel()
+
+    # --- pages ---------------------------------------------------------------------------------------------------------
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request for a page; None lets a WebSocket be opened."""
+        path = unquote(urlsplit(request.path).path)
+        headers = request.headers
+        socket = path == FEED
+        refusal = self._admission.refusal(target=request.path, host=headers.get("Host"), origin=headers.get("Origin"), socket=socket)
+        if refusal:
+            return self._page_of(HTTPStatus.FORBIDDEN, f"{refusal}\n".encode(), "text/plain; charset=utf-8")
+        if socket:
+            full = len(self._viewers) >= MAX_VIEWERS
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many viewers\n") if full else None
+        if path == "/":
+            return self._page_of(HTTPStatus.OK, self._page, "text/html; charset=utf-8")
+        return self._report(path)
+
+    def _report(self, path: str) -> Response:
+        run = next((folder for folder in self._runs if path == f"/runs/{folder.name}/{REPORT}"), None)
+        if run is None or not (run / REPORT).is_file():
+            return self._page_of(HTTPStatus.NOT_FOUND, b"there is no such page\n", "text/plain; charset=utf-8")
+        # In a sandbox, a page of a run has an origin of its own: nothing in it can command.
+        return self._page_of(HTTPStatus.OK, (run / REPORT).read_bytes(), "text/html; charset=utf-8", policy="sandbox allow-scripts")
+
+    def _page_of(self, status: HTTPStatus, body: bytes, kind: str, *, policy: str = "frame-ancestors 'none'") -> Response:
+        headers = Headers(
+            {
+                "Content-Type": kind,
+                "Content-Length": str(len(body)),
+                "Content-Security-Policy": policy,
+                "X-Content-Type-Options": "nosniff",
+                "Referrer-Policy": "no-referrer",
+                "Cache-Control": "no-store",
+                "Connection": "close",
+            }
+        )
+        return Response(status.value, status.phrase, headers, body)
+
+    # --- runs ----------------------------------------------------------------------------------------------------------
+
+    async def _look_for_runs(self) -> None:
+        while True:
+            self._runs = await asyncio.to_thread(runs_in, runs_folder(), self._fixed)
+            self._live = await asyncio.to_thread(lambda: {run for run in self._runs[:SHOWN_RUNS] if is_live(run)})
+            await asyncio.sleep(LOOK_S)
+
+    def _run_of(self, viewer: Viewer) -> Path | None:
+        """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
+        chosen = next((folder for folder in self._runs if folder.name == viewer.run), None)
+        return chosen or self._fixed or (self._runs[0] if self._runs else None)
+
+    def _feed(self, folder: Path) -> Feed:
+        if folder not in self._feeds:
+            feed = Feed(folder)
+            self._feeds[folder] = (feed, asyncio.create_task(feed.follow()))
+        return self._feeds[folder][0]
+
+    # --- viewers -------------------------------------------------------------------------------------------------------
+
+    async def _serve_viewer(self, connection: ServerConnection) -> None:
+        with contextlib.suppress(ConnectionClosed, TimeoutError, ValueError):
+            hello = _object(await asyncio.wait_for(connection.recv(), HELLO_S))
+            viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "somebody")[:40])
+            viewer.run = str(hello.get("run") or "")
+            self._viewers.add(viewer)
+            self._commander = self._commander or viewer.key
+            sending = asyncio.create_task(self._send(viewer, hello))
+            try:
+                async for message in connection:
+                    await self._obey(viewer, _object(message))
+            finally:
+                sending.cancel()
+                self._viewers.discard(viewer)
+
+    async def _send(self, viewer: Viewer, hello: Mapping[str, Any]) -> None:
+        """Send what the viewer lacks, and how things are, until it is gone."""
+        place, due = place_of(hello), 0.0
+        clock = asyncio.get_running_loop().time
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                run = self._run_of(viewer)
+                feed = None if run is None else self._feed(run)
+                changed = asyncio.Event() if feed is None else feed.changed
+                text = None if feed is None else feed.message(place)
+                try:
+                    if text is not None:
+                        await asyncio.wait_for(viewer.connection.send(text), STUCK_S)
+                    if clock() >= due:
+                        due = clock() + STATUS_S
+                        await asyncio.wait_for(viewer.connection.send(json.dumps({"status": self._status(viewer, run, feed)})), STUCK_S)
+                except TimeoutError:
+                    viewer.connection.transport.abort()
+                    return
+                if text is None:
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(changed.wait(), max(0.0, due - clock()))
+
+    def _status(self, viewer: Viewer, run: Path | None, feed: Feed | None) -> dict[str, Any]:
+        commander = next((other.name for other in self._viewers if other.key == self._commander), "")
+        return {
+            "run": "" if run is None else run.name,
+            "live": run in self._live,
+            "report": run is not None and (run / REPORT).is_file(),
+            "runs": [folder.name for folder in self._runs[:SHOWN_RUNS]],
+            "scenarios": self._scenarios,
+            "commands": viewer.key == self._commander,
+            "commander": commander,
+            "viewers": len(self._viewers),
+            "problems": [] if feed is None else feed.problems,
+        }
+
+    # --- commands ------------------------------------------------------------------------------------------------------
+
+    async def _obey(self, viewer: Viewer, asked: Mapping[str, Any]) -> None:
+        clock = asyncio.get_running_loop().time()
+        viewer.commands = [stamp for stamp in viewer.commands if clock - stamp < 1.0] + [clock]
+        if len(viewer.commands) > MAX_COMMANDS_PER_S:
+            await viewer.connection.close(1008, "too many commands")
+            return
+        if "watch" in asked:
+            viewer.run = str(asked["watch"])[:200]
+            return
+        command = str(asked.get("command"))
+        try:
+            answer = await self._do(viewer, command, asked)
+        except (acts.ActError, NoRunError, OSError, KeyError) as error:
+            answer = f"refused: {error}"
+        await viewer.connection.send(json.dumps({"answer": answer, "command": command}))
+
+    async def _do(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> str:
+        run = self._run_of(viewer)
+        if command == "take":
+            self._commander = viewer.key
+            self._note(run, viewer, command, "commands now")
+            return "you command now"
+        if viewer.key != self._commander:
+            raise acts.ActError("you watch; take over first")
+        if command not in self._acts:
+            raise acts.ActError(f"there is no command {command}")
+        async with self._busy:
+            done_to, answer = await asyncio.to_thread(self._acts[command], asked, run)
+        if command == "start":
+            viewer.run = "" if done_to is None else done_to.name
+        self._note(done_to, viewer, command, answer)
+        return answer
+
+    def _start(self, asked: Mapping[str, Any], _run: Path | None) -> tuple[Path | None, str]:
+        folder = acts.start(acts.read_flight(asked))
+        return folder, f"{folder.name} is started"
+
+    def _abort(self, asked: Mapping[str, Any], run: Path | None) -> tuple[Path | None, str]:
+        folder = _confirmed(asked, run)
+        return folder, acts.abort(folder)
+
+    def _off(self, asked: Mapping[str, Any], run: Path | None) -> tuple[Path | None, str]:
+        folder = _confirmed(asked, run)
+        return folder, acts.everything_off(folder)
+
+    def _note(self, run: Path | None, viewer: Viewer, command: str, answer: str) -> None:
+        if run is None or not run.is_dir():
+            return
+        stamp_s = self._feed(run).last_s
+        with contextlib.suppress(OSError):  # a disk that is full ends the record, not the command
+            journal.note(run, stamp_s, {"command": command, "by": viewer.name, "answer": answer})
+
+
+def _confirmed(asked: Mapping[str, Any], run: Path | None) -> Path:
+    """Return the run that a command means; raise ActError unless the request names the very run that is shown."""
+    if run is None or asked.get("run") != run.name:
+        raise acts.ActError("the run that is shown is another one by now; look again")
+    if not is_live(run):
+        raise acts.ActError("this run is over")
+    return run
+
+
+def is_live(folder: Path) -> bool:
+    """Tell whether a run is under way."""
+    try:
+        return load_run(folder).live and not (folder / "summary.json").exists()
+    except NoRunError:
+        return False
+
+
+def runs_in(folder: Path, fixed: Path | None) -> list[Path]:
+    """Return the folders of runs, the newest first; ``fixed`` is one, wherever it lies."""
+    found = {path.parent for path in folder.glob("*/run.json")} | ({fixed} if fixed is not None else set())
+    stamped = []
+    for path in found:
+        with contextlib.suppress(OSError):
+            stamped.append((path.stat().st_ctime, path))
+    return [path for _, path in sorted(stamped, reverse=True)]
+
+
+def _object(message: str | bytes) -> dict[str, Any]:
+    """Return a message's object; raise ValueError when it holds none."""
+    value = json.loads(message)
+    if not isinstance(value, dict):
+        raise ValueError("a message is a JSON object")  # noqa: TRY004 - as for what is no JSON at all
+    return value

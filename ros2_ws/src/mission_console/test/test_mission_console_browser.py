@@ -1,0 +1,287 @@
+"""The page in a real browser (Debian's chromium, driven by Selenium), live and as a report; skipped where there is none."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import HOSTILE, LIFT_OFF_S, Story, failing_story, tree, write_record
+
+from alula_common.network import free_port
+from alula_common.record import EVENTS, MISSION, TREE
+from mission_console.admission import Admission
+from mission_console.page import REPORT, write_report
+from mission_console.server import Console
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason="no browser: apt install chromium chromium-driver")
+
+SIZES = [(1280, 800), (390, 844)]
+WAIT_S = 60.0
+SUMMARY = {
+    "outcome": "degraded", "reason": "the ZED broke", "landed": True, "duration_s": 60.0, "distance_m": 60.0, "collisions": 0,
+    "recovery": {"failure_s": 29.9, "detected_s": 30.0, "fallback_running_s": 30.5, "moving_again_s": 34.0},
+    "lift_off": {"stamp_s": LIFT_OFF_S, "source": "simulator"}, "problems": [],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage"):
+        options.add_argument(word)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+    driver.set_script_timeout(WAIT_S)
+    yield driver
+    driver.quit()
+
+
+class Page:
+    """A page that is open."""
+
+    def __init__(self, browser: Any, address: str, size: tuple[int, int] = SIZES[0], theme: str = "light") -> None:
+        self.browser = browser
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": size[0] < 500}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]})
+        browser.get_log("browser")
+        browser.get(address)
+
+    def run(self, script: str) -> Any:
+        return self.browser.execute_script(f"return {script}")
+
+    def wait(self, condition: str) -> None:
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        WebDriverWait(self.browser, WAIT_S, 0.05).until(lambda _: self.run(condition), f"never: {condition}; {self.text('#headline')}")
+
+    def text(self, selector: str) -> str:
+        return str(self.run(f"[...document.querySelectorAll({json.dumps(selector)})].map((one) => one.textContent).join(' | ')"))
+
+    def choose(self, since_lift_off_s: float) -> None:
+        self.run(f"alula.choose({LIFT_OFF_S + since_lift_off_s})")
+        self.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def status(self, node: str) -> str:
+        return str(
+            self.run(f"[...document.querySelectorAll('.row')].find((row) => row.textContent.includes({json.dumps(node)})).dataset.status")
+        )
+
+    def complaints(self) -> list[str]:
+        return [str(entry["message"]) for entry in self.browser.get_log("browser") if "favicon" not in entry["message"]]
+
+
+def make_report(folder: Path, story: Story | None = None) -> str:
+    write_record(folder, failing_story() if story is None else story)
+    (folder / "summary.json").write_text(json.dumps(SUMMARY), encoding="utf-8")
+    (folder / "run.json").write_text(
+        json.dumps({"scenario": "mapping", "seed": 1, "faults": ["zed@30"], "world": "yard.yaml"}), encoding="utf-8"
+    )
+    fault = ("/fault", LIFT_OFF_S + 29.9, {"sensor": "zed", "mode": "dead"})
+    health = ("/health", LIFT_OFF_S + 30.0, {"sensor": "zed", "ok": False, "fault": "silent", "reason": "no image for 0.4 s"})
+    write_report(folder, [fault, health], title="mapping")
+    return f"file://{folder / REPORT}"
+
+
+def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser: Any, tmp_path: Path) -> None:
+    page = Page(browser, make_report(tmp_path))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    assert page.text("#headline") == "Mission accomplished in degraded mode"
+    assert "The zed was made to fail (dead)." in page.text("#lines")
+    steps = page.text(".chain li").split(" | ")
+    assert [step.partition("2")[0] for step in steps[:1]] == ["failure"]
+    chain = page.text(".chain b").split(" | ")
+    assert chain == ["failure", "measurement", "resource", "invariant", "skill", "branch", "decision", "started"]
+    assert "zed is silent: no image for 0.4 s" in steps[1]
+    assert "perception.zed_status: OK → BROKEN, reported by the functional layer" in steps[2]
+    assert "“ZED navigation” failed" in steps[5]
+    assert "“navigate” went on with “LiDAR navigation”" in steps[6]
+    assert "0.10 s from the failure to its detection | 0.60 s from the failure until the fallback watched" in page.text("#costs li")
+    assert page.complaints() == []
+
+
+def test_the_slider_moves_tree_timeline_map_and_figures_together(browser: Any, tmp_path: Path) -> None:
+    page = Page(browser, make_report(tmp_path))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    page.choose(10.0)
+    assert (page.status("watch with the ZED"), page.status("watch with the LiDAR")) == ("RUNNING", "INVALID")
+    assert "east 10.0 m" in page.text("#map-words")
+    assert page.text("#now") == "10.0 s"
+    early = page.run("Number(document.querySelector('#timeline .cursor').getAttribute('x1'))")
+    assert "50 m" in page.text("#charts figcaption")
+    page.choose(40.0)
+    assert (page.status("watch with the ZED"), page.status("watch with the LiDAR")) == ("FAILURE", "RUNNING")
+    assert "east 40.0 m" in page.text("#map-words")
+    assert page.run("Number(document.querySelector('#timeline .cursor').getAttribute('x1'))") > early
+    assert "20 m" in page.text("#charts figcaption")
+
+
+def test_keys_go_from_event_to_event(browser: Any, tmp_path: Path) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    page = Page(browser, make_report(tmp_path))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    page.choose(29.0)
+    body = browser.find_element("tag name", "body")
+    body.send_keys("n")
+    assert page.run("alula.moment()") == pytest.approx(LIFT_OFF_S + 29.9)
+    body.send_keys("n")
+    assert page.run("alula.moment()") == pytest.approx(LIFT_OFF_S + 30.0)
+    body.send_keys("p")
+    assert page.run("alula.moment()") == pytest.approx(LIFT_OFF_S + 29.9)
+    body.send_keys(Keys.HOME)
+    assert page.run("alula.moment()") == pytest.approx(LIFT_OFF_S - 3.0)
+    body.send_keys(Keys.END)
+    page.wait("document.querySelector('#latest').getAttribute('aria-pressed') === 'true'")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES)
+def test_the_page_fits_the_screen_and_names_its_controls(browser: Any, tmp_path: Path, size: tuple[int, int], theme: str) -> None:
+    page = Page(browser, make_report(tmp_path), size, theme)
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    assert page.run("document.documentElement.scrollWidth") <= size[0]
+    assert page.run("document.documentElement.dataset.theme") == theme
+    unnamed = (
+        "[...document.querySelectorAll('button, input, select, canvas, [role=img]')].filter((one) => !one.closest('[hidden]') &&"
+        "!(one.textContent.trim() || one.getAttribute('aria-label') || one.closest('label'))).map((one) => one.outerHTML)"
+    )
+    assert page.run(unnamed) == []
+    assert page.complaints() == []
+
+
+def test_markup_in_a_run_is_shown_and_never_run(browser: Any, tmp_path: Path) -> None:
+    story = failing_story(name=HOSTILE)
+    hostile = {"skillset": HOSTILE, "sequence": 9, "kind": "EXECUTION", "skill": HOSTILE, "id": HOSTILE}
+    ended = {**hostile, "state": "FAILED", "result": HOSTILE, "message": HOSTILE, "inputs": {HOSTILE: HOSTILE}, "outputs": {}}
+    page = Page(browser, make_report(tmp_path, [*story, (LIFT_OFF_S + 62, EVENTS, ended)]))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    assert HOSTILE in page.text(".row .box")
+    assert HOSTILE in page.text("#lines")
+    assert page.run("document.querySelectorAll('main img, main script').length") == 0
+    assert page.run("document.title") == "mapping"
+    assert page.complaints() == []
+
+
+def test_entries_that_make_no_sense_do_not_stop_the_page(browser: Any, tmp_path: Path) -> None:
+    odd: Story = [
+        (LIFT_OFF_S + 50, topic, {"kind": None, "stamp_s": 1}) for topic in (EVENTS, MISSION, "/decisions", "/data", "/unheard/of")
+    ]
+    page = Page(browser, make_report(tmp_path, [*failing_story(), *odd]))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    page.choose(20.0)
+    assert page.status("watch with the ZED") == "RUNNING"
+    assert page.complaints() == []
+
+
+# --- live ------------------------------------------------------------------------------------------------------------------
+
+
+class Served:
+    """A console in a thread of its own, which can be stopped and started."""
+
+    def __init__(self, fixed: Path) -> None:
+        self._fixed, self.port = fixed, free_port()
+        self._stop: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        up = threading.Event()
+
+        async def main() -> None:
+            over = asyncio.Event()
+            loop = asyncio.get_running_loop()
+            self._stop = lambda: loop.call_soon_threadsafe(over.set)
+            async with Console(Admission("127.0.0.1", self.port, ""), fixed=self._fixed).open():
+                up.set()
+                await over.wait()
+
+        self._thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
+        self._thread.start()
+        assert up.wait(WAIT_S)
+
+    def stop(self) -> None:
+        self._stop()
+        self._thread.join(WAIT_S)
+
+
+@contextlib.contextmanager
+def served(fixed: Path) -> Iterator[Served]:
+    console = Served(fixed)
+    console.start()
+    try:
+        yield console
+    finally:
+        console.stop()
+
+
+def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(browser: Any, make_run: Callable[..., Path]) -> None:
+    story = failing_story()
+    early = [entry for entry in story if entry[0] < LIFT_OFF_S + 20]
+    folder = make_run("live", story=[])
+    writer = write_record(folder, early, over=False)
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/")
+        page.wait("document.querySelector('.row') !== null && alula.run.end > 31")
+        assert page.status("watch with the ZED") == "RUNNING"
+        assert page.text("#headline") == "The mission is under way"
+        for t_s, topic, value in story:
+            if t_s >= LIFT_OFF_S + 20 and topic in {EVENTS, TREE}:
+                writer.write(topic, round(t_s * 1e9), value)
+        page.wait("document.querySelector('.chain') !== null")
+        assert page.status("watch with the ZED") == "FAILURE"
+        console.stop()
+        page.wait("document.querySelector('#link').dataset.state === 'stale'")
+        assert "disconnected" in page.text("#link")
+        assert page.run("document.querySelector('#operator .danger:not(:disabled)') === null")
+        writer.write(MISSION, round((LIFT_OFF_S + 61) * 1e9), story[-1][2])
+        console.start()
+        page.wait("document.querySelector('#link').dataset.state !== 'stale'")
+        page.wait("document.querySelector('#headline').textContent === 'Mission accomplished in degraded mode'")
+    writer.close()
+    assert [line for line in page.complaints() if "WebSocket connection" not in line and "ERR_" not in line] == []
+
+
+def test_an_act_needs_two_presses_and_everything_off_a_word(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, done = make_run("live"), []
+    monkeypatch.setattr("mission_console.server.is_live", lambda _run: True)
+    for act in ("abort", "everything_off"):
+        monkeypatch.setattr(f"mission_console.acts.{act}", lambda run, act=act: done.append((act, run.name)) or f"{act} is done")
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/")
+        abort, off = (f"[...document.querySelectorAll('#operator .danger')][{index}]" for index in (1, 2))
+        page.wait(f"{abort} !== undefined && !{abort}.disabled")
+        page.run(f"{abort}.click()")
+        assert page.run(f"{abort}.textContent") == "press again: stop and land"
+        assert done == []
+        page.run(f"{abort}.click()")
+        page.wait("document.querySelector('#operator output').textContent.includes('abort is done')")
+        assert page.run(f"{off}.disabled") is True
+        page.browser.find_element("css selector", "#operator input[placeholder='type OFF']").send_keys("off")
+        page.run(f"{off}.click(), {off}.click()")
+        page.wait("document.querySelector('#operator output').textContent.includes('everything_off is done')")
+        page.wait("document.querySelector('#lines').textContent.includes('The operator: off')")
+        assert page.complaints() == []
+    assert done == [("abort", "live"), ("everything_off", "live")]
+
+
+def test_a_tree_of_another_shape_replaces_the_first(browser: Any, tmp_path: Path) -> None:
+    aborted: Story = [(LIFT_OFF_S + 61, TREE, tree("FAILURE", "INTERRUPTED", name="aborted mission"))]
+    page = Page(browser, make_report(tmp_path, [*failing_story(), *aborted]))
+    page.wait("alula.run.count > 0 && document.querySelector('.row') !== null")
+    assert "aborted mission" in page.text(".row .box")
+    page.choose(20.0)
+    assert "navigate" in page.text(".row .box")
