@@ -52,7 +52,8 @@ class Monitor:
     """
 
     def __init__(self, skillsets: Iterable[Skillset]) -> None:
-        self._monitors = {skillset.name: SkillsetMonitor(skillset) for skillset in skillsets}
+        self.skillsets = tuple(skillsets)
+        self._monitors = {skillset.name: SkillsetMonitor(skillset) for skillset in self.skillsets}
 
     def take(self, event: EngineEvent, life: str = "") -> Finding | None:
         """Take the next event; return what does not conform, once a skillset.

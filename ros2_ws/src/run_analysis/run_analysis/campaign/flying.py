@@ -1,0 +1,102 @@
+"""Flies the flights of a campaign, in whatever process, and makes a row of each. A row says nothing of the machine or the time of day."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from run_analysis.campaign.failures import Way, as_dict, failures_in, ways_to_fail
+from run_analysis.campaign.plan import SIMULATOR, Flight
+from run_analysis.conformance import Monitor
+from run_analysis.errors import AnalysisError
+from run_analysis.mock_flights import MockFlights, load_flights
+from run_analysis.models import models_of
+from run_analysis.run import Run, load_run, origin_of
+from skill_runtime.core.events import EngineEvent, TransitionEvent
+
+Row = dict[str, Any]
+
+
+def fly(flights: Sequence[Flight], over: str, behaviour: tuple[str, ...], out: str) -> list[Row]:
+    """Fly one after another; return a row of each. ``out`` is the campaign's folder: flights in the simulator leave theirs there."""
+    if over == SIMULATOR:
+        return [_simulated(flight, Path(out)) for flight in flights]
+    return [_mocked(flight, behaviour) for flight in flights]
+
+
+@functools.cache
+def _scenario(name: str, behaviour: tuple[str, ...]) -> tuple[MockFlights, list[Way]]:
+    flights = load_flights(name, tuple(map(Path, behaviour)))
+    return flights, ways_to_fail(flights.skillsets)
+
+
+def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
+    scenario, ways = _scenario(flight.scenario, behaviour)
+    flown = scenario.fly(flight.requests, flight.seed)
+    monitor = Monitor(scenario.skillsets)
+    landed = _landed(flown.events)
+    found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
+    found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": []}
+    return _row(flight, found, flown.events, monitor, ways)
+
+
+def _landed(events: Sequence[EngineEvent]) -> bool | None:
+    """Tell whether the vehicle came down; None where it never took off, or was taken away from the mission in the air."""
+    changes = [event for event in events if isinstance(event, TransitionEvent)]
+    last = {event.resource: event.to_state for event in changes}
+    if "flight_status" not in last:
+        return None
+    down = last["flight_status"] == "ON_GROUND"
+    return down or (None if last.get("SDK_authority") == "UNAVAILABLE" else False)
+
+
+def _row(flight: Flight, found: Mapping[str, Any], events: Sequence[EngineEvent], monitor: Monitor, ways: Sequence[Way]) -> Row:
+    """Return a row; ``found`` is how the flight went besides its events."""
+    for event in events:
+        monitor.take(event)
+    failures = failures_in(events, ways)
+    return {
+        "flight": flight.number,
+        "scenario": flight.scenario,
+        "seed": flight.seed,
+        "faults": list(flight.faults),
+        **found,
+        "duration_s": round(events[-1].stamp_s - events[0].stamp_s, 6) if events else 0.0,
+        "events": len(events),
+        "conforms": monitor.verdict.conforms,
+        "failures": [as_dict(failure, origin_of(events)) for failure in failures],
+    }
+
+
+# --- in the simulator ---------------------------------------------------------------------------------------------------
+
+
+def _simulated(flight: Flight, out: Path) -> Row:
+    """Fly as a user does; the flight's folder stays."""
+    folder = out / f"flight-{flight.number:05d}"
+    for number in range(2, 1000):  # one that a crash has left half done stays as it is
+        if not folder.exists():
+            break
+        folder = out / f"flight-{flight.number:05d}-{number}"
+    words = [str(Path(os.environ["ALULA_ROOT"]) / "alula"), "fly", flight.scenario, "--seed", str(flight.seed), "--rate", "0"]
+    for fault in flight.faults:
+        words += ["--fail", fault]
+    done = subprocess.run([*words, "--out", str(folder)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        run = load_run(folder)
+    except (OSError, ValueError, AnalysisError):
+        said = (done.stderr.strip() or done.stdout.strip()).splitlines()
+        summary, run = {"outcome": "not_started", "reason": said[-1] if said else ""}, Run(folder, ())
+    names = dict.fromkeys(event.skillset for event in run.events)
+    ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
+    found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
+    found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
+    found |= {"problems": summary.get("problems") or [], "died": [one["name"] for one in summary.get("died") or ()]}
+    models = models_of(names)
+    return _row(flight, found, run.events, Monitor(models), ways_to_fail(models))

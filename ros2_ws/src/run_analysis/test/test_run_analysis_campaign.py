@@ -1,0 +1,193 @@
+"""Campaigns: the same file gives the same flights, a table survives a kill, and the coverage counts what the rows say."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import asdict
+
+import pytest
+
+from run_analysis.campaign.__main__ import main
+from run_analysis.campaign.coverage import cover, is_troubled, processes
+from run_analysis.campaign.failures import ARROW, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
+from run_analysis.campaign.flying import fly
+from run_analysis.campaign.plan import MOCKS, Flight, load_campaign
+from run_analysis.campaign.table import ROWS, Table
+from run_analysis.campaign.telling import as_page, as_text
+from run_analysis.errors import AnalysisError
+from run_analysis.mock_flights import load_flights
+from uav_missions.mock_flight import drone
+
+DRAWN = """
+scenarios: [mapping, inspection]
+flights: 12
+seed: 3
+draw:
+  faults: {mapping: [zed, lidar], inspection: [radio, "zed:dark"]}
+  most: 2
+  at_s: [0, 60]
+  lasts_s: [5, 9]
+"""
+KILLED_AFTER_S = 120.0
+
+
+def campaign_file(path, text):
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_drawn_flights_are_those_of_the_file_and_more_of_them_change_none(tmp_path):
+    drawn = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN)).flights
+    longer = load_campaign(campaign_file(tmp_path / "b.yaml", DRAWN.replace("12", "50"))).flights
+    other = load_campaign(campaign_file(tmp_path / "c.yaml", DRAWN.replace("seed: 3", "seed: 4"))).flights
+    assert drawn == longer[:12]
+    assert drawn != other
+    assert Counter(flight.scenario for flight in longer) == {"mapping": 25, "inspection": 25}
+    assert {len(flight.faults) for flight in longer} == {0, 1, 2}
+    assert {fault.what for flight in longer for fault in flight.requests} == {"zed", "lidar", "radio"}
+    assert all(0 <= fault.begin_s <= 60 for flight in longer for fault in flight.requests)
+    lasting = [fault.end_s - fault.begin_s for flight in longer for fault in flight.requests if fault.end_s is not None]
+    assert lasting
+    assert all(4.8 <= seconds <= 9.2 for seconds in lasting)
+
+
+def test_listed_flights_are_every_combination(tmp_path):
+    text = "scenarios: [mapping]\nseeds: [1, 2]\nfaults: [[], [zed@30], [zed@30, lidar@40-50]]\n"
+    flights = load_campaign(campaign_file(tmp_path / "a.yaml", text)).flights
+    assert [(one.seed, one.faults) for one in flights] == [
+        (seed, faults) for seed in (1, 2) for faults in ((), ("zed@30",), ("zed@30", "lidar@40-50"))
+    ]
+
+
+WRONG = {
+    "": "is empty; a campaign may have about, over",
+    "flight: 3": "a.yaml:1: a campaign has no `flight`",
+    "scenarios: [maping]": "a.yaml:1: there is no `maping`; there are inspection, mapping (did you mean `mapping`?)",
+    "over: hills": "a.yaml:1: there is no `hills`; there are mocks, simulator",
+    "flights: 3\nfaults: [zed]": "a.yaml:2: `faults` lists flights, `flights` draws them; write one of both",
+    "flights: 3": "a.yaml:1: a campaign that draws needs `draw`",
+    "flights: 1.5\ndraw: {faults: [zed]}": "a.yaml:1: `flights` should be a whole number",
+    "flights: 2\ndraw: {faults: [zed@3]}": "a.yaml:2: `zed@3` has a time",
+    "flights: 2\ndraw: {faults: [zed], at_s: [9, 3]}": "a.yaml:2: `at_s` should be [from, to]",
+    "flights: 2\nscenarios: [mapping, inspection]\ndraw: {faults: {mapping: zed}}": "a.yaml:3: `faults` says nothing of inspection",
+    "faults: [[zed@3-1]]": "a.yaml:1: fault 'zed@3-1'",
+    "behaviour: no.yaml": "a.yaml:1: there is no file ",
+    "over: simulator\nbehaviour: no.yaml": "a.yaml:2: `behaviour` says what mocks do",
+    "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has zed",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_a_wrong_campaign_is_refused_before_it_begins(text, tmp_path, capsys):
+    path = campaign_file(tmp_path / "a.yaml", text + "\n")
+    assert main([str(path), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("alula campaign: ")
+    assert WRONG[text] in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_ways_to_fail_are_those_of_the_models():
+    names = {(way.kind, way.name) for way in ways_to_fail(drone(), ["mission"])}
+    assert (RESULT, "navigation.goto BLOCKED") in names
+    assert (RESULT, "navigation.goto ARRIVED") not in names
+    assert (INVARIANT, "perception.zed_depthmap zed_ok") in names
+    assert (ARROW, "perception.zed_status OK -> BROKEN") in names
+    assert (ARROW, "perception.zed_status BROKEN -> OK") not in names
+    assert (PROCESS, "mission") in names
+    assert {"mission", "navigation", "ros_bridge", "uav_guidance"} <= set(processes())
+
+
+def test_a_failure_is_answered_by_what_the_mission_starts_next_and_one_that_nothing_hangs_on_by_nothing():
+    flights = load_flights("mapping")
+    known = ways_to_fail(flights.skillsets)
+    arrow, broken = failures_in(flights.fly(Flight(0, "mapping", 0, ("zed@30",)).requests).events, known)
+    assert (arrow.way, arrow.answered_by) == (Way(ARROW, "perception.zed_status OK -> BROKEN"), "perception.lidar_depthmap")
+    assert (broken.way, broken.answered_by) == (Way(INVARIANT, "perception.zed_depthmap zed_ok"), "perception.lidar_depthmap")
+    assert 0.0 < broken.after_s < 0.2
+    (unused,) = failures_in(flights.fly(Flight(0, "mapping", 0, ("lidar@30",)).requests).events, known)
+    assert (unused.way.name, unused.answered_by, unused.after_s) == ("perception.lidar_status OK -> BROKEN", "not in use", None)
+    assert isinstance(unused, Failure)
+
+
+def row(number=0, **other):
+    known = {"flight": number, "outcome": "degraded", "landed": True, "open": [], "problems": [], "collisions": 0, "conforms": True}
+    return {**known, "min_clearance_m": 1.0, "died": [], "failures": [], **other}
+
+
+def test_the_coverage_counts_answers_and_keeps_the_worst():
+    way, never = Way(INVARIANT, "a.b c"), Way(RESULT, "a.b BAD")
+    failure = {"kind": way.kind, "name": way.name, "at_s": 3.0, "answered_by": "a.hover", "after_s": 0.5}
+    rows = [
+        row(0, failures=[failure]),
+        row(1, failures=[{**failure, "after_s": 0.7}, {**failure, "answered_by": "a.land", "after_s": 0.1}], min_clearance_m=0.4),
+        row(2, died=["mission"], outcome="given_up", conforms=False),
+    ]
+    coverage = cover(rows, [way, never])
+    told = coverage.as_dict()
+    assert told["tried"][0] == {
+        "kind": INVARIANT,
+        "name": "a.b c",
+        "times": 3,
+        "answers": {"a.hover": 2, "a.land": 1},
+        "outcomes": {"degraded": 3},
+        "worst_recovery_s": 0.7,
+        "worst_clearance_m": 0.4,
+    }
+    assert (told["tried"][1]["name"], told["never"], told["troubled"]) == ("mission", [vars(never)], [2])
+    assert told["outcomes"] == {"degraded": 2, "given_up": 1}
+    text, page = as_text(coverage), as_page(coverage, "a < b")
+    assert "never tried (1):\n  result: a.b BAD" in text
+    assert "2 a.hover, 1 a.land" in text
+    assert "<title>a &lt; b</title>" in page
+    assert page.count("<tr>") == 3
+
+
+@pytest.mark.parametrize("other", [{"conforms": False}, {"open": ["x"]}, {"collisions": 1}, {"landed": False}, {"problems": ["x"]}])
+def test_what_must_not_be_is_trouble(other):
+    assert not is_troubled(row())
+    assert is_troubled(row(**other))
+
+
+def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(tmp_path):
+    campaign = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN))
+    table = Table(tmp_path / "out", campaign)
+    table.add([row(3), row(1)])
+    table.finish()
+    path = tmp_path / "out" / ROWS
+    assert [json.loads(line)["flight"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 3]
+    path.write_bytes(path.read_bytes()[:-5])
+    again = Table(tmp_path / "out", campaign)
+    assert set(again.rows) == {1}
+    again.add([row(3)])
+    again.finish()
+    assert len(path.read_text(encoding="utf-8").splitlines()) == 2
+    with pytest.raises(AnalysisError, match="holds another campaign"):
+        Table(tmp_path / "out", load_campaign(campaign_file(tmp_path / "b.yaml", DRAWN.replace("12", "13"))))
+    with pytest.raises(AnalysisError, match="is not empty and holds no campaign"):
+        Table(tmp_path, campaign)
+
+
+def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp_path):
+    path, out = campaign_file(tmp_path / "a.yaml", DRAWN.replace("flights: 12", "flights: 14")), tmp_path / "out"
+    words = [sys.executable, "-m", "run_analysis.campaign", str(path), "--out", str(out)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=dict(os.environ)) as killed:
+        end = time.monotonic() + KILLED_AFTER_S
+        while not ((out / ROWS).is_file() and (out / ROWS).read_bytes().count(b"\n")):
+            assert time.monotonic() < end, "no flight was flown"
+            time.sleep(0.02)
+        killed.kill()
+    assert subprocess.run(words, capture_output=True, timeout=300, check=False).returncode in {0, 1}
+    flights = load_campaign(path).flights
+    there = [json.loads(line) for line in (out / ROWS).read_text(encoding="utf-8").splitlines()]
+    assert [one["flight"] for one in there] == list(range(14))
+    assert there[:3] == json.loads(json.dumps(fly(flights[:3], MOCKS, (), "")))
+    assert [asdict(flight)["seed"] for flight in flights] == [one["seed"] for one in there]
+    for name in ("coverage.json", "coverage.txt", "coverage.html"):
+        assert (out / name).is_file()
+    assert all(one["conforms"] for one in there)
