@@ -14,7 +14,11 @@ from alula_common.record import DECISIONS, FILE, MISSION, RecordWriter, read_rec
 from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
 from mission_replay.comparison import alike
 from run_analysis import expect
-from uav_missions import mock_flight
+from skill_missions.director import Outcome
+from skill_missions.mocked import MockedMission
+from skill_runtime.mock import load_behaviour
+from uav_missions import mapping, mock_flight
+from uav_missions.route import load_route
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 WORLDS = {"mapping": "yard", "inspection": "building"}
@@ -73,6 +77,19 @@ def test_a_replay_is_a_record_that_replays(zed_dead, tmp_path):
     assert main([str(tmp_path / "again")]) == SAME
 
 
+def test_an_abort_is_decided_as_it_was(tmp_path):
+    route = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml")
+    skillsets = mock_flight.drone(("navigation", "perception", "mapping"))
+    behaviour = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone())
+    (tmp_path / "run").mkdir()
+    mission = MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(route), out=tmp_path / "run")
+    mission.world.clock.after(15.0, lambda: mission.abort("told to end"))
+    assert mission.run().outcome is Outcome.ABORTED
+    assert main([str(tmp_path / "run"), "--out", str(tmp_path / "again")]) == SAME
+    assert requests(tmp_path / "again") == requests(tmp_path / "run")
+    assert ending(tmp_path / "again") == ("aborted", "told to end")
+
+
 def test_ten_replays_are_one(zed_dead, capsys):
     traces = set()
     for rate in (0.0, 1e6) * 5:
@@ -124,8 +141,6 @@ plan = mapping.plan
 
 
 def test_a_tree_with_its_branches_in_the_wrong_order_is_told(nominal, tmp_path, capsys, monkeypatch):
-    from uav_missions import mapping
-
     monkeypatch.setattr(mapping, "MappingMission", mapping.MappingMission)  # put back afterwards
     (tmp_path / "tree.py").write_text(WRONG_ORDER)
     assert main([str(nominal), "--tree", str(tmp_path / "tree.py")]) == OTHERWISE

@@ -118,10 +118,10 @@ class MockedMission:
 
     def _tick(self) -> None:
         self._due = False
-        if self._record is not None:
-            self._record.tick(self.director)
         if self._abort_reasons:
             self._abort_now(self._abort_reasons.pop())
+        if self._record is not None:
+            self._record.tick(self.director)
         try:
             self.director.step()
         except Exception as error:  # noqa: BLE001 - as over ROS 2: whatever breaks in a tree, the robot has to come to rest
