@@ -28,6 +28,7 @@ from alula_common.processes import RUN_ID_VARIABLE, end_run, node_name, processe
 from alula_common.scenarios import scenario_names
 from alula_common.shared_memory import sweep_shared_memory
 from alula_common.signals import Interrupts
+from alula_flight.beside import page_beside
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
@@ -58,6 +59,7 @@ class Arguments(argparse.Namespace):
     sensors: str | None
     imperfections: str
     mock: bool
+    console: bool
     record: str
     behaviour: list[Path]
 
@@ -83,6 +85,7 @@ def parse(arguments: list[str]) -> RunSpec:
         metavar="off|realistic|NAME=VALUE,...",
         help="of the simulated autopilot and sensors (default off)",
     )
+    parser.add_argument("--console", action="store_true", help="serve the operator's page beside the flight")
     parser.add_argument("--mock", action="store_true", help="fly over mocks in virtual time: no simulator, no ROS graph, seconds")
     parser.add_argument(
         "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what the mocks do, on top of the drone's own"
@@ -113,6 +116,7 @@ def parse(arguments: list[str]) -> RunSpec:
         mavlink_port=0 if given.mock else free_port(),
         domain=0,
         mock=given.mock,
+        console=given.console,
         record=given.record,
         behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
     )
@@ -138,6 +142,8 @@ def check_mock(given: Arguments) -> None:
         raise RequestError("--mock flies without a vehicle; leave out --autopilot")
     if given.mock and given.record == "sensors":
         raise RequestError("--record sensors: mocks measure nothing; leave it out with --mock")
+    if given.mock and given.console:
+        raise RequestError("--console: a flight over mocks is over in a moment; look at its report.html")
     if given.mock and given.rate is not None:
         raise RequestError("--mock flies in virtual time, which no --rate limits; leave it out")
 
@@ -281,9 +287,10 @@ def main(arguments: list[str]) -> int:
     say = announce(spec)
     if spec.record == "sensors":
         say(sensors_words(out))
-    code = Front(spec, claim, say).fly(spec_path)
-    say("making the report")
-    return finish(spec, code)
+    with page_beside(out, say) if spec.console else contextlib.nullcontext():
+        code = Front(spec, claim, say).fly(spec_path)
+        say("making the report")
+        return finish(spec, code)
 
 
 def sensors_words(out: Path) -> str:

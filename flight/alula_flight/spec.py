@@ -65,6 +65,7 @@ class RunSpec:
     most, 0 unlimited. ``sensors``: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors, "" where
     real drivers run elsewhere. ``imperfections`` of the simulated autopilot and sensors.
     ``record``: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
+    ``console``: whether the operator's page is served beside the flight.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
     """
 
@@ -84,6 +85,7 @@ class RunSpec:
     mock: bool = False
     record: str = "functional"
     behaviour: tuple[str, ...] = ()
+    console: bool = False
 
     @property
     def simulated(self) -> bool:

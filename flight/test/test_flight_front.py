@@ -5,16 +5,19 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 import uuid
 from pathlib import Path
 
+import psutil
 import pytest
 
 from alula_common.network import NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula_common.record import EVENTS, RecordWriter
 from alula_common.record import FILE as RECORD
+from alula_flight.beside import page_beside
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.fly import CANNOT_START, main, parse
 from alula_flight.live import LiveEvents, event_line
@@ -131,6 +134,7 @@ def test_mocks_need_no_ports_and_know_their_own_faults(tmp_path):
         (["--behaviour", "x.yaml"], "add --mock"),
         (["--mock", "--autopilot", "tcp:127.0.0.1:5760"], "leave out --autopilot"),
         (["--mock", "--rate", "2"], "no --rate limits"),
+        (["--mock", "--console"], "look at its report.html"),
         (["--mock", "--fail", "zed@x"], "write WHAT"),
     ],
 )
@@ -256,3 +260,25 @@ def test_event_line_tells_transitions_and_hides_requests():
 def test_the_package_needs_no_ros_to_be_imported():
     code = "import alula_flight.fly, sys; assert not {'rospy', 'rclpy', 'open3d', 'matplotlib'} & set(sys.modules), 'imported too early'"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_page_beside_a_flight_ends_with_it(tmp_path):
+    (tmp_path / "logs").mkdir()
+    told, said = threading.Event(), []
+    script = "import signal, time; print('http://127.0.0.1:8440/', flush=True); time.sleep(100)"
+    with page_beside(tmp_path, lambda line: (said.append(line), told.set()), (sys.executable, "-c", script)):
+        assert told.wait(30)
+        (page,) = [process for process in psutil.Process().children() if script in process.cmdline()]
+    assert not page.is_running()
+    assert said == ["the operator's page: http://127.0.0.1:8440/"]
+
+
+def test_a_page_that_can_not_be_served_stops_no_flight(tmp_path):
+    (tmp_path / "logs").mkdir()
+    told, said = threading.Event(), []
+    with page_beside(
+        tmp_path, lambda line: (said.append(line), told.set()), (sys.executable, "-c", "raise SystemExit('the port is taken')")
+    ):
+        assert told.wait(30)
+    assert "logs/console.log" in said[0]
+    assert "the port is taken" in (tmp_path / "logs" / "console.log").read_text()
