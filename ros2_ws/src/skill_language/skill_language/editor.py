@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from skill_language.lexer import MAX_CHARACTERS
 from skill_language.models import ModelFile
@@ -44,18 +46,25 @@ def definition(file: ModelFile, entity: Entity) -> Span | None:
     return next((one.span for one in references(file, entity) if one.defining), None)
 
 
-def renamed(file: ModelFile, entity: Entity, name: str) -> list[Span]:
-    """Return the places that a new name has to be put in; raise RenameError where that can't be or would change the meaning."""
+SHARED = frozenset({"type", "skillset"})
+"""What other files of a robot know by its name; everything else belongs to one skillset."""
+
+
+def renamed(files: Sequence[ModelFile], entity: Entity, name: str) -> dict[str, list[Span]]:
+    """Return the places that a new name has to be put in, by file; raise RenameError where that can't be or would change the meaning.
+
+    ``files``: the file that was asked about, and for what is ``SHARED`` all other models of the robot, read together.
+    """
     if not NAME.fullmatch(name) or name in OPERATOR_WORDS or len(name) > MAX_CHARACTERS:
         raise RenameError(f"`{name[:40]}` is no name: names are made of a-z, A-Z, 0-9 and _, and are not and, or, not, true, false")
-    if file.damaged:
-        raise RenameError("the file has errors of syntax: what could not be read may have the name, too")
-    if entity.kind == "skillset":
-        raise RenameError("other files may use a skillset by its name")
-    found = occurrences(file)
-    if any(one.entity.name == name and one.entity.owner == entity.owner for one in found):
-        raise RenameError(f"`{name}` is there already")
-    return [one.span for one in found if one.entity == entity]
+    found = {file.path: occurrences(file) for file in files}
+    for file in files:
+        if file.damaged:
+            raise RenameError(f"{Path(file.path).name} has errors of syntax: what could not be read may have the name, too")
+        if any(one.entity.name == name and one.entity.owner == entity.owner for one in found[file.path]):
+            raise RenameError(f"`{name}` is there already")
+    places = {path: [one.span for one in several if one.entity == entity] for path, several in found.items()}
+    return {path: spans for path, spans in places.items() if spans}
 
 
 def symbols(file: ModelFile) -> list[Symbol]:

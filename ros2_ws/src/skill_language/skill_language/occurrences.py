@@ -65,6 +65,7 @@ class _Finder:
         """Yield all names within a skillset."""
         owner = (skillset.name,)
         yield from self._name(skillset.span, Entity("skillset", skillset.name), defining=True)
+        yield from self._uses(skillset)
         for resource in skillset.resources:
             yield from self._resource(resource, owner)
         for data in skillset.data:
@@ -80,6 +81,16 @@ class _Finder:
             yield from self._condition(prop.condition, owner)
             if prop.consequence is not None:
                 yield from self._condition(prop.consequence, owner)
+
+    def _uses(self, skillset: Skillset) -> Iterator[Occurrence]:
+        """Yield the skillsets that one uses: `use a` or `use { a b }`."""
+        begin, using = self._index(skillset.span), False
+        for token in self._tokens[begin + 1 :] if begin is not None and skillset.uses else ():
+            if token.text == "skillset":
+                return
+            if using and token.text in skillset.uses:
+                yield Occurrence(Entity("skillset", token.text), self._source.span(token))
+            using = token.text == "use" or (using and (token.text in {"{", ","} or token.text in skillset.uses))
 
     def _resource(self, resource: Resource, owner: tuple[str, ...]) -> Iterator[Occurrence]:
         yield from self._name(resource.span, Entity("resource", resource.name, owner), defining=True)

@@ -13,14 +13,14 @@ from pathlib import Path
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
-from pygls.uris import to_fs_path
+from pygls.uris import from_fs_path, to_fs_path
 
 from skill_language import editor
 from skill_language.completion import Place, completions
 from skill_language.errors import Diagnostic, Severity, has_errors
 from skill_language.layout import formatted
 from skill_language.lexer import MAX_CHARACTERS
-from skill_language.models import ModelFile, check_texts
+from skill_language.models import ModelFile, check_texts, models_in
 from skill_language.occurrences import Occurrence
 from skill_model.model import Span
 
@@ -65,10 +65,24 @@ class SkillLanguageServer(LanguageServer):
             return None
         known = self._files.get(uri)
         if known is None or known[0] != document.version:
-            text = document.source[: MAX_CHARACTERS + 1].removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-            (file,) = check_texts([ModelFile(to_fs_path(uri) or Path(uri).name, text)])
+            (file,) = check_texts([ModelFile(*self._text(uri))])
             known = self._files[uri] = (document.version, file)
         return known[1]
+
+    def robot(self, uri: str) -> dict[str, ModelFile]:
+        """Return all models of a document's folder by their URI, as the editor or else the disk has them, read together."""
+        texts = {uri: ModelFile(*self._text(uri))}
+        place = to_fs_path(uri)
+        for path in models_in(str(Path(place).parent)) if place else ():
+            other = from_fs_path(path)
+            if other and other != uri and Path(path).is_file():
+                texts[other] = ModelFile(*self._text(other))
+        return dict(zip(texts, check_texts(list(texts.values())), strict=True))
+
+    def _text(self, uri: str) -> tuple[str, str]:
+        """Return the path and the text of a document, whether it is open or not."""
+        source = self.workspace.get_text_document(uri).source[: MAX_CHARACTERS + 1]
+        return to_fs_path(uri) or Path(uri).name, source.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
 
 
 server = SkillLanguageServer()
@@ -195,11 +209,27 @@ def rename(ls: SkillLanguageServer, params: lsp.RenameParams) -> lsp.WorkspaceEd
     asked = _asked(ls, params.text_document, params.position)
     if asked is None:
         return None
+    entity, name = asked.name.entity, params.new_name
+    files = ls.robot(asked.uri) if entity.kind in editor.SHARED else {asked.uri: asked.file}
     try:
-        spans = editor.renamed(asked.file, asked.name.entity, params.new_name)
+        places = editor.renamed(list(files.values()), entity, name)
     except editor.RenameError as error:
         raise JsonRpcInvalidParams(str(error)) from error
-    return lsp.WorkspaceEdit(changes={asked.uri: [lsp.TextEdit(_range(asked.file, span), params.new_name) for span in spans]})
+    changed = {uri: (file, places[file.path]) for uri, file in files.items() if file.path in places}
+    edits = {uri: [lsp.TextEdit(_range(file, one), name) for one in spans] for uri, (file, spans) in changed.items()}
+    return lsp.WorkspaceEdit(changes=edits | (_types_renamed(asked.uri, entity.name, name) if entity.kind == "type" else {}))
+
+
+def _types_renamed(uri: str, before: str, after: str) -> dict[str, list[lsp.TextEdit]]:
+    """Return the change of the folder's ``types.yaml``, which has an entry a type."""
+    place = Path(to_fs_path(uri) or "").with_name("types.yaml")
+    types_uri = from_fs_path(str(place))
+    if types_uri is None or not place.is_file():
+        return {}
+    lines = place.read_text(encoding="utf-8").splitlines()
+    numbers = [number for number, line in enumerate(lines) if re.match(rf"{re.escape(before)}\s*:", line)]
+    entry = lambda number: lsp.Range(lsp.Position(number, 0), lsp.Position(number, len(before)))  # noqa: E731
+    return {types_uri: [lsp.TextEdit(entry(number), after) for number in numbers]} if numbers else {}
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)

@@ -92,14 +92,14 @@ def test_a_new_name_changes_nothing_else():
         (Entity("effect", "take", ("s", "goto")), "t"),
     ):
         lines = RL.split("\n")
-        for span in sorted(editor.renamed(file, entity, name), key=lambda one: -one.column):
+        for span in sorted(editor.renamed([file], entity, name)[file.path], key=lambda one: -one.column):
             line = lines[span.line - 1]
             lines[span.line - 1] = line[: span.column - 1] + name + line[span.end_column - 1 :]
         assert "\n".join(lines) == RL.replace(entity.name, name)
         (again,) = check_texts([ModelFile("s.rl", "\n".join(lines))])
         assert again.findings == file.findings
     with pytest.raises(editor.RenameError, match="is there already"):
-        editor.renamed(file, Entity("state", "FREE", ("s", "axes")), "USED")
+        editor.renamed([file], Entity("state", "FREE", ("s", "axes")), "USED")
 
 
 def test_indentation_keeps_comments_and_the_model():

@@ -192,6 +192,38 @@ def test_names_and_outline(editor):
     ]
 
 
+def test_what_the_files_of_a_robot_share_is_renamed_in_all_of_them(editor, tmp_path):
+    texts = {
+        "arm.rl": "type Point\nskillset arm {\n  use camera\n  data at: Point\n  data seen: Picture\n}\n",
+        "camera.rl": "skillset camera {\n  type Picture\n  type Point\n  data look: Picture\n  data from: Point\n}\n",
+        "types.yaml": "Point: geometry_msgs/Point\nPicture: sensor_msgs/Image\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    uris = {name: (tmp_path / name).as_uri() for name in texts}
+    editor.send(
+        "textDocument/didOpen", {"textDocument": {"uri": uris["arm.rl"], "languageId": "alula", "version": 1, "text": texts["arm.rl"]}}
+    )
+    editor.told()
+
+    def rename(line, character, name):
+        where = {"textDocument": {"uri": uris["arm.rl"]}, "position": {"line": line, "character": character}}
+        return editor.answer("textDocument/rename", {**where, "newName": name})
+
+    def places(answer):
+        changes = answer["result"]["changes"]
+        return {
+            name: [(e["range"]["start"]["line"], e["range"]["start"]["character"]) for e in changes.get(uris[name], [])] for name in texts
+        }
+
+    assert places(rename(3, 11, "Place")) == {"arm.rl": [(0, 5), (3, 11)], "camera.rl": [(2, 7), (4, 13)], "types.yaml": [(0, 0)]}
+    assert places(rename(4, 13, "Image")) == {"arm.rl": [(4, 13)], "camera.rl": [(1, 7), (3, 13)], "types.yaml": [(1, 0)]}
+    assert places(rename(2, 7, "eye")) == {"arm.rl": [(2, 6)], "camera.rl": [(0, 9)], "types.yaml": []}
+    assert "`Picture` is there already" in rename(3, 11, "Picture")["error"]["message"]
+    (tmp_path / "camera.rl").write_text("skillset camera { data")
+    assert "camera.rl has errors of syntax" in rename(3, 11, "Place")["error"]["message"]
+
+
 def test_changes_and_proofs(editor):
     document = {"uri": URI, "languageId": "alula", "version": 1, "text": TEXT}
     editor.send("textDocument/didOpen", {"textDocument": document})
