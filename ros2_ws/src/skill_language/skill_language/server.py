@@ -228,8 +228,8 @@ def _types_renamed(uri: str, before: str, after: str) -> dict[str, list[lsp.Text
         return {}
     lines = place.read_text(encoding="utf-8").splitlines()
     numbers = [number for number, line in enumerate(lines) if re.match(rf"{re.escape(before)}\s*:", line)]
-    entry = lambda number: lsp.Range(lsp.Position(number, 0), lsp.Position(number, len(before)))  # noqa: E731
-    return {types_uri: [lsp.TextEdit(entry(number), after) for number in numbers]} if numbers else {}
+    entries = [lsp.Range(lsp.Position(number, 0), lsp.Position(number, len(before))) for number in numbers]
+    return {types_uri: [lsp.TextEdit(entry, after) for entry in entries]} if entries else {}
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)

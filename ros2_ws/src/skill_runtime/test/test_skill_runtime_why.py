@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import queue
+
 import pytest
 from skill_runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
 
 from skill_model.execution_state import ExecutionState
 from skill_model.model import And, Assignment, Comparison, Data, DataIs, Effect, Invariant, Not, Precondition
+from skill_runtime.managers import questions
 
 S = ExecutionState
 FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))
@@ -103,3 +106,16 @@ def test_each_skill_keeps_its_last_result_and_what_is_open():
     assert last.requested_ns < last.started_ns < last.ended_ns
     assert bench.engine.skills["takeoff"].open == ()
     assert [record.state for record in bench.engine.skills["land"].open] == [S.RUNNING]
+
+
+def test_a_hook_that_stays_silent_is_answered_for_and_its_late_answer_is_dropped(monkeypatch):
+    monkeypatch.setattr(questions, "HOOK_ANSWERS_S", 0.1)
+    told: queue.SimpleQueue[str] = queue.SimpleQueue()
+    late = questions._in_time(told.put, "silent")
+    assert told.get(timeout=10.0) == "silent"
+    late("after all")
+    quick = questions._in_time(told.put, "silent")
+    quick("at once")
+    quick("and again")
+    assert told.get(timeout=10.0) == "at once"
+    assert told.empty()

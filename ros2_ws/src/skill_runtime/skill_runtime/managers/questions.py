@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from skill_model.json_form import to_json
 from skill_runtime.core.engine import PauseReply, SkillsetEngine
-from skill_runtime.middleware import ActionServer, Middleware, Reply, ResourceValue, Timer, WhyReply
+from skill_runtime.core.watchdog import WATCHDOG
+from skill_runtime.middleware import ActionServer, Middleware, Reply, ResourceValue, WhyReply
 
 HOOK_ANSWERS_S = 10.0
-"""A hook that has not answered after so long (wall clock) is said to be silent."""
+"""A hook that has not answered after so long is said to be silent; in time that this process could run."""
 
 
 class Questions:
@@ -48,9 +48,8 @@ class Questions:
             reply(WhyReply(str(error)))
             return
         silent = f"validate has not answered for {HOOK_ANSWERS_S:g} s"
-        once = _Once(lambda refusal: self._explain(skill, refusal, reply))
-        once.give_up(self._middleware, silent)
-        self._middleware.defer(lambda: self._engine.ask_validate(skill, inputs, once))
+        answer = _in_time(lambda refusal: self._explain(skill, refusal, reply), silent)
+        self._middleware.defer(lambda: self._engine.ask_validate(skill, inputs, answer))
 
     def _explain(self, skill: str, refusal: str, reply: Reply) -> None:
         resources = {name: ResourceValue(one.state, one.previous, one.stamp_ns) for name, one in self._engine.resources.items()}
@@ -58,9 +57,8 @@ class Questions:
 
     def _pause(self, request: Mapping[str, Any], reply: Reply) -> None:
         silent = PauseReply(accepted=False, reason=f"the hook has not answered for {HOOK_ANSWERS_S:g} s")
-        once = _Once(reply)
-        once.give_up(self._middleware, silent)
-        self._middleware.defer(lambda: self._engine.set_paused(request["id"], once, paused=request["paused"]))
+        answer = _in_time(reply, silent)
+        self._middleware.defer(lambda: self._engine.set_paused(request["id"], answer, paused=request["paused"]))
 
     def _inputs(self, skill: str, inputs_json: str) -> object:
         """Make what ``validate`` gets; raise ValueError where the JSON does not fit."""
@@ -73,23 +71,12 @@ class Questions:
         return self._make_inputs(skill, self._servers[skill].inputs_of(values))
 
 
-class _Once:
-    """Passes on the first answer: the hook's, or that it is silent."""
+def _in_time(reply: Callable[[Any], None], silent: object) -> Callable[[Any], None]:
+    """Return what takes a hook's answer, once; a hook that stays silent is answered for."""
+    watch = WATCHDOG.watch(HOOK_ANSWERS_S, lambda: reply(silent))
 
-    def __init__(self, reply: Callable[[Any], None]) -> None:
-        self._reply = reply
-        self._lock = threading.Lock()
-        self._given = False
-        self._timer: Timer | None = None
+    def answer(value: Any) -> None:
+        if watch.end():
+            reply(value)
 
-    def give_up(self, middleware: Middleware, silent: object) -> None:
-        """Answer for a hook that stays silent."""
-        self._timer = middleware.later(HOOK_ANSWERS_S, lambda: self(silent))
-
-    def __call__(self, answer: Any) -> None:
-        with self._lock:
-            first, self._given = not self._given, True
-        if first:
-            if self._timer is not None:
-                self._timer.cancel()
-            self._reply(answer)
+    return answer
