@@ -26,7 +26,7 @@ def example(document: str, marker: str) -> str:
 def test_the_behaviour_of_the_page_on_mocks_is_flown_as_it_says(tmp_path: Path) -> None:
     behaviour = tmp_path / "gust.yaml"
     behaviour.write_text(example("docs/mocks.md", "`gust.yaml`:"), encoding="utf-8")
-    flight = start_flight(tmp_path / "run", "--mock", "--behaviour", str(behaviour))
+    flight = start_flight(tmp_path / "run", "--mock", "--monitor", "--behaviour", str(behaviour))
     assert flight.end() == 0, flight.words()
     summary = flight.summary
     assert (summary["outcome"], summary["landed"], summary["problems"]) == ("degraded", True, [])
@@ -41,6 +41,8 @@ def test_the_behaviour_of_the_page_on_mocks_is_flown_as_it_says(tmp_path: Path) 
     assert (summary["collisions"], summary["distance_m"], summary["map"]["points"], summary["bridge"]) == (None, None, None, None)
     assert summary["mock"]["factor"] > 1.0
     assert "times faster than the clock" in flight.words()
+    assert (summary["conformance"]["conforms"], summary["conformance"]["events"]) == (True, len(flight.events()))
+    assert f"monitor: all {len(flight.events())} events conform to the models" in flight.words()
     for name in ("timeline.svg", "tree.svg"):
         ET.parse(flight.out / name)  # noqa: S314 - our own
     timeline, mission, run = (json.loads((flight.out / f"{name}.json").read_text()) for name in ("timeline", "mission", "run"))

@@ -25,7 +25,7 @@ import psutil
 
 from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
-from alula_common.scenarios import scenario_names
+from alula_common.scenarios import load_scenario, scenario_names
 from alula_common.shared_memory import sweep_shared_memory
 from alula_common.signals import Interrupts
 from alula_flight.beside import page_beside
@@ -33,6 +33,8 @@ from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
 from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_world
+from run_analysis.conformance import Monitor
+from run_analysis.models import models_of
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.world.config import world_names
 
@@ -61,6 +63,7 @@ class Arguments(argparse.Namespace):
     mock: bool
     console: bool
     record: str
+    monitor: bool
     behaviour: list[Path]
 
 
@@ -93,6 +96,7 @@ def parse(arguments: list[str]) -> RunSpec:
     parser.add_argument(
         "--record", choices=["functional", "sensors"], default="functional", help="sensors: functional.bag also holds raw measurements"
     )
+    parser.add_argument("--monitor", action="store_true", help="hold every event of the skillsets against the models, while it flies")
     given = parser.parse_args(arguments, namespace=Arguments())
     scenario = read_scenario(given.scenario)
     if not 0 <= given.seed < 2**31:
@@ -118,6 +122,7 @@ def parse(arguments: list[str]) -> RunSpec:
         mock=given.mock,
         console=given.console,
         record=given.record,
+        monitor=given.monitor,
         behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
     )
 
@@ -193,10 +198,11 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
 class Front:
     """Watches the supervisor; the first Ctrl-C lands the vehicle, the second ends everything at once."""
 
-    def __init__(self, spec: RunSpec, claim: DomainClaim, say: Callable[[str], None]) -> None:
+    def __init__(self, spec: RunSpec, claim: DomainClaim, say: Callable[[str], None], monitor: Monitor | None = None) -> None:
         self._spec = spec
         self._claim = claim
         self._say = say
+        self._monitor = monitor
         self._interrupts = Interrupts(self._land, lambda: say("ending everything at once"))
         self._supervisor: subprocess.Popen[bytes] | None = None
 
@@ -204,7 +210,7 @@ class Front:
         """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards."""
         self._interrupts.install()
         supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
-        live = LiveEvents(Path(self._spec.out_dir), self._say)
+        live = LiveEvents(Path(self._spec.out_dir), self._say, self._monitor)
         try:
             while supervisor.poll() is None and not self._interrupts.at_once:
                 live.show_new()
@@ -240,7 +246,7 @@ class Front:
             live.show_new()
 
 
-def finish(spec: RunSpec, mission_exit: int | None) -> int:
+def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = None) -> int:
     """Make the report from the run's folder, say how it went, and return the exit code."""
     # Late, because a wrong command line should not have to wait for matplotlib and Open3D.
     from alula_flight.report.facts import RunFacts
@@ -258,6 +264,7 @@ def finish(spec: RunSpec, mission_exit: int | None) -> int:
             died=[{"name": d.name, "when_s": d.when_s, "how": d.how} for d in died],
             mission_exit=mission_exit,
             mock=spec.mock,
+            conformance=None if monitor is None else monitor.verdict.as_dict(),
         )
     )
     for line in verdict_lines(summary, died, out):
@@ -287,10 +294,16 @@ def main(arguments: list[str]) -> int:
     say = announce(spec)
     if spec.record == "sensors":
         say(sensors_words(out))
+    monitor = monitor_of(spec)
     with page_beside(out, say) if spec.console else contextlib.nullcontext():
-        code = Front(spec, claim, say).fly(spec_path)
+        code = Front(spec, claim, say, monitor).fly(spec_path)
         say("making the report")
-        return finish(spec, code)
+        return finish(spec, code, monitor)
+
+
+def monitor_of(spec: RunSpec) -> Monitor | None:
+    """Return what holds the events against the models of the scenario's skillsets, where that was asked for."""
+    return Monitor(models_of(load_scenario(spec.scenario).skillsets)) if spec.monitor else None
 
 
 def sensors_words(out: Path) -> str:
@@ -305,7 +318,8 @@ def sensors_words(out: Path) -> str:
 def fly_mocked(spec: RunSpec) -> int:
     """Fly over mocks; raise RequestError when that can't be, and leave nothing behind then."""
     say = announce(spec)
-    code, words = MockFront(spec, say).fly()
+    monitor = monitor_of(spec)
+    code, words = MockFront(spec, say, monitor).fly()
     out = Path(spec.out_dir)
     if code == CANNOT_START and not (out / "mission.json").exists():
         raise RequestError(words.strip() or "the mission could not start")
@@ -316,7 +330,7 @@ def fly_mocked(spec: RunSpec) -> int:
     except OSError as error:
         say(f"{error.filename} could not be written: {error.strerror}")
     say("making the report")
-    return finish(spec, code)
+    return finish(spec, code, monitor)
 
 
 def announce(spec: RunSpec) -> Callable[[str], None]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from alula_common.record import EVENTS, FILE, RecordFollower
 from alula_flight.deaths import read_deaths
+from run_analysis.conformance import Monitor
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, TransitionEvent, read_event
 
@@ -29,12 +30,13 @@ def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: flo
 
 
 class LiveEvents:
-    """Follows ``skills.mcap`` and ``deaths.jsonl`` of a run's folder."""
+    """Follows ``skills.mcap`` and ``deaths.jsonl`` of a run's folder. A ``monitor`` is given each event, and what it finds is said."""
 
-    def __init__(self, out: Path, say: Callable[[str], None]) -> None:
+    def __init__(self, out: Path, say: Callable[[str], None], monitor: Monitor | None = None) -> None:
         self._record = RecordFollower(out / FILE)
         self._deaths = out / "deaths.jsonl"
         self._say = say
+        self._monitor = monitor
         self._begun_s: float | None = None
         self._lift_off_s: float | None = None
         self._deaths_shown = 0
@@ -61,3 +63,6 @@ class LiveEvents:
         text = event_line(event, self._lift_off_s, self._begun_s)
         if text is not None:
             self._say(text)
+        finding = None if self._monitor is None else self._monitor.take(event)
+        if finding is not None:
+            self._say(f"does not conform to the model: {finding}")

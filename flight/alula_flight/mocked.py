@@ -12,6 +12,7 @@ from pathlib import Path
 from alula_common.signals import Interrupts
 from alula_flight.live import LiveEvents
 from alula_flight.spec import RunSpec
+from run_analysis.conformance import Monitor
 
 CANNOT_START = 2
 STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at once"
@@ -36,15 +37,16 @@ def command(spec: RunSpec, root: Path) -> list[str]:
 class MockFront:
     """Watches the flight; the first Ctrl-C lands the vehicle, the second ends everything at once."""
 
-    def __init__(self, spec: RunSpec, say: Callable[[str], None]) -> None:
+    def __init__(self, spec: RunSpec, say: Callable[[str], None], monitor: Monitor | None = None) -> None:
         self._spec = spec
         self._say = say
+        self._monitor = monitor
         self._interrupts = Interrupts(self._land, self._kill)
         self._flight: subprocess.Popen[str] | None = None
 
     def fly(self) -> tuple[int, str]:
         """Fly; return the exit code and what the flight had to say."""
-        live = LiveEvents(Path(self._spec.out_dir), self._say)
+        live = LiveEvents(Path(self._spec.out_dir), self._say, self._monitor)
         with subprocess.Popen(
             command(self._spec, Path(os.environ["ALULA_ROOT"])),
             stdin=subprocess.DEVNULL,

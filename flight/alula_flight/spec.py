@@ -66,6 +66,7 @@ class RunSpec:
     real drivers run elsewhere. ``imperfections`` of the simulated autopilot and sensors.
     ``record``: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
     ``console``: whether the operator's page is served beside the flight.
+    ``monitor``: every event is held against the models.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
     """
 
@@ -84,6 +85,7 @@ class RunSpec:
     imperfections: str = "off"
     mock: bool = False
     record: str = "functional"
+    monitor: bool = False
     behaviour: tuple[str, ...] = ()
     console: bool = False
 

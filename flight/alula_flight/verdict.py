@@ -85,6 +85,16 @@ def what_failed(summary: Mapping[str, Any]) -> str:
     return "radio lost" if summary.get("video") else "sensor failed"
 
 
+def conformance_lines(found: Mapping[str, Any]) -> list[str]:
+    """Return what the monitor has to say."""
+    if found["conforms"]:
+        return [f"  monitor: all {found['events']} events conform to the models"]
+    told = [
+        f"{one['skillset']} event {one['sequence']} at {one['stamp_s']:.3f} s: {one['event']}: {one['why']}" for one in found["findings"]
+    ]
+    return [f"  monitor: does not conform: {one}" for one in told]
+
+
 def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
     """Return the verdict, a line each."""
     reason = summary.get("reason")
@@ -99,6 +109,8 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
             if recovery.get(key) is not None:
                 steps.append(f"{words} {recovery[key] - failure:.2f} s later")
         lines.append("  recovery: " + ", ".join(steps))
+    if summary.get("conformance") is not None:
+        lines += conformance_lines(summary["conformance"])
     lines += [f"  problem: {problem}" for problem in summary.get("problems") or ()]
     lines += [f"  {out / name}" for name in PICTURES if (out / name).exists()]
     return lines

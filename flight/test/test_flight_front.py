@@ -19,10 +19,11 @@ from alula_common.record import EVENTS, RecordWriter
 from alula_common.record import FILE as RECORD
 from alula_flight.beside import page_beside
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
-from alula_flight.fly import CANNOT_START, main, parse
+from alula_flight.fly import CANNOT_START, main, monitor_of, parse
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import command
 from alula_flight.spec import RequestError, RunSpec
+from alula_flight.verdict import conformance_lines
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 from uav_simulator.world.config import find_world
@@ -233,6 +234,25 @@ def test_live_lines_wait_for_whole_events(tmp_path):
     live.show_new()
     assert len(said) == 2
     assert "navigation.goto" in said[0]
+
+
+def test_a_monitor_says_at_once_what_does_not_conform_and_the_verdict_repeats_it(tmp_path):
+    said: list[str] = []
+    monitor = monitor_of(parse(["mapping", "--mock", "--monitor", "--out", str(tmp_path / "run")]))
+    assert monitor is not None
+    live = LiveEvents(tmp_path, said.append, monitor)
+    change = {"skillset": "perception", "kind": "TRANSITION", "resource": "zed_status", "cause": "extern", "stamp_s": 1.0}
+    writer = RecordWriter(tmp_path / RECORD)
+    writer.write(EVENTS, 0, {**change, "sequence": 1, "from_state": "UNKNOWN", "to_state": "OK"})
+    live.show_new()
+    assert len(said) == 1
+    assert conformance_lines(monitor.verdict.as_dict()) == ["  monitor: all 1 events conform to the models"]
+    writer.write(EVENTS, 0, {**change, "sequence": 2, "from_state": "BROKEN", "to_state": "OK"})
+    live.show_new()
+    what = "perception event 2 at 1.000 s: zed_status BROKEN -> OK (extern): zed_status was OK, not BROKEN"
+    assert said[2:] == [f"does not conform to the model: {what}"]
+    assert conformance_lines(monitor.verdict.as_dict()) == [f"  monitor: does not conform: {what}"]
+    assert monitor_of(parse(["mapping", "--mock", "--out", str(tmp_path / "run")])) is None
 
 
 def test_live_lines_count_from_lift_off_on_any_clock(tmp_path):

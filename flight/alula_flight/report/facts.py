@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
@@ -21,6 +21,7 @@ class RunFacts:
     """One run. ``faults`` as on the command line (``zed@30``); ``mission_exit`` None: the mission did not end by itself.
 
     ``mock``: flown over mocks, so there is neither a bag nor a world nor a map, and no bridge.
+    ``conformance``: what a monitor says of the events; None without one.
     """
 
     scenario: str
@@ -30,3 +31,4 @@ class RunFacts:
     died: Sequence[Death]
     mission_exit: int | None
     mock: bool = False
+    conformance: Mapping[str, object] | None = None

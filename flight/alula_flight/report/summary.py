@@ -104,6 +104,7 @@ class Summary(TypedDict):
     injected: list[InjectedFault]
     died: list[Death]
     mission_exit: int | None
+    conformance: dict[str, object] | None
     mock: MockSummary | None
     lift_off: LiftOff
     accounts: dict[str, EncounterSummary | None]
@@ -213,6 +214,7 @@ def summarise(
         injected=[InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(recording)],
         died=[Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],
         mission_exit=facts.mission_exit,
+        conformance=None if facts.conformance is None else dict(facts.conformance),
         mock=mock,
         lift_off=LiftOff(stamp_s=phases.zero_s, source=phases.zero_from),
         accounts={"simulator": _encounter(simulated), "recomputed": _encounter(recomputed)},
