@@ -12,7 +12,7 @@ import importlib
 import json
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -84,11 +84,19 @@ def _untuned(_settings: object, _apply: object) -> None:
 
 
 class Perception:
-    """Feeds the nodes from one bag, and writes the other."""
+    """Feeds the nodes from one bag, and writes the other; ``names``: what topics of the source are called here."""
 
-    def __init__(self, source: rosbag.Bag, target: rosbag.Bag, faults: Faults, parameters: dict[str, dict[str, object]]) -> None:
+    def __init__(
+        self,
+        source: rosbag.Bag,
+        target: rosbag.Bag,
+        faults: Faults,
+        parameters: dict[str, dict[str, object]],
+        names: Mapping[str, str],
+    ) -> None:
         self._source = source
         self._target = target
+        self._names = names
         self._faults = faults
         self._graph = offline.Graph(self._publish)
         self._graph.parameters = parameters
@@ -101,7 +109,7 @@ class Perception:
             nodes = make_nodes(self._graph, str(Path(folder) / "map.ply"))
             for topic, (kind, data, *_, message_class), time in self._source.read_messages(raw=True):
                 self._graph.advance_to(time.to_nsec())
-                self._take(topic, kind, data, message_class)
+                self._take(self._names.get(topic, topic), kind, data, message_class)
             del nodes
 
     def _take(self, topic: str, kind: str, data: bytes, message_class: Any) -> None:
@@ -142,29 +150,40 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("bag", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--fail", action="append", default=[])
+    parser.add_argument("--map", action="append", default=[], dest="names", metavar="THEIRS:=OURS")
     parser.add_argument("--set", action="append", default=[], dest="settings")
     options = parser.parse_args(words)
     try:
-        perceive(options.bag, options.out, options.fail, options.settings)
+        perceive(options.bag, options.out, options.fail, options.settings, options.names)
     except (PerceptionError, FaultError, rosbag.ROSBagException, OSError, ValueError) as error:
         sys.stderr.write(f"{str(error) or type(error).__name__}\n".replace("\n", " ").strip() + "\n")
         return 2
     return 0
 
 
-def perceive(source: Path, target: Path, fail: Sequence[str], settings: Sequence[str]) -> None:
+def names_of(texts: Sequence[str]) -> dict[str, str]:
+    """Read ``THEIRS:=OURS``; raises PerceptionError."""
+    pairs = [text.split(":=") for text in texts]
+    for text, pair in zip(texts, pairs, strict=True):
+        if len(pair) != 2 or not all(name.startswith("/") for name in pair):
+            raise PerceptionError(f"--map {text}: write /THEIRS:=/OURS; topics of measurements here are {', '.join(TOPICS)}")
+    return {pair[0]: pair[1] for pair in pairs}
+
+
+def perceive(source: Path, target: Path, fail: Sequence[str], settings: Sequence[str], maps: Sequence[str] = ()) -> None:
     """Write ``target``: the bag ``source`` with what the perception says of its measurements now.
 
     Raises:
         PerceptionError: there are no measurements in it, or a setting does not exist.
         FaultError: there is no such failure.
     """
-    requests, parameters = read_faults(fail), settings_of(settings)
+    requests, parameters, names = read_faults(fail), settings_of(settings), names_of(maps)
     with rosbag.Bag(str(source)) as bag:
-        if not any(topic in TOPICS and topic != "/imu/data" for topic in bag.get_type_and_topic_info().topics):
+        topics = {names.get(topic, topic) for topic in bag.get_type_and_topic_info().topics}
+        if not topics & (TOPICS.keys() - {"/imu/data"}):
             raise PerceptionError(f"{source}: holds no measurements; record them with ./alula fly SCENARIO --record sensors")
         with rosbag.Bag(str(target), "w") as out:
-            Perception(bag, out, Faults(requests, lift_off_of(bag)), parameters).run()
+            Perception(bag, out, Faults(requests, lift_off_of(bag)), parameters, names).run()
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from alula_common.files import write_json, write_text
-from alula_common.record import Entry
+from alula_common.record import FILE, Entry
 from mission_replay.again import bag_of, is_perception, perceive
 from mission_replay.asked import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
 from mission_replay.recorded import Recorded, ReplayError, load
@@ -48,6 +48,9 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--behaviour", type=Path, action="append", default=[], metavar="FILE", help="what mocks do where nothing was recorded"
     )
+    parser.add_argument(
+        "--map", action="append", default=[], dest="names", metavar="/THEIRS:=/OURS", help="a topic of the bag, from sensors"
+    )
     parser.add_argument("--on", action="store_true", help="go on over mocks after the first difference")
     parser.add_argument("--rate", type=float, default=0.0, help="mission clock a second at most (default 0: no limit)")
     parser.add_argument("--out", type=Path, help="folder for the replay's own record")
@@ -69,7 +72,7 @@ def prepare(recorded: Recorded, options: argparse.Namespace) -> Replay:
     behaviour = behaviour_for(recorded, skillsets, options.behaviour)
     if options.depth == "sensors":  # what fails and is set there is the perception's business
         perception = [text for text in options.settings if is_perception(text)]
-        options.run = perceive(bag_of(recorded, options.run), options.folder, options.fail, perception)
+        options.run = perceive(bag_of(recorded, options.run), options.folder, options.fail, perception, options.names)
         options.settings, options.fail = [text for text in options.settings if text not in perception], []
     parameters = parameters_for(recorded, plan, options.settings)
     faults = faults_for(behaviour, options.fail)
@@ -154,6 +157,8 @@ def write_out(out: Path, recorded: Recorded, result: Result, zero_s: float) -> N
 
 def replay(options: argparse.Namespace) -> int:
     """Replay as asked and tell; return the exit code; raises ReplayError."""
+    if options.depth == "sensors" and options.run.suffix == ".bag" and not options.run.with_name(FILE).exists():
+        return perception_alone(options)
     expectations = None if options.expect is None else load_expectations(options.expect)
     recorded = load(options.run)
     result = prepare(recorded, options).run()
@@ -168,6 +173,21 @@ def replay(options: argparse.Namespace) -> int:
     if expectations is None:
         return SAME if same(recorded, result) else OTHERWISE
     return hold(options, check(expectations, load_run(options.out)))
+
+
+def perception_alone(options: argparse.Namespace) -> int:
+    """Tell what the perception says of a bag that belongs to no mission: the transitions that it asks for; return the exit code."""
+    from mission_replay.functional import read_calls
+
+    if not options.run.is_file():
+        raise ReplayError(f"{options.run}: there is no such bag")
+    calls = read_calls(perceive(options.run, options.folder, options.fail, options.settings, options.names))
+    for call in calls:
+        skillset = call.service.split("/")[1]
+        text = f"{call.end_s:9.2f} s  {skillset}.{call.request.get('resource')} -> {call.request.get('to')}"
+        sys.stdout.write(f"{json.dumps(vars(call)) if options.json else text}\n")
+    sys.stderr.write("no record of a mission lies beside it: perceived only\n")
+    return SAME
 
 
 def hold(options: argparse.Namespace, checked: Sequence[Checked]) -> int:

@@ -27,8 +27,10 @@ def is_perception(setting: str) -> bool:
     return setting.removeprefix("perception.").removeprefix("mapping.").partition(".")[0] in NODES
 
 
-def perceive(bag: Path, folder: Path, faults: Sequence[str], settings: Sequence[str]) -> Path:
+def perceive(bag: Path, folder: Path, faults: Sequence[str], settings: Sequence[str], names: Sequence[str]) -> Path:
     """Return a bag like this one, with what the perception says of its measurements now; it lies in ``folder``.
+
+    ``names``: what topics of the bag are called here, as ``/theirs:=/ours``.
 
     Raises:
         ReplayError: the bag holds no measurements, or a failure or a setting does not exist.
@@ -36,6 +38,7 @@ def perceive(bag: Path, folder: Path, faults: Sequence[str], settings: Sequence[
     again = folder / BAG
     words = [str(Path(os.environ["ALULA_ROOT"]) / "setup" / "in_ros1"), "python3", "-m", "sensor_replay", str(bag), str(again)]
     words += [word for fault in faults for word in ("--fail", fault)] + [word for text in settings for word in ("--set", text)]
+    words += [word for text in names for word in ("--map", text)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode:
         raise ReplayError((done.stderr.strip().splitlines() or [f"perceiving ended with {done.returncode}"])[-1])
