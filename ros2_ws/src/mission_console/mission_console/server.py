@@ -65,7 +65,7 @@ class Console:
         self._commander = ""
         self._runs: list[Path] = []
         self._live: set[Path] = set()
-        self._busy = asyncio.Lock()
+        self._starting = asyncio.Lock()
         self._acts: Mapping[str, Callable[[Mapping[str, Any], Path | None], tuple[Path | None, str]]] = {
             "start": self._start,
             "abort": self._abort,
@@ -223,7 +223,8 @@ class Console:
             answer = await self._do(viewer, command, asked)
         except (acts.ActError, NoRunError, OSError, KeyError) as error:
             answer = f"refused: {error}"
-        await viewer.connection.send(json.dumps({"answer": answer, "command": command}))
+        started = viewer.run if command == "start" else ""
+        await viewer.connection.send(json.dumps({"answer": answer, "command": command, "started": started}))
 
     async def _do(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> str:
         run = self._run_of(viewer)
@@ -235,10 +236,10 @@ class Console:
             raise acts.ActError("you watch; take over first")
         if command not in self._acts:
             raise acts.ActError(f"there is no command {command}")
-        async with self._busy:
+        async with self._starting if command == "start" else contextlib.nullcontext():
             done_to, answer = await asyncio.to_thread(self._acts[command], asked, run)
-        if command == "start":
-            viewer.run = "" if done_to is None else done_to.name
+        if command == "start" and done_to is not None:
+            viewer.run = done_to.name
         self._note(done_to, viewer, command, answer)
         return answer
 
@@ -285,7 +286,7 @@ def runs_in(folder: Path, fixed: Path | None) -> list[Path]:
     stamped = []
     for path in found:
         with contextlib.suppress(OSError):
-            stamped.append((path.stat().st_ctime, path))
+            stamped.append(((path / "run.json").stat().st_mtime, path))
     return [path for _, path in sorted(stamped, reverse=True)]
 
 

@@ -215,7 +215,10 @@ class Link {
       this.behind = said.of - said.upTo;
       take(said.entries);
     }
-    if (said.answer !== undefined) this.bar.say(`${said.command}: ${said.answer}`);
+    if (said.answer !== undefined) {
+      this.bar.say(`${said.command}: ${said.answer}`);
+      if (said.started) this.run = said.started;
+    }
     if (said.status) {
       this.status = said.status;
       if (this.run && said.status.run !== this.run && !said.status.runs.includes(this.run)) this.run = "";

@@ -22,7 +22,7 @@ class OperatorBar {
     byId("operator").hidden = false;
     byId("operator").append(
       el("div", { class: "acts" }, el("label", {}, "run ", this.runs), this.report, this.role, this.take),
-      this.form,
+      el("details", {}, el("summary", {}, "start a mission"), this.form),
       el("div", { class: "acts" }, this.abort, this.word, this.off),
       this.checks,
       this.answer,
@@ -39,13 +39,13 @@ class OperatorBar {
       const faults = this.faults.value.split(/[\s,]+/).filter(Boolean);
       this.send({ command: "start", scenario: this.scenario.value, seed: Number(this.seed.value), faults, mock: this.over.value === "mocks" });
       this.say("starting …");
-    });
+    }, "go");
     return el("form", { "aria-label": "Start a mission", onsubmit: (event) => event.preventDefault() }, field("scenario", this.scenario), field("seed", this.seed), field("failures", this.faults), field("over", this.over), this.begin);
   }
 
   /** A button that acts on the second press within some seconds. */
-  armed(text, again, act) {
-    const button = el("button", { type: "button", class: "danger" }, text);
+  armed(text, again, act, kind = "danger") {
+    const button = el("button", { type: "button", class: kind }, text);
     let timer = null;
     const disarm = () => {
       clearTimeout(timer);

@@ -18,6 +18,8 @@ function headline(run) {
   if (run.begin === null) return { text: run.facts["/run"] ? "The run has recorded nothing yet" : "No run yet", tone: "now", reason: "" };
   const outcome = summary?.outcome ?? mission.outcome ?? "running";
   if (summary && outcome === "running") return { text: "The mission's process ended before the mission did", tone: "bad", reason: "" };
+  const failed = failures(run).length;
+  if (outcome === "running" && failed) return { text: `The mission is under way, after ${failed === 1 ? "a failure" : `${failed} failures`}`, tone: "fair", reason: "" };
   const [text, tone] = OUTCOMES[outcome] ?? [`Outcome: ${words(outcome)}`, "now"];
   return { text, tone, reason: summary?.reason ?? mission.reason ?? "" };
 }
@@ -33,7 +35,8 @@ function keyFigures(run) {
   add("landed", summary.landed === true ? "yes" : summary.landed === false ? "no" : null);
   add("in the air", summary.duration_s, "s");
   add("flown", summary.distance_m, "m");
-  if (mission.waypoints) add("waypoints reached", `${mission.waypoints_reached} of ${mission.waypoints}`);
+  const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
+  if (mission.waypoints) add("waypoints reached", `${reached} of ${mission.waypoints}`);
   add("collisions", summary.collisions, "", 0);
   add("nearest surface", summary.min_clearance_m, "m", 2);
   add("map coverage", summary.map?.coverage != null ? 100 * summary.map.coverage : null, "%");

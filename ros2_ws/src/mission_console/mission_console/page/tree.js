@@ -106,7 +106,7 @@ class TreeView {
   detail(node) {
     const { status, message, since } = nodeAt(node, this.t);
     const zero = origin(this.run);
-    const lines = [el("p", {}, el("b", {}, node.name), ` — ${node.kind}, ${words(status)}${since === null ? "" : ` since ${seconds(since - zero)}`}${message ? `: ${message}` : ""}`)];
+    const lines = [el("p", {}, el("b", {}, node.name), ` — ${node.kind}, ${status === "INVALID" ? "not ticked" : words(status)}${since === null ? "" : ` since ${seconds(since - zero)}`}${message ? `: ${message}` : ""}`)];
     const executions = [...this.run.executions.values()].filter((one) => `${one.skillset}.${one.skill}` === node.skill && one.start <= this.t);
     for (const one of executions.slice(-8)) {
       const ended = one.end !== null && one.end <= this.t;
