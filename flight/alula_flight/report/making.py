@@ -7,17 +7,17 @@ from pathlib import Path
 
 from alula_common.files import write_aside, write_json
 from alula_common.record import FILE as RECORD
-from alula_common.scenarios import load_scenario
+from alula_common.scenarios import Scenario, load_scenario
 from alula_flight.report.events import History, fold, read_events
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.files import Problems
 from alula_flight.report.map_picture import MapScene, draw_map
 from alula_flight.report.map_quality import Floats, MapQuality, judge_map, load_map, load_route
-from alula_flight.report.mocked import read_mock
+from alula_flight.report.mocked import MockSummary, read_mock
 from alula_flight.report.page import page_entries
 from alula_flight.report.phases import Phases, find_phases
 from alula_flight.report.recording import Recording, read_recording
-from alula_flight.report.recovery import find_recovery, injected
+from alula_flight.report.recovery import Recovery, find_recovery, injected
 from alula_flight.report.summary import Summary, summarise
 from alula_flight.report.timeline import make_timeline
 from alula_flight.report.timeline_picture import draw_timeline
@@ -40,16 +40,54 @@ class Truth:
     quality: MapQuality = field(default_factory=MapQuality)
 
 
+@dataclass(frozen=True)
+class Account:
+    """What happened in the skillsets, and what the functional layer recorded."""
+
+    history: History
+    recording: Recording
+    mock: MockSummary | None
+    phases: Phases
+    video: Video
+    recovery: Recovery | None
+
+    @property
+    def failed(self) -> str:
+        """The first sensor that was made to fail, or nothing."""
+        return next((fault.sensor for fault in injected(self.recording)), "")
+
+
 def make_report(facts: RunFacts) -> Summary:
     """Make ``timeline.json``, ``timeline.svg``, ``map.png``, ``summary.json`` and ``report.html`` in the run's folder; return the summary.
 
     Whatever is missing, cut off, makes no sense or can't be written is named in the summary's ``problems``; numbers that depend on it
     are None.
     """
-    folder, problems, scenario = facts.out_dir, Problems(), load_scenario(facts.scenario)
+    problems, scenario = Problems(), load_scenario(facts.scenario)
+    account = _account(facts, scenario, problems)
+    truth = Truth() if facts.mock else _compare(facts.out_dir, account, problems, mapped="map" in scenario.report)
+    _draw_pictures(facts, account, truth, problems)
+    # The numbers come behind the pictures, because they tell what went wrong with the rest.
+    summary = summarise(
+        facts,
+        history=account.history,
+        recording=account.recording,
+        phases=account.phases,
+        recovery=account.recovery,
+        recomputed=truth.recomputed,
+        resting=truth.resting,
+        quality=truth.quality,
+        mock=account.mock,
+        video=account.video.summary,
+        problems=problems,
+    )
+    _write_summary(facts.out_dir, summary)
+    _write_page(facts, account, truth, summary)
+    return summary
 
-    # 1. What happened in the skillsets, and what the functional layer recorded.
-    history, recording, mock = History(), Recording(), None
+
+def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account:
+    folder, history, recording, mock, video = facts.out_dir, History(), Recording(), None, Video()
     with problems.survive(RECORD):
         history = fold(read_events(folder / RECORD, problems), problems)
     if facts.mock:
@@ -58,55 +96,41 @@ def make_report(facts: RunFacts) -> Summary:
         with problems.survive("functional.bag"):
             recording = read_recording(folder, problems)
     phases = find_phases(history, recording)
-    video = Video()
     if "video" in scenario.report and not facts.mock:
         with problems.survive("video"):
             video = read_video(folder, history, phases, problems)
     recovery = find_recovery(scenario, history, recording, phases, radio_lost_s=radio_lost_s(video, phases))
+    return Account(history, recording, mock, phases, video, recovery)
 
-    # 2. The flight, and 3. its map, against the true world, where there is one.
-    truth = Truth() if facts.mock else _compare(folder, recording, phases, problems, mapped="map" in scenario.report)
 
-    # 4. The pictures.
-    failed = next((fault.sensor for fault in injected(recording)), "")
+def _draw_pictures(facts: RunFacts, account: Account, truth: Truth, problems: Problems) -> None:
+    folder, title = facts.out_dir, _title(facts)
     with problems.survive("timeline"):
-        timeline = make_timeline(history, phases, recovery, failed)
+        timeline = make_timeline(account.history, account.phases, account.recovery, account.failed)
         write_json(folder / "timeline.json", timeline)
-        write_aside(folder / "timeline.svg", lambda aside: draw_timeline(timeline, aside, title=_title(facts)))
+        write_aside(folder / "timeline.svg", lambda aside: draw_timeline(timeline, aside, title=title))
+        if account.video.frames:
+            with problems.survive("video.svg"):
+                write_aside(folder / "video.svg", lambda aside: draw_video(account.video, timeline, aside, title=title))
     if not facts.mock:
         with problems.survive("map.png"):
-            failure_s = recovery.failure_s or recovery.detected_s if recovery is not None else None
-            scene = MapScene(truth.points, truth.quality.missed_enu_m, truth.world, truth.route, recording.path, failure_s, failed)
-            write_aside(folder / "map.png", lambda aside: draw_map(scene, aside, title=_title(facts)))
+            write_aside(folder / "map.png", lambda aside: draw_map(_map_scene(account, truth), aside, title=title))
 
-    if video.frames:
-        with problems.survive("video.svg"):
-            write_aside(folder / "video.svg", lambda aside: draw_video(video, timeline, aside, title=_title(facts)))
 
-    # 5. The numbers, last, because they tell what went wrong with the rest.
-    summary = summarise(
-        facts,
-        history=history,
-        recording=recording,
-        phases=phases,
-        recovery=recovery,
-        recomputed=truth.recomputed,
-        resting=truth.resting,
-        quality=truth.quality,
-        mock=mock,
-        video=video.summary,
-        problems=problems,
-    )
-    _write_summary(folder, summary)
+def _map_scene(account: Account, truth: Truth) -> MapScene:
+    recovery = account.recovery
+    failure_s = recovery.failure_s or recovery.detected_s if recovery is not None else None
+    return MapScene(truth.points, truth.quality.missed_enu_m, truth.world, truth.route, account.recording.path, failure_s, account.failed)
 
-    # 6. The page, of all that is in the folder by now.
-    doubts = Problems()
-    with doubts.survive("report.html"):
-        write_report(folder, page_entries(recording, truth.world), title=_title(facts))
-    if doubts.sentences:
-        summary["problems"] = [*summary["problems"], *doubts.sentences]
-        _write_summary(folder, summary)
-    return summary
+
+def _write_page(facts: RunFacts, account: Account, truth: Truth, summary: Summary) -> None:
+    """Write the page, of all that is in the folder by now."""
+    problems = Problems()
+    with problems.survive("report.html"):
+        write_report(facts.out_dir, page_entries(account.recording, truth.world), title=_title(facts))
+    if problems.sentences:
+        summary["problems"] = [*summary["problems"], *problems.sentences]
+        _write_summary(facts.out_dir, summary)
 
 
 def _write_summary(folder: Path, summary: Summary) -> None:
@@ -116,8 +140,9 @@ def _write_summary(folder: Path, summary: Summary) -> None:
         summary["problems"].append(f"summary.json could not be written: {error.strerror or error}")
 
 
-def _compare(folder: Path, recording: Recording, phases: Phases, problems: Problems, *, mapped: bool) -> Truth:
-    """Compare with the true world: the path first, then the map."""
+def _compare(folder: Path, account: Account, problems: Problems, *, mapped: bool) -> Truth:
+    """Compare with the true world, where there is one: the path first, then the map."""
+    recording, phases = account.recording, account.phases
     world: World | None = None
     with problems.survive("world.ply"):
         world = World.load(folder / "world.ply")
