@@ -19,7 +19,7 @@ from alula_common.record import EVENTS, RecordWriter
 from alula_common.record import FILE as RECORD
 from alula_flight.beside import page_beside
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
-from alula_flight.fly import CANNOT_START, main, monitor_of, parse
+from alula_flight.fly import CANNOT_START, main, monitor_of, parse, sensors_words
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import command
 from alula_flight.spec import RequestError, RunSpec
@@ -203,6 +203,26 @@ def test_everything_of_a_run_ends_and_nothing_else(tmp_path):
     assert other.poll() is None
     other.kill()
     other.wait()
+
+
+def test_sensors_are_recorded_where_that_is_asked_for_and_can_be():
+    assert "record:=sensors" in parse(["mapping", "--record", "sensors"]).launch_arguments()
+    assert not [word for word in parse(["mapping"]).launch_arguments() if word.startswith("record:=")]
+    with pytest.raises(RequestError, match="mocks measure nothing"):
+        parse(["mapping", "--mock", "--record", "sensors"])
+
+
+def test_how_much_sensors_will_take_is_said(tmp_path):
+    assert "about 4 MB a second of flight, 0.5 GB for two minutes" in sensors_words(tmp_path)
+
+
+def test_a_death_that_can_not_be_written_is_kept(tmp_path):
+    (tmp_path / "run").mkdir()
+    record = DeathRecord(tmp_path / "run/deaths.jsonl")
+    (tmp_path / "run/deaths.jsonl").unlink()
+    (tmp_path / "run").rmdir()
+    record.add(Death("zed_depth", "gone", 1.0))
+    assert [death.name for death in record.all] == ["zed_depth"]
 
 
 def test_deaths_are_written_at_once_and_a_cut_line_is_left_out(tmp_path):

@@ -239,6 +239,20 @@ def test_an_empty_folder(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == OUTPUTS
 
 
+def test_a_folder_that_has_gone_is_told_in_the_verdict(tmp_path):
+    gone = tmp_path / "gone"
+    summary = make_report(facts(gone, faults=[], mission_exit=0))
+    assert "summary.json could not be written: No such file or directory" in summary["problems"]
+    lines = verdict_lines(summary, [], gone)
+    assert lines[1] == "mission accomplished (by its exit code; its own account is lost)"
+    assert "  problem: summary.json could not be written: No such file or directory" in lines
+
+
+def test_what_the_mission_could_not_record_is_a_problem_of_the_flight(folder):
+    (folder / "mission.json").write_text('{"outcome": "degraded", "problems": ["skills.mcap ends early: No space left on device"]}')
+    assert "skills.mcap ends early: No space left on device" in make_report(facts(folder))["problems"]
+
+
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"{", b"[]", b"null", b'"text"'], ids=repr)
 def test_garbage_everywhere(tmp_path, content):
     for name in (RECORD, "mission.json", "route.json", "functional.bag", "bridge.json", "map.ply", "world.ply"):
