@@ -43,6 +43,7 @@ def test_the_behaviour_of_the_page_on_mocks_is_flown_as_it_says(tmp_path: Path) 
     assert "times faster than the clock" in flight.words()
     assert (summary["conformance"]["conforms"], summary["conformance"]["events"]) == (True, len(flight.events()))
     assert f"monitor: all {len(flight.events())} events conform to the models" in flight.words()
+    assert "DecompressionStream" in (flight.out / "report.html").read_text(encoding="utf-8")
     for name in ("timeline.svg", "tree.svg"):
         ET.parse(flight.out / name)  # noqa: S314 - our own
     timeline, mission, run = (json.loads((flight.out / f"{name}.json").read_text()) for name in ("timeline", "mission", "run"))

@@ -29,6 +29,7 @@ SUMMARY = {
     "outcome": "degraded", "reason": "the ZED broke", "landed": True, "duration_s": 60.0, "distance_m": 60.0, "collisions": 0,
     "recovery": {"failure_s": 29.9, "detected_s": 30.0, "fallback_running_s": 30.5, "moving_again_s": 34.0},
     "lift_off": {"stamp_s": LIFT_OFF_S, "source": "simulator"}, "problems": [],
+    "died": [{"name": "zed_depth", "when_s": 29.8, "how": "signal 11"}],
 }  # fmt: skip
 
 
@@ -101,6 +102,7 @@ def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser
     page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
     assert page.text("#headline") == "Mission accomplished in degraded mode"
     assert "The zed was made to fail (dead)." in page.text("#lines")
+    assert "29.80 sThe process zed_depth died: signal 11." in page.text("#lines li")
     steps = page.text(".chain li").split(" | ")
     assert [step.partition("2")[0] for step in steps[:1]] == ["failure"]
     chain = page.text(".chain b").split(" | ")

@@ -154,6 +154,7 @@ function story(run) {
   }
   if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, "The fallback watches: the flight is safe again.", "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
+  for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
   for (const act of run.operator) say(act.t, `The operator: ${act.command}.`);
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
