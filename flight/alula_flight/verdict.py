@@ -31,13 +31,22 @@ def landed(summary: Mapping[str, Any]) -> str:
     return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
 
 
-def outcome_words(summary: Mapping[str, Any]) -> str:
-    """Return how the mission ended, in words; where its files are lost, by the exit code of its process."""
-    outcome = summary.get("outcome")
-    code = summary.get("mission_exit")
-    if outcome is None and code in BY_EXIT_CODE:
+def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> str:
+    """Return how the mission ended, in words; where its files are lost, by the exit code of its process, or by what died."""
+    outcome, code, reason = summary.get("outcome"), summary.get("mission_exit"), summary.get("reason")
+    if outcome is not None:
+        return MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")
+    if code in BY_EXIT_CODE and all(death.respawned for death in died):  # else it may be the supervisor's
         return f"{MEANING[BY_EXIT_CODE[code]]} (by its exit code; its own account is lost)"
-    return MEANING.get(str(outcome), f"outcome: {outcome}")
+    names = ", ".join(dict.fromkeys(death.name for death in died))
+    return f"the mission came to no outcome: {f'{names} died' if names else 'the run ended early'}; {out / 'logs'} tells why"
+
+
+def death_lines(died: Sequence[Death]) -> list[str]:
+    """Return how each process died the last time, and how often it did."""
+    last = {death.name: death for death in died}
+    times = {name: sum(death.name == name for death in died) for name in last}
+    return [f"  {death.sentence()}" + (f" ({times[name]} times in all)" if times[name] > 1 else "") for name, death in last.items()]
 
 
 def flight_lines(summary: Mapping[str, Any]) -> list[str]:
@@ -97,10 +106,11 @@ def conformance_lines(found: Mapping[str, Any]) -> list[str]:
 
 def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
     """Return the verdict, a line each."""
-    reason = summary.get("reason")
-    lines = ["", outcome_words(summary) + (f": {reason}" if reason else "")]
-    lines += [f"  {death.sentence()}" for death in died]
-    lines += mock_lines(summary) if summary.get("mock") else flight_lines(summary)
+    lines = ["", outcome_words(summary, died, out), *death_lines(died)]
+    if summary.get("mock"):
+        lines += mock_lines(summary)
+    elif summary.get("outcome") is not None or summary.get("distance_m") is not None:  # else there are no figures
+        lines += flight_lines(summary)
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:
         failure = recovery["failure_s"]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from alula_flight.deaths import Death
 from alula_flight.verdict import verdict_lines
 
 LATER = {"detected_s": 40.5, "fallback_running_s": None, "moving_again_s": None}
@@ -25,3 +26,30 @@ def test_what_failed_is_named(injected, video, told, tmp_path: Path):
     summary = {"outcome": "degraded", "mock": MOCK, "video": video, "injected": injected, "recovery": {"failure_s": 40.0, **LATER}}
     lines = verdict_lines(summary, [], tmp_path)
     assert f"  recovery: {told}, detected 0.50 s later" in lines
+
+
+OUT = Path("/runs/one")
+
+
+def test_a_flight_whose_nodes_all_died_names_them_and_their_logs() -> None:
+    died = [Death("uav_simulator", "exit code 1", None)]
+    died += [Death("zed_depth", "exit code 1", None, respawned=True) for _ in range(3)]
+    lines = verdict_lines({"outcome": None, "mission_exit": 1, "landed": None, "collisions": None}, died, OUT)
+    assert lines == [
+        "",
+        "the mission came to no outcome: uav_simulator, zed_depth died; /runs/one/logs tells why",
+        "  uav_simulator died (exit code 1)",
+        "  zed_depth died (exit code 1); it was started again (3 times in all)",
+    ]
+
+
+def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
+    summary = {"outcome": None, "landed": False, "duration_s": 12.0, "distance_m": 9.0}
+    lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)
+    assert lines[1] == "the mission came to no outcome: mission died; /runs/one/logs tells why"
+    assert lines[3].startswith("  landed: no, duration 12.0 s")
+
+
+def test_an_outcome_is_told_with_its_reason() -> None:
+    summary = {"outcome": "given_up", "reason": "no sensor left", "landed": True}
+    assert verdict_lines(summary, [], OUT)[1] == "mission given up: no sensor left"
