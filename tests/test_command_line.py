@@ -38,6 +38,7 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["new", "robot", "Small-Rover"], "Small-Rover"),
         (["conform", "no/such/run"], "no/such/run"),
         (["expect", "no/such/run"], "no/such/run"),
+        (["compare", "no/such/run", "no/such/run"], "no/such/run"),
         (["campaign", "no/such/file.yaml"], "no/such/file.yaml"),
         (["bridge", "--config", "no/such/file.yaml"], "no/such/file.yaml"),
     ],

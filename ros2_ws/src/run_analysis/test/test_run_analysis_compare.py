@@ -1,0 +1,80 @@
+"""Runs side by side: the same flight twice is alike, a failure is told at the first decision that it changes, many make distributions."""
+
+from __future__ import annotations
+
+import json
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from alula_common.faults import parse_fault
+from run_analysis.compare import main
+from run_analysis.comparing.telling import spread
+from run_analysis.mock_flights import load_flights
+from skill_runtime.core.events import event_record
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    flights, base, found = load_flights("mapping"), tmp_path_factory.mktemp("runs"), {}
+    for name, fault in (("nominal", ""), ("again", ""), ("zed-fails", "zed@30")):
+        flown = flights.fly([parse_fault(fault)] if fault else [])
+        folder = found[name] = base / name
+        folder.mkdir()
+        lines = "".join(json.dumps(event_record(event)) + "\n" for event in flown.events)
+        (folder / "events.jsonl").write_text(lines, encoding="utf-8")
+        (folder / "mission.json").write_text(json.dumps({"outcome": flown.end.outcome.value}), encoding="utf-8")
+    summary = {"duration_s": 100.0, "recovery": {"failure_s": 30.0, "detected_s": 30.5}, "map": {"coverage": 0.9}, "video": None}
+    (found["zed-fails"] / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    return found
+
+
+def test_the_same_flight_twice_is_decided_alike(folders, capsys):
+    assert main([str(folders["nominal"]), str(folders["again"])]) == 0
+    assert "decided alike: " in capsys.readouterr().out
+
+
+def test_another_flight_is_told_with_its_first_other_decision_and_its_figures(folders, capsys, tmp_path):
+    picture = tmp_path / "c.svg"
+    assert main([*(str(folders[name]) for name in ("nominal", "again", "zed-fails")), "--svg", str(picture)]) == 1
+    said = capsys.readouterr().out
+    assert "interrupt navigation.goto_straight at 30.3" in said
+    assert said.splitlines()[0].split() == ["nominal", "again", "zed-fails"]
+    assert any(line.split()[-1] == "0.500" for line in said.splitlines() if line.startswith("detected after (s)"))
+    text = "".join(ET.parse(picture).getroot().itertext())  # noqa: S314 - our own
+    assert "zed-fails: degraded" in text
+    assert "perception.lidar_depthmap" in text
+
+
+def test_json_has_every_figure_and_decision(folders, capsys):
+    assert main([str(folders["nominal"]), str(folders["zed-fails"]), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["alike"], [side["outcome"] for side in told["runs"]]) == (False, ["accomplished", "degraded"])
+    assert told["runs"][1]["figures"]["map coverage"] == 0.9
+    assert told["runs"][0]["decisions"][0]["what"] == "start navigation.takeoff"
+    at = told["differs_at"][0]
+    assert told["runs"][0]["decisions"][:at] != told["runs"][1]["decisions"][: at + 1]
+    assert told["distributions"]["duration"]["min"] == 100.0
+
+
+def test_many_runs_are_told_as_distributions(folders, capsys, tmp_path):
+    picture = tmp_path / "c.svg"
+    assert main([*([str(folders["nominal"])] * 6), str(folders["zed-fails"]), "--svg", str(picture)]) == 1
+    said = capsys.readouterr().out
+    assert said.splitlines()[0].split() == ["7", "runs", "min", "median", "p95", "max"]
+    assert "outcomes: 6 accomplished, 1 degraded" in said
+    assert "7 runs; a stroke a run" in "".join(ET.parse(picture).getroot().itertext())  # noqa: S314 - our own
+
+
+@pytest.mark.parametrize(("values", "p95"), [([3.0], 3.0), (list(range(1, 101)), 95), (list(range(1, 21)), 19), ([1, 2, 3], 3)])
+def test_the_95th_percentile_is_what_95_in_100_do_not_exceed(values, p95):
+    assert spread(values)["p95"] == p95
+
+
+def test_what_can_not_be_compared_is_refused(folders, capsys, tmp_path):
+    assert main([str(folders["nominal"]), str(tmp_path)]) == 2
+    assert "is no run and no bag" in capsys.readouterr().err
+    assert main([str(folders["nominal"]), str(folders["again"]), "--svg", str(tmp_path / "x.none")]) == 2
+    assert "alula compare: " in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        main([str(folders["nominal"])])
