@@ -68,6 +68,18 @@ def bench(monkeypatch):
     return SimpleNamespace(service=service, calls=calls, ask=ask, run_for=run_for, answers=answers, now=now)
 
 
+def test_what_is_withdrawn_is_not_asked_again_and_answers_nobody(bench):
+    withdraw = bench.calls.call("a", lambda *_: bench.answers.append("a"), bench.answers.append, timeout_s=60.0, once=False)
+    bench.ask("b", timeout_s=60.0)
+    withdraw()
+    bench.run_for(3 * (AGAIN_S + LOOK_S))
+    assert [future.request for future in bench.service.sent].count("a") == 1
+    assert [future.request for future in bench.service.sent].count("b") > 1
+    bench.service.sent[0].answer("late")
+    withdraw()
+    assert bench.answers == []
+
+
 def test_an_answer_comes_once_and_with_the_number_of_tries(bench):
     bench.ask("a")
     bench.run_for(AGAIN_S + LOOK_S + 0.1)

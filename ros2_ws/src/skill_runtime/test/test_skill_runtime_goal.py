@@ -207,6 +207,19 @@ def test_nothing_is_cancelled_at_managers_that_are_others(graph, client):
     assert handle.state is S.FAILED
 
 
+def test_a_goal_that_was_given_up_on_its_way_is_cancelled_at_managers_that_were_started_anew(graph, client):
+    handle = client.start("takeoff", height=3.0)
+    graph.run_for(ACKNOWLEDGE_S + 0.1)
+    assert handle.state is S.FAILED
+    graph.sign("two")
+    graph.states("two", sdk="AVAILABLE")
+    graph.tell("two", handle, S.REQUESTED)
+    assert graph.link.cancelled == [handle.id]
+    graph.tell("two", handle, S.INTERRUPTED)
+    graph.tell("two", handle, S.INTERRUPTED, sequence=9)
+    assert graph.link.cancelled == [handle.id]
+
+
 def test_managers_that_were_started_anew_do_not_know_what_runs(graph, client):
     handle = running(graph, client)
     graph.sign("two")

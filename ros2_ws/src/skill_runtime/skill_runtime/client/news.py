@@ -20,7 +20,6 @@ from skill_runtime.middleware import (
     EVENTS,
     RESOURCE_STATES,
     SKILL_STATES,
-    ActionLink,
     Ending,
     Middleware,
     ResourceStates,
@@ -54,7 +53,7 @@ class ClientNews:
         self._middleware = middleware
         self._lock = threading.Lock()
         self._open: dict[str, GoalTracker] = {}
-        self._orphans: dict[str, ActionLink] = {}
+        self._orphans: dict[str, GoalTracker] = {}
         self._pending: WeakSet[Pending[Any]] = WeakSet()
         self._last_event = self._last_transition = 0
         self.connection.subscriptions = [
@@ -77,7 +76,7 @@ class ClientNews:
         with self._lock:
             self._open.pop(tracker.handle.id, None)
             if orphan:
-                self._orphans[tracker.handle.id] = tracker.link
+                self._orphans[tracker.handle.id] = tracker
         if not orphan:
             tracker.link.release(tracker.handle.id)
 
@@ -147,11 +146,11 @@ class ClientNews:
     def _follow_event(self, event: ExecutionEvent, life: str) -> None:
         if event.state.terminal:
             self._keep_last(event.skill, event.stamp_ns, event)
-            link = self._orphans.pop(event.id, None)
-            if link is not None:
-                link.release(event.id)
+            orphan = self._orphans.pop(event.id, None)
+            if orphan is not None:
+                orphan.link.release(event.id)
         elif event.id in self._orphans:
-            self._orphans[event.id].cancel(event.id)
+            self._orphans[event.id].link.cancel(event.id)
         tracker = self._open.get(event.id)
         if tracker is not None:
             tracker.on_event(event, life, self._last_transition)
@@ -176,7 +175,11 @@ class ClientNews:
         """Forget what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
         self.last.clear()
-        self._orphans.clear()
+        # A goal that nobody has acknowledged may still be on its way, also to managers that were started anew.
+        ended = [tracker for tracker in self._orphans.values() if tracker.life]
+        for tracker in ended:
+            del self._orphans[tracker.handle.id]
+            tracker.link.release(tracker.handle.id)
         for tracker in self._trackers():
             if tracker.life:
                 tracker.abandon(f"the managers of {self.skillset} were started anew and do not know this execution")
@@ -185,8 +188,8 @@ class ClientNews:
         self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life", orphans=True)
 
     def _cancel_orphans(self) -> None:
-        for goal_id, link in list(self._orphans.items()):
-            link.cancel(goal_id)
+        for goal_id, tracker in list(self._orphans.items()):
+            tracker.link.cancel(goal_id)
 
     def _ask_endings(self) -> None:
         """Make good for events that got lost."""

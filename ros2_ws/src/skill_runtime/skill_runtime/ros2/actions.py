@@ -25,7 +25,7 @@ from skill_runtime.ros2.convert import fields_of, fill, ros_types, values_of
 from skill_runtime.ros2.names import SERVICE
 
 if TYPE_CHECKING:
-    from skill_runtime.ros2.calls import Calls
+    from skill_runtime.ros2.calls import Calls, Withdraw
     from skill_runtime.ros2.middleware import RclpyMiddleware
 
 ID_DIGITS = 12
@@ -140,6 +140,7 @@ class RclpyLink:
         self._listener = listener
         self._lock = threading.Lock()
         self._goals: dict[str, Any] = {}
+        self._offers: dict[str, Withdraw] = {}
         place = f"skill/{skill}/_action"
         self._send = middleware.calls(f"{place}/send_goal", action.Impl.SendGoalService)
         self._follow = middleware.resting_subscription(f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback)
@@ -178,12 +179,13 @@ class RclpyLink:
             self._follow(True)
 
         def answered(response: Any, tries: int) -> None:
+            self._offers.pop(goal_id, None)
             # Who is offered a goal twice refuses the second offer; the first may have been taken.
             if response.accepted or tries == 1:
                 on_answer(bool(response.accepted))
 
         request = self._action.Impl.SendGoalService.Request(goal_id=identifier, goal=goal)
-        self._send.call(request, answered, _nothing, timeout_s=GOAL_S, once=False)
+        self._offers[goal_id] = self._send.call(request, answered, _nothing, timeout_s=GOAL_S, once=False)
         _ = self._cancels  # met by the time that it is wanted
 
     def cancel(self, goal_id: str) -> None:
@@ -216,7 +218,10 @@ class RclpyLink:
         self._results.call(self._action.Impl.GetResultService.Request(goal_id=identifier), answered, _nothing, timeout_s=GOAL_S, once=True)
 
     def release(self, goal_id: str) -> None:
-        """Follow a goal no more."""
+        """Follow a goal no more, and offer it to nobody: managers that were started anew would take it for a new one."""
+        withdraw = self._offers.pop(goal_id, None)
+        if withdraw is not None:
+            withdraw()
         with self._lock:
             self._goals.pop(goal_id, None)
             if not self._goals:

@@ -24,6 +24,7 @@ QUEUE = 10_000
 """So many may wait; one more is refused at once."""
 LOOK_S = 0.25
 Later = Callable[[float, Job], Timer]
+Withdraw = Callable[[], object]
 
 
 @dataclass(eq=False)
@@ -63,18 +64,20 @@ class Calls:
         """Tell whether somebody serves the service."""
         return not self._closed and bool(self._client.service_is_ready())
 
-    def call(self, request: Any, on_reply: OnReply, on_error: OnError, *, timeout_s: float, once: bool) -> None:
-        """Ask; either ``on_reply`` or ``on_error`` is called, once."""
+    def call(self, request: Any, on_reply: OnReply, on_error: OnError, *, timeout_s: float, once: bool) -> Withdraw:
+        """Ask; either ``on_reply`` or ``on_error`` is called, once. The return value ends that: nobody is asked again or told."""
+        call = _Call(request, on_reply, on_error, timeout_s, once, time.monotonic())
         with self._lock:
             full = len(self._waiting) >= QUEUE
             if not full and not self._closed:
-                self._waiting.append(_Call(request, on_reply, on_error, timeout_s, once, time.monotonic()))
+                self._waiting.append(call)
         if full or self._closed:
             why = f"{QUEUE} requests wait for it already" if full else "this client was closed"
             on_error(f"service {self._client.srv_name}: {why}")
-            return
-        self._pump()
-        self._look_later()
+        else:
+            self._pump()
+            self._look_later()
+        return lambda: self._close(call)
 
     def close(self) -> None:
         """Ask nothing more."""
