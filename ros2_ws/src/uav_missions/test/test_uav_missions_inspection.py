@@ -78,6 +78,10 @@ def test_from_the_stream_s_failure_to_hover_takes_less_than_a_second():
     assert 0 < stamps["hover", "RUNNING"] - stamps["stream", "RESOURCE_INVARIANT_VIOLATED"] < 1e9
 
 
+def test_a_degraded_radio_ends_nothing():
+    assert fly("radio:degraded@40").end.outcome is Outcome.ACCOMPLISHED
+
+
 def test_a_short_loss_of_the_radio_is_forgiven():
     mission = fly("radio@40-40.5")
     assert mission.end.outcome is Outcome.ACCOMPLISHED
