@@ -126,8 +126,10 @@ class RecordFollower:
         self._offset = 0
         self._channels: dict[int, Channel] = {}
 
-    def poll(self) -> list[Entry]:
+    def poll(self, limit: int | None = None) -> list[Entry]:
         """Return the entries that came since the last call; none while there is no file.
+
+        ``limit``: stop behind the record with which there are so many; the next call goes on there.
 
         Raises:
             RecordError: the file is no MCAP.
@@ -138,7 +140,12 @@ class RecordFollower:
             if self._offset == 0 and not self._begin(file):
                 return []
             file.seek(self._offset)
-            return [entry for record in self._records(file) for entry in self._entries(record)]
+            entries: list[Entry] = []
+            for record in self._records(file):
+                entries += self._entries(record)
+                if limit is not None and len(entries) >= limit:
+                    break
+            return entries
 
     def _begin(self, file: BinaryIO) -> bool:
         magic = file.read(len(MAGIC))

@@ -13,6 +13,8 @@ from mission_console.entries import written
 from mission_console.following import RunFollower
 
 POLL_S = 0.1
+READ_ENTRIES = 1000
+"""Read at once; a record of hours comes in pieces, so that viewers see its beginning, and memory holds one piece."""
 CHUNK_BYTES = 1 << 19
 """A message ends with the entry that makes it longer than this."""
 
@@ -48,11 +50,11 @@ class Feed:
         """Read what comes, until cancelled; viewers that wait for ``changed`` hear of it."""
         while True:
             self.add(await asyncio.to_thread(self.read))
-            await asyncio.sleep(POLL_S)
+            await asyncio.sleep(0 if self._follower.behind else POLL_S)
 
     def read(self) -> list[tuple[str, float | None, str]]:
         """Return what came since the last call: topic, seconds of mission clock, and the entry as JSON."""
-        return [(topic, t_s, written((topic, t_s, value))) for topic, t_s, value in self._follower.poll()]
+        return [(topic, t_s, written((topic, t_s, value))) for topic, t_s, value in self._follower.poll(READ_ENTRIES)]
 
     def add(self, entries: Iterable[tuple[str, float | None, str]]) -> None:
         """Add entries, and wake the viewers if there were any."""

@@ -19,6 +19,7 @@ class RunFollower:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.problems: list[str] = []
+        self.behind = False
         self._converter = Converter()
         self._record = RecordFollower(folder / FILE)
         self._journal = JournalFollower(folder)
@@ -30,9 +31,12 @@ class RunFollower:
         ]
         self._seen: dict[Path, tuple[int, int]] = {}
 
-    def poll(self) -> list[Wire]:
-        """Return what came since the last call, what belongs to the whole run first."""
-        return [*self._changed_files(), *self._new_entries()]
+    def poll(self, limit: int | None = None) -> list[Wire]:
+        """Return what came since the last call, what belongs to the whole run first.
+
+        ``limit``: read so many entries of the record at most; ``behind`` says then that there may be more.
+        """
+        return [*self._changed_files(), *self._new_entries(limit)]
 
     def _changed_files(self) -> Iterator[Wire]:
         for path, topic, read in self._files:
@@ -48,13 +52,14 @@ class RunFollower:
             except (OSError, ValueError, TypeError, CloudError) as error:
                 self._note(f"{path.name}: {error}")
 
-    def _new_entries(self) -> list[Wire]:
+    def _new_entries(self, limit: int | None) -> list[Wire]:
         entries: list[Entry] = []
-        for source in (self._record, self._journal):
-            try:
-                entries += source.poll()
-            except (RecordError, OSError) as error:
-                self._note(str(error))
+        try:
+            entries += self._record.poll(limit)
+            self.behind = limit is not None and len(entries) >= limit
+            entries += self._journal.poll()
+        except (RecordError, OSError) as error:
+            self._note(str(error))
         if self._record.broken:
             self._note(f"{FILE}: {self._record.broken}")
         return [wire for entry in entries for wire in self._converter.convert(entry)]

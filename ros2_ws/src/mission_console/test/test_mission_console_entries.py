@@ -128,6 +128,15 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     assert follower.problems == []
 
 
+def test_a_long_record_is_read_in_pieces(tmp_path: Path) -> None:
+    write_record(tmp_path, [(float(number), EVENTS, {"number": number}) for number in range(25)])
+    follower, read = RunFollower(tmp_path), []
+    while piece := follower.poll(10):
+        read.append((len(piece), follower.behind))
+    assert read == [(10, True), (10, True), (5, False)]
+    assert len(RunFollower(tmp_path).poll()) == 25
+
+
 def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) -> None:
     write_record(tmp_path, failing_story())
     for name, content in (
