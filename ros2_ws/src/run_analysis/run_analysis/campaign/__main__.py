@@ -69,7 +69,7 @@ class Teller:
 def finish(table: Table, out: Path, title: str) -> Coverage:
     """Order the table and write the coverage beside it."""
     table.finish()
-    coverage = cover(table.rows.values(), ways_to_fail(drone(), processes()))
+    coverage = cover([table.rows[number] for number in sorted(table.rows)], ways_to_fail(drone(), processes()))
     write_json(out / "coverage.json", coverage.as_dict())
     write_text(out / "coverage.txt", as_text(coverage))
     write_text(out / "coverage.html", as_page(coverage, title))
