@@ -178,9 +178,12 @@ class LiveStage:
         found = self.until(lambda: all(client.ready for client in self.clients), PATIENCE_S)
         assert found, f"clients do not find the managers: {[what_is_known(client) for client in self.clients if not client.ready]}"
         for resource, state in FLYING.items():
-            asked = self.clients[0].transition(resource, state)
-            assert asked.wait(PATIENCE_S)
-            assert not asked.failure, asked.failure
+            assert self.until(lambda r=resource, s=state: self._taken(r, s), PATIENCE_S), f"{resource} does not get {state}"  # type: ignore[misc]
+
+    def _taken(self, resource: str, state: str) -> bool:
+        """Take a transition; a client that has just doubted slow managers is asked again."""
+        asked = self.clients[0].transition(resource, state)
+        return bool(asked.wait(PATIENCE_S)) and not asked.failure
 
 
 def what_is_known(client: Any) -> dict[str, object]:

@@ -40,6 +40,7 @@ def ros2() -> Iterator[LiveGraph]:
 
     rclpy.init()
     executors: list[Any] = []
+    threads: list[threading.Thread] = []
 
     def make_client() -> Any:
         """Return a client with a node, an executor and a thread of its own."""
@@ -47,7 +48,8 @@ def ros2() -> Iterator[LiveGraph]:
         client = SkillsetClient(node, "navigation")
         executors.append(SingleThreadedExecutor())
         executors[-1].add_node(node)
-        threading.Thread(target=spin, args=(executors[-1],), daemon=True).start()
+        threads.append(threading.Thread(target=spin, args=(executors[-1],), daemon=True))
+        threads[-1].start()
         return client
 
     graph = LiveGraph("ros2", make_client)
@@ -55,6 +57,8 @@ def ros2() -> Iterator[LiveGraph]:
     graph.close()
     for executor in executors:
         executor.shutdown(timeout_sec=5.0)
+    for thread in threads:
+        thread.join(5.0)
     rclpy.try_shutdown()
     claim.release()
 
