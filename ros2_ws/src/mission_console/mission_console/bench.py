@@ -28,8 +28,6 @@ from alula_common.files import write_json
 from alula_common.network import free_port
 from alula_common.record import DATA, EVENTS, FILE, TREE, RecordWriter
 
-SETTLE_S = 2.0
-
 
 @dataclass(frozen=True)
 class Figures:
@@ -96,14 +94,20 @@ async def viewer(port: int) -> ClientConnection:
     return socket
 
 
-async def catch_up(port: int, last_s: float) -> float:
-    """Return how long a new viewer waits until it has the run up to ``last_s``, seconds of mission clock."""
+async def caught_up(port: int, last_s: float) -> ClientConnection:
+    """Connect, and return when the run up to ``last_s``, seconds of mission clock, has come."""
+    socket = await viewer(port)
+    while True:
+        entries = json.loads(await socket.recv()).get("entries", [])
+        if any(t_s is not None and t_s >= last_s for _, t_s, _ in entries):
+            return socket
+
+
+async def wait_for_all(port: int, last_s: float) -> float:
+    """Return how long a viewer waits until it has the run up to ``last_s``."""
     begun = time.perf_counter()
-    async with await viewer(port) as socket:
-        while True:
-            entries = json.loads(await socket.recv()).get("entries", [])
-            if any(t_s is not None and t_s >= last_s for _, t_s, _ in entries):
-                return time.perf_counter() - begun
+    await (await caught_up(port, last_s)).close()
+    return time.perf_counter() - begun
 
 
 async def listen(socket: ClientConnection, ages_s: list[float]) -> None:
@@ -115,24 +119,26 @@ async def listen(socket: ClientConnection, ages_s: list[float]) -> None:
                 ages_s.append(now - value["sent"])
 
 
-async def live(port: int, writer: RecordWriter, *, begin_s: float, seconds: float, rate_hz: float, viewers: int, nodes: int) -> list[float]:
-    """Write a run that goes on while viewers listen; return how old entries were."""
+async def live(
+    server: psutil.Process, port: int, writer: RecordWriter, last_s: float, options: argparse.Namespace
+) -> tuple[float, list[float]]:
+    """Write a run that goes on while viewers listen; return the server's part of a core, and how old entries were."""
     ages_s: list[float] = []
-    sockets = [await viewer(port) for _ in range(viewers)]
+    sockets = [await caught_up(port, last_s) for _ in range(options.viewers)]
     hung = await viewer(port)  # never reads
     listening = [asyncio.create_task(listen(socket, ages_s)) for socket in sockets]
-    await asyncio.sleep(SETTLE_S)
-    ages_s.clear()
-    begun = time.monotonic()
-    for number in range(round(seconds * rate_hz)):
-        topic, value = entry(number, begin_s + number / rate_hz, nodes)
-        writer.write(topic, round((begin_s + number / rate_hz) * 1e9), {**value, "sent": time.time()})
-        await asyncio.sleep(max(0.0, begun + (number + 1) / rate_hz - time.monotonic()))
+    begun, before_s = time.monotonic(), sum(server.cpu_times()[:2])
+    for number in range(round(options.seconds * options.rate)):
+        t_s = options.hours * 3600 + number / options.rate
+        topic, value = entry(number, t_s, options.nodes)
+        writer.write(topic, round(t_s * 1e9), {**value, "sent": time.time()})
+        await asyncio.sleep(max(0.0, begun + (number + 1) / options.rate - time.monotonic()))
+    core = (sum(server.cpu_times()[:2]) - before_s) / (time.monotonic() - begun)
     for task in listening:
         task.cancel()
     for socket in [*sockets, hung]:
         socket.transport.abort()
-    return ages_s
+    return core, ages_s
 
 
 def measure(folder: Path, options: argparse.Namespace) -> Figures:
@@ -147,20 +153,9 @@ def measure(folder: Path, options: argparse.Namespace) -> Figures:
             if server.stdout is None or not server.stdout.readline():
                 raise OSError("the server did not start")
             last_s = (entries - 10) / 5  # samples behind that may be thinned out
-            read_s, caught_up_s = (asyncio.run(catch_up(port, last_s)) for _ in range(2))
+            read_s, caught_up_s = (asyncio.run(wait_for_all(port, last_s)) for _ in range(2))
             process = psutil.Process(server.pid)
-            before, begun = sum(process.cpu_times()[:2]), time.monotonic()
-            story = live(
-                port,
-                writer,
-                begin_s=options.hours * 3600,
-                seconds=options.seconds,
-                rate_hz=options.rate,
-                viewers=options.viewers,
-                nodes=options.nodes,
-            )
-            ages_s = asyncio.run(story)
-            core = (sum(process.cpu_times()[:2]) - before) / (time.monotonic() - begun)
+            core, ages_s = asyncio.run(live(process, port, writer, last_s, options))
             rss_mb = process.memory_info().rss / 1e6
         finally:
             server.terminate()

@@ -253,6 +253,10 @@ def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(browser
         console.start()
         page.wait("document.querySelector('#link').dataset.state !== 'stale'")
         page.wait("document.querySelector('#headline').textContent === 'Mission accomplished in degraded mode'")
+        assert "made to fail" not in page.text("#lines")
+        (folder / "summary.json").write_text(json.dumps({**SUMMARY, "injected": [{"sensor": "zed", "mode": "dead", "t_s": 29.9}]}))
+        page.wait("document.querySelector('#lines').textContent.includes('The zed was made to fail (dead).')")
+        assert page.text(".chain b").startswith("failure | resource | invariant")
     writer.close()
     assert [line for line in page.complaints() if "WebSocket connection" not in line and "ERR_" not in line] == []
 

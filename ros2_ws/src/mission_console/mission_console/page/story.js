@@ -53,13 +53,19 @@ function failures(run) {
     .sort((one, other) => one.end - other.end);
 }
 
+/** What was made to fail: live nobody tells before the summary does. */
+function faultsOf(run) {
+  if (run.faults.length) return run.faults;
+  return (run.facts["/summary"]?.injected ?? []).filter(({ t_s: since }) => since !== null).map(({ sensor, mode, t_s: since }) => ({ sensor, mode, t: origin(run) + since }));
+}
+
 /** A failure's chain of causes: [{step, t, text}], from the measurement to what the tree did. */
 function chainOf(run, failure) {
   const chain = [];
   const add = (step, t, text) => chain.push({ step, t, text });
   const change = blamed(run, failure);
   const sensor = change ? change.resource.replace(/_status$/, "") : "";
-  const fault = run.faults.findLast((entry) => entry.t <= failure.end + APART_S && entry.mode !== "ok" && (entry.sensor === sensor || failure.message.includes(entry.sensor)));
+  const fault = faultsOf(run).findLast((entry) => entry.t <= failure.end + APART_S && entry.mode !== "ok" && (entry.sensor === sensor || failure.message.includes(entry.sensor)));
   if (fault) add("failure", fault.t, `${fault.sensor}: ${fault.mode} (injected)`);
   const measured = measurement(run, failure, sensor);
   if (measured) add("measurement", measured.t, measured.text);
@@ -142,7 +148,7 @@ function story(run) {
   const recovery = run.facts["/summary"]?.recovery;
   const zero = origin(run);
   if (run.departure !== null) say(run.departure, "Lift-off.");
-  for (const fault of run.faults) say(fault.t, fault.mode === "ok" ? `The ${fault.sensor} works again.` : `The ${fault.sensor} was made to fail (${fault.mode}).`, "bad");
+  for (const fault of faultsOf(run)) say(fault.t, fault.mode === "ok" ? `The ${fault.sensor} works again.` : `The ${fault.sensor} was made to fail (${fault.mode}).`, "bad");
   for (const failure of failures(run)) {
     const chain = chainOf(run, failure);
     const branch = chain.find(({ step }) => step === "decision");
@@ -184,7 +190,7 @@ function costs(run) {
 function marks(run) {
   const zero = origin(run);
   const recovery = run.facts["/summary"]?.recovery;
-  const found = run.faults.filter(({ mode }) => mode !== "ok").map((fault) => ({ t: fault.t, kind: "failure", label: `${fault.sensor} fails` }));
+  const found = faultsOf(run).filter(({ mode }) => mode !== "ok").map((fault) => ({ t: fault.t, kind: "failure", label: `${fault.sensor} fails` }));
   if (recovery) {
     const moments = { detected: "detected", fallback_running: "fallback runs", moving_again: "moves again" };
     if (!found.length && recovery.failure_s != null) found.push({ t: zero + recovery.failure_s, kind: "failure", label: "failure" });
