@@ -3,21 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from alula_common.flight_limits import FLIGHT_LIMITS
 
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """What a request may ask for: metres, metres and radians per second, seconds."""
-
-    max_speed_m_s: float = 3.0
-    max_rate_rad_s: float = 1.5
-    max_height_m: float = 20.0
-    fence_radius_m: float = 60.0
-    max_duration_s: float = 600.0
-
-
-DEFAULT_LIMITS = Limits()
+MAX_DURATION_S = 600.0
 
 
 def check_between(name: str, value: float, low: float, high: float, unit: str) -> str:
@@ -29,36 +18,36 @@ def check_between(name: str, value: float, low: float, high: float, unit: str) -
     return ""
 
 
-def check_takeoff(*, height_m: float, speed_m_s: float, limits: Limits = DEFAULT_LIMITS) -> str:
+def check_takeoff(*, height_m: float, speed_m_s: float) -> str:
     """Refuse a height outside the fence or a speed that the vehicle must not fly."""
-    return check_between("height", height_m, 0.0, limits.max_height_m, "m") or check_between(
-        "speed", speed_m_s, 0.0, limits.max_speed_m_s, "m/s"
+    return check_between("height", height_m, 0.0, FLIGHT_LIMITS.fence_height_m, "m") or check_between(
+        "speed", speed_m_s, 0.0, FLIGHT_LIMITS.max_speed_m_s, "m/s"
     )
 
 
-def check_target(*, target_enu_m: tuple[float, float, float], speed_m_s: float, limits: Limits = DEFAULT_LIMITS) -> str:
+def check_target(*, target_enu_m: tuple[float, float, float], speed_m_s: float) -> str:
     """Refuse a target that is surely outside the fence (the guidance knows home and checks it exactly), or a speed too high."""
     x, y, z = target_enu_m
     if not all(math.isfinite(value) for value in target_enu_m):
         return f"target ({x}, {y}, {z}) has a coordinate that is not a finite number"
     radius_m = math.hypot(x, y)
-    if radius_m > limits.fence_radius_m:
-        return f"target ({x:g}, {y:g}, {z:g}) is {radius_m:.1f} m from home; the fence is at {limits.fence_radius_m:g} m"
-    return check_between("target height", z, 0.0, limits.max_height_m, "m") or check_between(
-        "speed", speed_m_s, 0.0, limits.max_speed_m_s, "m/s"
+    if radius_m > FLIGHT_LIMITS.fence_radius_m:
+        return f"target ({x:g}, {y:g}, {z:g}) is {radius_m:.1f} m from home; the fence is at {FLIGHT_LIMITS.fence_radius_m:g} m"
+    return check_between("target height", z, 0.0, FLIGHT_LIMITS.fence_height_m, "m") or check_between(
+        "speed", speed_m_s, 0.0, FLIGHT_LIMITS.max_speed_m_s, "m/s"
     )
 
 
-def check_turn(*, heading_rad: float, rate_rad_s: float, limits: Limits = DEFAULT_LIMITS) -> str:
+def check_turn(*, heading_rad: float, rate_rad_s: float) -> str:
     """Refuse a heading that is no number or a rate that would smear the sensors' measurements."""
     if not math.isfinite(heading_rad):
         return f"heading is {heading_rad}, not a finite number"
-    return check_between("rate", rate_rad_s, 0.0, limits.max_rate_rad_s, "rad/s")
+    return check_between("rate", rate_rad_s, 0.0, FLIGHT_LIMITS.max_yaw_rate_rad_s, "rad/s")
 
 
-def check_duration(*, duration_s: float, limits: Limits = DEFAULT_LIMITS) -> str:
+def check_duration(*, duration_s: float) -> str:
     """Refuse a time that is no number, not positive, or longer than the batteries last."""
-    return check_between("duration", duration_s, 0.0, limits.max_duration_s, "s")
+    return check_between("duration", duration_s, 0.0, MAX_DURATION_S, "s")
 
 
 def check_stream(*, min_fps: float, min_quality: float, patience_s: float) -> str:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from skill_runtime.hooks import SkillHooks
 from uav_skills.calls import Answer, Reply, ignore_answer
-from uav_skills.checks import DEFAULT_LIMITS, Limits
 from uav_skills.decisions import DEFAULT_THRESHOLDS, Thresholds, Verdict, remaining_part, speaks_of
 
 if TYPE_CHECKING:
@@ -57,10 +56,9 @@ class GuidedSkill(SkillHooks):
     stops_when_it_fails: ClassVar[bool] = True
     """Whether any other result tells the vehicle to hover."""
 
-    def __init__(self, guidance: GuidanceApi, limits: Limits = DEFAULT_LIMITS, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
+    def __init__(self, guidance: GuidanceApi, thresholds: Thresholds = DEFAULT_THRESHOLDS) -> None:
         super().__init__()
         self.guidance = guidance
-        self.limits = limits
         self.thresholds = thresholds
         self._motion: Motion | None = None
         self._lock = threading.Lock()

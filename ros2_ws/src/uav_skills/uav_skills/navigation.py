@@ -43,7 +43,7 @@ class Takeoff(GuidedSkill, AbstractTakeoffSkill):  # type: ignore[misc]  # gener
 
     def validate(self, inputs: TakeoffInputs) -> str:
         """Check height and speed."""
-        return checks.check_takeoff(height_m=inputs.height, speed_m_s=inputs.speed, limits=self.limits)
+        return checks.check_takeoff(height_m=inputs.height, speed_m_s=inputs.speed)
 
     def send(self, motion: Motion) -> None:
         """Ask for the climb."""
@@ -69,7 +69,7 @@ class _Flight(GuidedSkill):
     def validate(self, inputs: GotoInputs | GotoStraightInputs) -> str:
         """Check target and speed."""
         target = inputs.target
-        return checks.check_target(target_enu_m=(target.x, target.y, target.z), speed_m_s=inputs.speed, limits=self.limits)
+        return checks.check_target(target_enu_m=(target.x, target.y, target.z), speed_m_s=inputs.speed)
 
     def send(self, motion: Motion) -> None:
         """Give the position reference."""
@@ -117,7 +117,7 @@ class RotateHead(GuidedSkill, AbstractRotateHeadSkill):  # type: ignore[misc]  #
 
     def validate(self, inputs: RotateHeadInputs) -> str:
         """Check heading and rate."""
-        return checks.check_turn(heading_rad=inputs.heading, rate_rad_s=inputs.rate, limits=self.limits)
+        return checks.check_turn(heading_rad=inputs.heading, rate_rad_s=inputs.rate)
 
     def send(self, motion: Motion) -> None:
         """Give the heading reference."""
@@ -174,7 +174,7 @@ class Hover(GuidedSkill, AbstractHoverSkill):  # type: ignore[misc]  # generated
 
     def validate(self, inputs: HoverInputs) -> str:
         """Check the duration."""
-        return checks.check_duration(duration_s=inputs.duration, limits=self.limits)
+        return checks.check_duration(duration_s=inputs.duration)
 
     def send(self, motion: Motion) -> None:
         """Hover."""
@@ -228,8 +228,7 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
     # With a process a skill, all hooks are made in each, but only those of the skill that it serves are called.
     served = getattr(node, "served_skills", tuple(HOOKS))
     guidance = GuidanceApi(node, orphans={HOOKS[skill].reference for skill in served})
-    limits = checks.Limits(**{name: node.declare_parameter(name, value).value for name, value in vars(checks.DEFAULT_LIMITS).items()})
-    return {skill: hooks(guidance, limits) for skill, hooks in HOOKS.items()}
+    return {skill: hooks(guidance) for skill, hooks in HOOKS.items()}
 
 
 def main_navigation() -> None:
