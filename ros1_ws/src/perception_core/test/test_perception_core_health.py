@@ -43,6 +43,25 @@ def test_broken_after_five_seconds_of_nothing() -> None:
     assert run.go(1).changes == [(pytest.approx(5.04, abs=0.03), Verdict.BROKEN)]
 
 
+def test_without_a_driver_it_is_named_for_as_long_as_it_takes_and_five_seconds_begin_with_the_driver() -> None:
+    watch = HealthWatch(HealthLimits())
+    for k in range(1000):
+        assert watch.tick(k * TICK, missing="no images on /left") is Verdict.UNKNOWN
+    assert (watch.fault, watch.reason) == (Fault.SILENT, "no images on /left")
+    verdicts = [watch.tick(k * TICK) for k in range(1000, 1300)]
+    assert verdicts.index(Verdict.BROKEN) == pytest.approx(250, abs=2)
+    assert watch.reason == "nothing received yet"
+
+
+def test_a_driver_that_goes_away_after_it_delivered_is_a_broken_sensor() -> None:
+    watch = HealthWatch(HealthLimits())
+    watch.take(FINE, 0)
+    assert watch.tick(TICK) is Verdict.OK
+    verdicts = [watch.tick(k * TICK, missing="no images on /left") for k in range(2, 30)]
+    assert verdicts[-1] is Verdict.BROKEN
+    assert watch.reason == "no measurement for 0.35 s"
+
+
 @pytest.mark.parametrize("fault", [None, "image is black"])
 def test_broken_within_0_45_s_of_the_last_good_one_and_ok_after_1_s(fault) -> None:
     run = Run(lambda t: fault if 2.0 < t < 4.0 else True).go(6)

@@ -12,7 +12,7 @@ from lidar_mapping.inertial import ATTITUDE, VELOCITY, ImuReading, InertialFilte
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.registration import Registration, RegistrationSettings, refused, register
 from lidar_mapping.voxel_map import downsample
-from perception_core import NS
+from perception_core import NS, Poses, straighten
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -125,21 +125,11 @@ class LidarInertialOdometry:
         """Return the points (N, 3) in the body frame of the filter's moment, each moved from the pose of its own."""
         body = sweep.points @ T_base_lidar[:3, :3].T + T_base_lidar[:3, 3]
         stamps, states = zip(*self.filter.history, strict=True)
-        if len(states) == 1:
-            return body
-        times = sweep.times_s.astype(np.float64) + (sweep.stamp_ns - stamps[0]) / NS
-        knots = (np.array(stamps, dtype=np.int64) - stamps[0]) / NS
-        segment = np.clip(np.searchsorted(knots, times) - 1, 0, len(knots) - 2)
-        # Up to one step beyond the last knot the motion is continued: readings end a little before the sweep does.
-        share = np.clip((times - knots[segment]) / np.diff(knots)[segment], 0.0, 2.0)[:, None]
-        result = np.empty_like(body, dtype=np.float64)
-        for k in np.unique(segment):
-            of_segment = segment == k
-            before = body[of_segment] @ states[k].rotation.T + states[k].position
-            after = body[of_segment] @ states[k + 1].rotation.T + states[k + 1].position
-            result[of_segment] = before + share[of_segment] * (after - before)
+        knots_s = (np.array(stamps, dtype=np.int64) - stamps[0]) / NS
+        times_s = sweep.times_s.astype(np.float64) + (sweep.stamp_ns - stamps[0]) / NS
+        at_knots = Poses(np.array([state.rotation for state in states]), np.array([state.position for state in states]))
         now = self.filter.state
-        straight: Floats = (result - now.position) @ now.rotation
+        straight: Floats = (straighten(body, times_s, knots_s, at_knots) - now.position) @ now.rotation
         return straight
 
     def _locate(self, points: Floats, autopilot: AutopilotMotion | None) -> Registration:

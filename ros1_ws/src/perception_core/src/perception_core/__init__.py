@@ -4,7 +4,7 @@ from perception_core.corridor import Corridor, Motion, Nearest, Support, corrido
 from perception_core.health import FINE, Fault, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
 from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
 from perception_core.stamps import StampJudge, StampLimits
-from perception_core.sweep import Sweep, deskew
+from perception_core.sweep import Sweep, deskew, straighten
 from perception_core.tunable import SettingsError, tunable
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "direction_of_motion",
     "first_trouble",
     "nearest_obstacle",
+    "straighten",
     "tunable",
     "unsure",
 ]

@@ -99,6 +99,7 @@ class HealthWatch:
         self.verdict = Verdict.UNKNOWN
         self.fault = Fault.SILENT
         self.reason = "nothing received yet"
+        self._missing = ""
         self._judged = False  # whether there was another verdict than UNKNOWN
         self._started_ns: int | None = None
         self._last_tick_ns: int | None = None
@@ -126,14 +127,18 @@ class HealthWatch:
         while self._good_ns[0] < arrived_ns - RATE_OVER_S * NS:
             self._good_ns.popleft()
 
-    def tick(self, now_ns: int) -> Verdict:
-        """Return the verdict at this moment; call at 20 Hz or faster. A clock that jumps back by a second starts the watch anew."""
+    def tick(self, now_ns: int, *, missing: str = "") -> Verdict:
+        """Return the verdict at this moment; call at 20 Hz or faster. A clock that jumps back by a second starts the watch anew.
+
+        ``missing`` says what has no driver: as long as nothing was received either, the sensor is not there yet, which is not broken.
+        """
         if self._last_tick_ns is not None and now_ns < self._last_tick_ns - NS:
             self._restart()
         # After a late tick, what arrived meanwhile may still wait in the socket: judge at the next one.
         late = self._last_tick_ns is not None and now_ns - self._last_tick_ns > LATE_TICK_S * NS
         self._last_tick_ns = now_ns
-        self._started_ns = self._started_ns if self._started_ns is not None else now_ns
+        self._missing = missing if self._last_good_ns is None and self._trouble is None else ""
+        self._started_ns = now_ns if self._started_ns is None or self._missing else self._started_ns
         if self._overdue(now_ns):
             if not late:
                 self.verdict = self._verdict_without_good(now_ns)
@@ -182,7 +187,7 @@ class HealthWatch:
         if trouble is not None:
             return trouble.fault, trouble.reason
         if self._last_good_ns is None:
-            return Fault.SILENT, "nothing received yet"
+            return Fault.SILENT, self._missing or "nothing received yet"
         if self._overdue(now_ns):
             return Fault.SILENT, f"no measurement for {self.limits.timeout_s:g} s"
         return self.fault, "recovering"

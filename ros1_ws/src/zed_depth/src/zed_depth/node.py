@@ -62,14 +62,23 @@ class ZedDepthNode:
         self._worker = NewestWorker[StereoPair](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=lambda _enabled: self._rig.rest())
         self._tuning = TunableSettings(settings, self._tune)
-        self._subscribers = [self._subscribe(side) for side in SIDES]
+        self._inputs: dict[str, RawSubscriber[CameraInfo] | RawSubscriber[Image]] = {}
+        for side in SIDES:
+            self._subscribe(side)
+        self._health.missing = self._missing
 
-    def _subscribe(self, side: str) -> tuple[RawSubscriber[CameraInfo], RawSubscriber[Image]]:
-        garbage = self._garbage_of(side)
-        return (
-            RawSubscriber(f"/zed/{side}/camera_info", CameraInfo, lambda m: self._on_info(m, side), garbage, buffer_bytes=INFO_BYTES),
-            RawSubscriber(f"/zed/{side}/image_raw", Image, lambda m: self._on_image(m, side), garbage, buffer_bytes=IMAGE_BYTES),
+    def _subscribe(self, side: str) -> None:
+        garbage, info, image = self._garbage_of(side), f"/zed/{side}/camera_info", f"/zed/{side}/image_raw"
+        self._inputs[f"camera_info on {info}"] = RawSubscriber(
+            info, CameraInfo, lambda m: self._on_info(m, side), garbage, buffer_bytes=INFO_BYTES
         )
+        self._inputs[f"images on {image}"] = RawSubscriber(
+            image, Image, lambda m: self._on_image(m, side), garbage, buffer_bytes=IMAGE_BYTES
+        )
+
+    def _missing(self) -> str:
+        absent = [f"no {what}" for what, subscriber in self._inputs.items() if not subscriber.published]
+        return f"{', '.join(absent)}: no driver publishes there" if absent else ""
 
     def _garbage_of(self, side: str) -> Callable[[str], None]:
         return lambda reason: self._trouble(broken(Fault.FORMAT, f"{side}: {reason}"), rospy.Time.now().to_nsec())

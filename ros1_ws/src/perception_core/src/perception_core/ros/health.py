@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import rospy
 from uav_msgs.msg import SensorHealth
@@ -11,6 +12,9 @@ from perception_core.health import Fault, Finding, HealthLimits, HealthWatch, Ve
 from perception_core.poses import NS
 from perception_core.stamps import StampJudge, StampLimits
 from resource_reporter import ResourceReporter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 TICK_S = 0.02
 PUBLISH_S = 0.1
@@ -21,6 +25,8 @@ class HealthReporter:
     """A health watch driven by a 50 Hz timer on the ROS clock; its methods may be called from any thread."""
 
     def __init__(self, sensor: str, *, resource: str, limits: HealthLimits, stamps: StampLimits) -> None:
+        self.missing: Callable[[], str] = lambda: ""
+        """Says which inputs have no driver; to be set by who subscribes to them."""
         self._sensor = sensor
         self._resource = resource
         self._watch = HealthWatch(limits)
@@ -66,9 +72,9 @@ class HealthReporter:
             return self._watch.reason
 
     def _tick(self, _event: object) -> None:
-        now_ns = rospy.Time.now().to_nsec()
+        now_ns, missing = rospy.Time.now().to_nsec(), self.missing()
         with self._lock:
-            verdict = self._watch.tick(now_ns)
+            verdict = self._watch.tick(now_ns, missing=missing)
             message = self._message(now_ns)
         changed = verdict is not self._told
         self._told = verdict

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -16,8 +17,12 @@ if TYPE_CHECKING:
 
 
 def read_settings(defaults: Settings) -> Settings:
-    """Return the defaults with what the parameter server has under the node's name; raise SettingsError."""
-    return override(defaults, rospy.get_param("~", {}))
+    """Return the defaults with what the parameter server has under the node's name; a wrong value is told, and ends the process with 2."""
+    try:
+        return override(defaults, rospy.get_param("~", {}))
+    except SettingsError as error:
+        rospy.logfatal("%s", error)
+        sys.exit(2)
 
 
 def override(defaults: Settings, given: dict[str, object]) -> Settings:

@@ -59,6 +59,11 @@ class RawSubscriber(Generic[Message]):
     def _subscribe(self) -> rospy.Subscriber:
         return rospy.Subscriber(self._topic, rospy.AnyMsg, self._on_bytes, queue_size=1, buff_size=self._buffer_bytes, tcp_nodelay=True)
 
+    @property
+    def published(self) -> bool:
+        """Whether somebody publishes there."""
+        return bool(self._subscriber.get_num_connections())
+
     def close(self) -> None:
         """End the subscription."""
         with self._lock:
@@ -89,7 +94,7 @@ class RawSubscriber(Generic[Message]):
 
     def _reconnect(self) -> None:
         with self._lock:
-            if self._ended or not self._subscriber.get_num_connections():
+            if self._ended or not self.published:
                 self._heard_s = time.monotonic()
                 return
             self._subscriber.unregister()

@@ -78,8 +78,10 @@ class FakeFlight:
         self._pose = rospy.Publisher("/uav_guidance/pose", PoseStamped, queue_size=100)
         self._state = rospy.Publisher("/uav_guidance/state", GuidanceState, queue_size=10)
         self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
-        self._images = {side: rospy.Publisher(f"/zed/{side}/image_raw", Image, queue_size=10) for side in ("left", "right")}
-        self._infos = {side: rospy.Publisher(f"/zed/{side}/camera_info", CameraInfo, queue_size=10) for side in ("left", "right")}
+        self._images: dict[str, rospy.Publisher] = {}
+        self._infos: dict[str, rospy.Publisher] = {}
+        for side in ("left", "right"):
+            self.start_driver(side)
         self._cloud = rospy.Publisher("/lidar/points", PointCloud2, queue_size=10)
         self._resources = rospy.Publisher("/perception/resource_states", ResourceStates, queue_size=10, latch=True)
         self._transition = rospy.Service("/perception/transition", Transition, self._on_transition)
@@ -105,6 +107,16 @@ class FakeFlight:
             rospy.delete_param("/use_sim_time")
         else:
             rospy.set_param("/use_sim_time", self._sim_time_before)
+
+    def start_driver(self, side: str) -> None:
+        """Advertise the images of one eye, and their infos."""
+        self._images[side] = rospy.Publisher(f"/zed/{side}/image_raw", Image, queue_size=10)
+        self._infos[side] = rospy.Publisher(f"/zed/{side}/camera_info", CameraInfo, queue_size=10)
+
+    def drop_driver(self, side: str) -> None:
+        """Take the images of one eye back."""
+        for publisher in (self._images.pop(side), self._infos.pop(side)):
+            publisher.unregister()
 
     def connected(self) -> bool:
         """Whether the node listens, and its health is heard."""
