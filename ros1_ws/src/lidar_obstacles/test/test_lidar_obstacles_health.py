@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[4]
 DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
 
 
+@cache
 def room(seed=0, *, yaw=0.0, x=0.0, count=30_000, noise_m=0.02) -> np.ndarray:
     """Return a sweep of 16 beams from within a hall of 40 x 16 x 8 m, the vehicle turned by ``yaw`` and moved to ``x``."""
     azimuth = np.tile(np.linspace(-np.pi, np.pi, count // 16, endpoint=False), 16)
@@ -60,10 +62,10 @@ BREAKS = {
 def test_a_broken_lidar_is_broken_from_the_first_sweep_on_and_for_as_long(name) -> None:
     broken, fault, sentence = BREAKS[name]
     good = [room(seed) for seed in range(5)]
-    findings = judge_all([*good, *(broken(room(5 + k), None) for k in range(30)), *(room(50 + k) for k in range(3))])
+    findings = judge_all([*good, *(broken(room(5 + k), None) for k in range(10)), *(room(50 + k) for k in range(3))])
     assert all(finding.ok for finding in findings[:5])
     # A frozen sweep repeats the last good one: the first repetition is the first that can be known.
-    during = findings[5:35]
+    during = findings[5:15]
     assert {finding.verdict for finding in during} == {Verdict.BROKEN}
     assert {finding.fault for finding in during} == {fault}
     assert sentence in during[0].reason
@@ -71,10 +73,45 @@ def test_a_broken_lidar_is_broken_from_the_first_sweep_on_and_for_as_long(name) 
 
 
 def test_turning_at_90_degrees_a_second_and_flying_out_of_the_hall_is_no_fault() -> None:
-    turning = [room(k, yaw=np.radians(9.0 * k)) for k in range(60)]
+    turning = [room(k, yaw=np.radians(9.0 * k)) for k in range(41)]  # once around, and on
     assert all(finding.ok for finding in judge_all(turning))
-    moving = [room(k, x=0.5 * k) for k in range(38)]
+    moving = [room(k, x=1.0 * k) for k in range(19)]
     assert all(finding.ok for finding in judge_all(moving))
+
+
+def landing(heights_m, *, walls_m=np.inf) -> list[np.ndarray]:
+    """Return sweeps of a LiDAR whose scan plane is upright (y up), sinking to the ground between two walls; blind nearer than 0.4 m."""
+    azimuth, elevation = np.tile(np.linspace(-np.pi, np.pi, 720, endpoint=False), 16), np.repeat(np.radians(np.linspace(-15, 15, 16)), 720)
+    ray = np.column_stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    sweeps = []
+    for seed, height_m in enumerate(heights_m):
+        with np.errstate(divide="ignore"):
+            ranges = np.minimum(np.where(ray[:, 1] < 0, -height_m / ray[:, 1], np.inf), walls_m / np.abs(ray[:, 0]))
+        ranges += np.random.default_rng(seed).normal(0, 0.02, len(ranges))
+        seen = (ranges > 0.4) & (ranges < 25.0)
+        sweeps.append((ray[seen] * ranges[seen, None]).astype(np.float32))
+    return sweeps
+
+
+SINKING_M = np.maximum(np.arange(3.0, -1.0, -0.05), 0.05)  # 0.5 m/s, then on the ground
+
+
+def test_a_landing_hides_the_ground_and_is_no_fault() -> None:
+    assert all(finding.ok for finding in judge_all(landing(SINKING_M, walls_m=8.0)))
+    assert all(finding.ok for finding in judge_all(landing([*SINKING_M, *reversed(SINKING_M)])))
+
+
+def test_what_is_lost_during_a_landing_is_broken_all_the_same() -> None:
+    sweeps = landing(SINKING_M, walls_m=8.0)
+    lost = judge_all([*sweeps[:55], *(points[points[:, 0] < 0.0] for points in sweeps[55:])])
+    assert {(finding.verdict, finding.fault) for finding in lost[55:]} == {(Verdict.BROKEN, Fault.SECTOR)}
+
+
+def test_a_sensor_that_saw_near_things_only_can_not_be_judged_when_they_are_gone() -> None:
+    near = landing(np.full(5, 1.2))
+    findings = judge_all([*(points[np.linalg.norm(points, axis=1) < 1.4] for points in near), near[0][:0]])
+    assert (findings[-1].verdict, findings[-1].fault) == (Verdict.UNKNOWN, Fault.RETURNS)
+    assert findings[-1].reason == "0 returns: what was around came nearer than 1.5 m"
 
 
 def test_a_mirror_of_5_centimetre_steps_is_not_frozen() -> None:

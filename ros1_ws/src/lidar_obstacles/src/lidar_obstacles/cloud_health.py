@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from perception_core import FINE, Fault, Finding, Sweep, broken
+from perception_core import FINE, Fault, Finding, Sweep, broken, unsure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
 
 SECTORS = 12
 SAMPLE = 8_000  # points are enough to judge a sweep
 RECENT = 3  # sweeps: a sensor loses a sector from one to the next, a moving one gradually
 SECTOR_RETURNS = 20  # of the sample; a sector with fewer can't be missed
+NEAR = 1.5  # of the vehicle's radius: what comes nearer soon is taken for the vehicle, or is too near to be seen
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
 
@@ -36,12 +39,16 @@ class CloudLimits:
 
 
 class CloudJudge:
-    """Judge sweeps in their order; not thread-safe."""
+    """Judge sweeps in their order; not thread-safe.
+
+    A sector whose surfaces came nearer than the sensor sees, as the ground does at a landing, is hidden: nobody can say whether it was
+    lost, and it is not missed before it has returns again.
+    """
 
     def __init__(self, limits: CloudLimits) -> None:
         self._limits = limits
         self._previous: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
-        self._recent: deque[NDArray[np.float64]] = deque(maxlen=RECENT)
+        self._recent: deque[_Sectors] = deque(maxlen=RECENT)
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
 
     def finding(self, sweep: Sweep, *, self_m: float) -> Finding:
@@ -50,15 +57,31 @@ class CloudJudge:
         sample = sweep.points[::stride]
         previous, self._previous = self._previous, sample
         ranges = np.sqrt(np.einsum("ij,ij->i", sample, sample))
-        returns = sample[np.isfinite(ranges) & (ranges > self_m)]
-        if len(returns) * stride < self._limits.min_returns:
-            return broken(Fault.RETURNS, f"{'only ' if len(returns) else ''}{len(returns) * stride} returns")
-        far = self._far(ranges[np.isfinite(ranges) & (ranges > self_m)])
+        outside = np.isfinite(ranges) & (ranges > self_m)
+        sectors = _sectors(sample, ranges, stride, self_m)
+        before = self._expected()
+        count = int(np.count_nonzero(outside)) * stride
+        if count < self._limits.min_returns:
+            return self._too_few(count, before, self_m)
+        far = self._far(ranges[outside])
         if far:
             return broken(Fault.RANGE, far)
         if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
             return broken(Fault.FROZEN, "the sweep is the same as the one before")
-        return self._against_the_past(returns, stride)
+        return self._against_the_past(sectors, before, stride)
+
+    def _expected(self) -> Floats:
+        """Return how many returns each sector should have at least, (SECTORS,): what it lately had, none where it is hidden."""
+        if not self._recent:
+            return np.zeros(SECTORS)
+        hidden = np.any([sectors.near for sectors in self._recent], axis=0)
+        return np.where(hidden, 0.0, np.min([sectors.counts for sectors in self._recent], axis=0))
+
+    def _too_few(self, count: int, before: Floats, self_m: float) -> Finding:
+        told = f"{'only ' if count else ''}{count} returns"
+        if self._recent and before.sum() < self._limits.min_returns:
+            return unsure(Fault.RETURNS, f"{told}: what was around came nearer than {NEAR * self_m:g} m")
+        return broken(Fault.RETURNS, told)
 
     def _far(self, ranges: NDArray[np.float32]) -> str:
         share = float(np.mean(ranges > self._limits.max_range_m))
@@ -68,22 +91,33 @@ class CloudJudge:
         unit = ": are the coordinates in millimetres?" if middle > self._limits.max_range_m else ""
         return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {middle:.0f} m{unit}"
 
-    def _against_the_past(self, returns: NDArray[np.float32], stride: int) -> Finding:
-        azimuth = np.arctan2(returns[:, 1], returns[:, 0])
-        sector = ((azimuth + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
-        counts = np.bincount(sector, minlength=SECTORS).astype(np.float64) * stride
-        if not self._recent:
-            self._recent.append(counts)
-            return FINE
-        before = np.min(self._recent, axis=0)
+    def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int) -> Finding:
+        counts = sectors.counts
         if counts.sum() < self._limits.thin_share * before.sum():
             return broken(Fault.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
         gone = (before >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * before)
         self._lost = (self._lost & gone) | (gone & (np.roll(gone, 1) | np.roll(gone, -1)))
         if self._lost.any():
             return broken(Fault.SECTOR, f"no returns any more from {_angles(self._lost)} around the sensor's z axis")
-        self._recent.append(counts)
+        self._recent.append(sectors)
         return FINE
+
+
+@dataclass(frozen=True)
+class _Sectors:
+    """A sweep by sectors, (SECTORS,) each: returns from outside of the vehicle, and whether most are too near to stay in view."""
+
+    counts: Floats
+    near: NDArray[np.bool_]
+
+
+def _sectors(sample: NDArray[np.float32], ranges: NDArray[np.float32], stride: int, self_m: float) -> _Sectors:
+    known = np.isfinite(ranges)
+    points, ranges = sample[known], ranges[known]
+    azimuth = np.arctan2(points[:, 1], points[:, 0])
+    sector = ((azimuth + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
+    counts, near = (np.bincount(sector[which], minlength=SECTORS) for which in (ranges > self_m, ranges <= NEAR * self_m))
+    return _Sectors(counts.astype(np.float64) * stride, 2 * near > np.bincount(sector, minlength=SECTORS))
 
 
 def _frozen(now: NDArray[np.float32], previous: NDArray[np.float32], sample: NDArray[np.float32], returned: NDArray[np.bool_]) -> bool:

@@ -23,6 +23,7 @@ from perception_core.ros import (
     read_settings,
 )
 
+CLOUD = "/lidar/points"
 CLOUD_BYTES = 1 << 23
 
 
@@ -40,7 +41,11 @@ class LidarObstaclesNode:
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled)
         self._tuning = TunableSettings(settings, self._tune)
-        self._subscriber = RawSubscriber("/lidar/points", PointCloud2, self._on_cloud, self._on_garbage, buffer_bytes=CLOUD_BYTES)
+        self._subscriber = RawSubscriber(CLOUD, PointCloud2, self._on_cloud, self._on_garbage, buffer_bytes=CLOUD_BYTES)
+        self._health.missing = self._missing
+
+    def _missing(self) -> str:
+        return "" if self._subscriber.published else f"no points on {CLOUD}: no driver publishes there"
 
     def _tune(self, settings: LidarSettings) -> None:
         self._health.tune(settings.health, settings.stamps)
