@@ -24,7 +24,7 @@ ACCEL_M_S2, TOP_M_S, YAW_RAD_S = 2.5, 5.0, 1.2
 GROUND_DISARM_S, LANDED_DISARM_S = 10.0, 0.5
 FOLLOWED_MASKS = {0x0DF8, 0x09F8, 0x05F8, 0x01F8, 0x0000}
 HOME = (473977418, 85455939, 488000)
-GUIDED, LOITER, LAND = 4, 5, 9
+STABILIZE, GUIDED, LOITER, LAND = 0, 4, 5, 9
 KNOWN_MODES = {0, 3, 4, 5, 6, 9, 17}
 
 
@@ -58,6 +58,7 @@ class FakeVehicle:
         self._takeoff: tuple[float, float] | None = None
         self._climb_to: float | None = None
         self._late_text: tuple[float, str] | None = None
+        self._booted_s = 0.0
         self._armed_s = self._touched_s = self._heartbeat_s = 0.0
 
     @property
@@ -68,6 +69,13 @@ class FakeVehicle:
     def pilot(self, mode: int) -> None:
         """The pilot takes another mode."""
         self._change_mode(mode)
+
+    def restart(self, mode: int) -> None:
+        """The autopilot's computer starts anew in the air: streams, boot time, what it was told, and where it counts from."""
+        self.forget_streams()
+        self._booted_s = self.now_s
+        self._change_mode(mode)
+        self.body.place = [0.0, 0.0, self.body.place[2]]
 
     def forget_streams(self) -> None:
         self._intervals.clear()
@@ -214,7 +222,7 @@ class FakeVehicle:
                 self._say(number)
 
     def _say(self, number: int) -> None:
-        body, boot_ms = self.body, int(self.now_s * 1000.0)
+        body, boot_ms = self.body, int((self.now_s - self._booted_s) * 1000.0)
         if number == mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
             self._send(mavlink.MAVLink_local_position_ned_message(boot_ms, *body.place, *body.speed))
         elif number == mavlink.MAVLINK_MSG_ID_ATTITUDE:

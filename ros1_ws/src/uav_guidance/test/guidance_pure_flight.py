@@ -12,7 +12,7 @@ from uav_guidance.follower import Setpoint
 from uav_guidance.guidance import Guidance, Report
 from uav_guidance.requests import Decision, PositionRequest, Request, TakeoffRequest
 from uav_guidance.settings import Settings
-from uav_guidance.streams import STREAMS_HZ
+from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.vectors import Vec3
 
 
@@ -26,6 +26,7 @@ class PureFlight:
         self.cut = False
         self.withheld: set[str] = set()
         self._next_step_s = self.now_s
+        self._streams = StreamKeeper()
         self.vehicle.hear(heartbeat_message())
         self.ask_streams()
 
@@ -42,8 +43,8 @@ class PureFlight:
         return [entry for entry in self.vehicle.transcript if entry[0] != "setpoints"]
 
     def ask_streams(self) -> None:
-        for number, rate_hz in STREAMS_HZ.items():
-            self.vehicle.hear(interval_message(number, rate_hz))
+        for number in self._streams.due(self.now_s):
+            self.vehicle.hear(interval_message(number, STREAMS_HZ[number]))
 
     def tick(self) -> None:
         self.vehicle.tick()
@@ -52,6 +53,8 @@ class PureFlight:
             self.step()
 
     def step(self) -> None:
+        if not self.cut:
+            self.ask_streams()
         for item in self.guidance.step(self.now_s):
             if isinstance(item, Setpoint):
                 self.setpoints.append((self.now_s, item))
@@ -99,6 +102,7 @@ class PureFlight:
     def _receive(self, message: object) -> None:
         if self.cut or message.get_type() in self.withheld:
             return
+        self._streams.hear(message.get_msgId(), self.now_s)
         if message.get_type() == "STATUSTEXT":
             self.guidance.on_text(message.severity, message.text if isinstance(message.text, str) else message.text.decode())
         self.guidance.on_message(message, self.now_s)

@@ -12,6 +12,10 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
+from dynamic_reconfigure.client import Client  # noqa: E402
+from dynamic_reconfigure.encoding import encode_config  # noqa: E402
+from dynamic_reconfigure.msg import Config  # noqa: E402
+from dynamic_reconfigure.srv import Reconfigure  # noqa: E402
 from geometry_msgs.msg import Point, PoseStamped  # noqa: E402
 from guidance_fake_autopilot import GUIDED, LAND, LOITER, FakeAutopilot  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
@@ -181,10 +185,29 @@ def test_fence_and_limits_refuse(bench):
     assert not bench.call("set_position", SetPositionReference, Point(1.0, 0.0, 3.0), 1.5, KEEP).accepted
     bench.until(lambda s: s.authority, "the companion has the authority")
     bench.autopilot.refuse_arming = "Compass not calibrated"
+    refused = bench.call("takeoff", Takeoff, 3.0, 3.1)
+    assert (refused.accepted, refused.reason) == (False, "speed is 3.1: at most 3 is allowed")
     refused = bench.call("takeoff", Takeoff, 3.0, 1.5)
     assert not refused.accepted
     assert "Arm: Compass not calibrated" in refused.reason
     bench.until(lambda s: s.reference == "idle", "the take-off is given up")
+
+
+def test_parameters_are_changed_in_flight_and_refused_out_of_range(bench):
+    told: list[Config] = []
+    subscriber = rospy.Subscriber("/uav_guidance/parameter_updates", Config, told.append)
+    client = Client("/uav_guidance", timeout=20.0)
+    bench.until(lambda s: s.home_valid, "home is known")
+    assert client.update_configuration({"fence_radius_m": 10.0})["fence_radius_m"] == 10.0
+    assert "20.0 m from home, at most 10 m" in bench.call("check_fence", CheckFence, Point(20.0, 0.0, 3.0)).reason
+    wait_until(
+        lambda: any(p.value == 10.0 for c in told for p in c.doubles if p.name == "fence_radius_m"), timeout_s=5.0, what="it is told"
+    )
+    with pytest.raises(rospy.ServiceException, match=r"~max_speed_m_s is 3\.5, expected 0\.1 to 3 "):
+        bench.call("set_parameters", Reconfigure, encode_config({"max_speed_m_s": 3.5, "fence_radius_m": 50.0}))
+    assert rospy.get_param("/uav_guidance/fence_radius_m") == 10.0
+    client.close()
+    subscriber.unregister()
 
 
 def test_obstacle_stops_it_and_it_goes_on_when_clear(bench):

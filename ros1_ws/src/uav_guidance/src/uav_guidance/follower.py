@@ -60,6 +60,11 @@ class Follower:
         self._last_step_s: float | None = None
         self._last_setpoint_s = -math.inf
 
+    def tune(self, settings: Settings) -> None:
+        """Go on with other settings; the reference under way keeps those that it was given with."""
+        self.obstacles.settings = settings
+        self._still.tune(reached_m=settings.reached_m, reached_rad=settings.reached_rad)
+
     def take(self, reference: Reference | None, vehicle: Vehicle, now_s: float) -> None:
         """Follow another reference from now on, or none."""
         self.reference = reference

@@ -62,6 +62,7 @@ class Guidance:
         self._authority = Authority()
         self._heard_s: float | None = None
         self._been_ready = False
+        self._restarted = False
         self._begun_s: float | None = None
         self._introduced = False
         self._follower = Follower(settings)
@@ -78,6 +79,11 @@ class Guidance:
             AuthorityRequest: self._take_authority,
         }
 
+    def tune(self, settings: Settings) -> None:
+        """Go on with other settings; the reference under way keeps those that it was given with."""
+        self._settings = settings
+        self._follower.tune(settings)
+
     # ---- what comes in -------------------------------------------------------------------------------------------------
 
     def on_message(self, message: Any, now_s: float) -> None:
@@ -88,7 +94,9 @@ class Guidance:
             if self._procedure is not None:
                 self._procedure.on_answer(message.command, message.result, now_s)
             return
-        self.vehicle = updated(self.vehicle, message, now_s)
+        before, self.vehicle = self.vehicle, updated(self.vehicle, message, now_s)
+        if self.vehicle.boots > before.boots:
+            self._start_over(now_s)
         if kind == "HEARTBEAT":
             self._check_authority(now_s)
 
@@ -140,13 +148,14 @@ class Guidance:
         """Return the states of navigation's resources that the hardware decides; what is not known is left out.
 
         The authority is of use once the autopilot can fly: with a position, and its checks passed, or armed already. It is not taken
-        away when these checks fail again on the ground. Nothing is known before the vehicle has introduced itself: a guidance that was
-        started again in flight must not take away from the skills what they rightly have, only because it has not heard of it yet.
+        away when these checks fail again on the ground, but when the autopilot starts anew in flight. Nothing is known before the
+        vehicle has introduced itself: a guidance that was started again in flight must not take away from the skills what they rightly
+        have, only because it has not heard of it yet.
         """
         if not self._introduced:
             return {}
         states = {
-            "SDK_authority": "AVAILABLE" if self._authority.held and self._been_ready else "UNAVAILABLE",
+            "SDK_authority": "AVAILABLE" if self._authority.held and self._been_ready and not self._restarted else "UNAVAILABLE",
             "homepoint_status": "VALID" if self.vehicle.home is not None else "INVALID",
         }
         if self.vehicle.landed is not Landed.UNDEFINED:
@@ -224,6 +233,7 @@ class Guidance:
 
     def _take_authority(self, _request: AuthorityRequest, now_s: float) -> Decision:
         require(self.link(now_s), "no link to the autopilot")
+        self._restarted = False
         if self._authority.held:
             return Decision(accepted=True, reference_id=self._reference_id)
         self._run(Procedure([set_mode(Mode.GUIDED)]))
@@ -252,12 +262,26 @@ class Guidance:
 
     # ---- at each step --------------------------------------------------------------------------------------------------
 
+    def _start_over(self, now_s: float) -> None:
+        """Drop what was asked of an autopilot that has started anew since: it has forgotten it, and its origin may be another one.
+
+        Where it comes back in GUIDED and in the air, the vehicle is held where it is, and can be landed; another mode is not ours. The
+        skills do not get the authority back before somebody gives it: their places may be others now.
+        """
+        self._restarted = True
+        log.warning("the autopilot has started anew, in %s", mode_name(self.vehicle.mode))
+        if self._procedure is not None:
+            self._procedure.abort("the autopilot has started anew")
+        self._follower.heading.locked = False
+        self._follower.take(None, self.vehicle, now_s)
+
     def _check_authority(self, now_s: float) -> None:
         """Drop everything when the pilot, a failsafe or a broken link takes the authority away; nothing is taken back."""
         change = self._authority.update(self.vehicle, link=self.link(now_s))
         vehicle = self.vehicle
         able = vehicle.located and (vehicle.ready or vehicle.armed or vehicle.off_ground)
         self._been_ready = self._authority.held and (self._been_ready or able)
+        self._restarted &= not (vehicle.on_ground and not vehicle.armed)
         if change is not Change.LOST:
             return
         why = self._lost_reason(now_s)
@@ -272,7 +296,10 @@ class Guidance:
         if not self.link(now_s):
             silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
             return f"the link is lost, nothing was heard of the autopilot for {silent_s:.1f} s"
-        return f"the vehicle is in {mode_name(self.vehicle.mode)}: the pilot or a failsafe has it"
+        mode = mode_name(self.vehicle.mode)
+        if self._restarted:
+            return f"the autopilot has started anew, in {mode}"
+        return f"the vehicle is in {mode}: the pilot or a failsafe has it"
 
     def _introduce(self, now_s: float) -> None:
         """Note that mode, landed state, home and place are known, or that they don't come although there was time."""

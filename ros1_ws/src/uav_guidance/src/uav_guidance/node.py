@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-import sys
 import threading
 import time
 from typing import Any
@@ -32,6 +31,7 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
+from perception_core.ros import TunableSettings, read_settings
 from resource_reporter import ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
@@ -39,7 +39,7 @@ from uav_guidance.follower import Setpoint
 from uav_guidance.guidance import Guidance
 from uav_guidance.link import Link
 from uav_guidance.messages import pose_message, sighting, state_message, time_of, transform_message, vec3
-from uav_guidance.settings import Settings, SettingsError
+from uav_guidance.settings import Settings
 from uav_guidance.stamping import FineClock, StampClock
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
@@ -74,6 +74,7 @@ class GuidanceNode:
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
             rospy.Subscriber(topic, Obstacle, self._on_obstacle, queue_size=5, tcp_nodelay=True)
         self._offer_services()
+        self._tuning = TunableSettings(settings, self._tune)
 
     def run(self) -> None:
         """Step at 20 Hz of the mission clock until the node is shut down; a clock that starts late is waited for."""
@@ -129,6 +130,10 @@ class GuidanceNode:
                 reason = outcome.reason if outcome is not None else "the autopilot has not answered"
         log.info("%s: %s", request, "accepted" if accepted else f"refused: {reason}")
         return response(accepted=accepted, reason=reason, reference_id=decision.reference_id if accepted else 0)
+
+    def _tune(self, settings: Settings) -> None:
+        with self._changed:
+            self._guidance.tune(settings)
 
     # ---- what comes in -------------------------------------------------------------------------------------------------
 
@@ -215,9 +220,4 @@ def _next_due(due_s: float, now_s: float) -> float:
 def main() -> None:
     """Run the node."""
     rospy.init_node("uav_guidance")
-    try:
-        settings = Settings.from_parameters(rospy.get_param(rospy.get_name(), {}))
-    except SettingsError as error:
-        rospy.logfatal("%s", error)
-        sys.exit(2)
-    GuidanceNode(settings).run()
+    GuidanceNode(read_settings(Settings())).run()

@@ -50,14 +50,14 @@ class ObstacleWatch:
     """Remember the last verdict of each sensor and decide when to hold and when to go on."""
 
     def __init__(self, settings: Settings) -> None:
-        self._settings = settings
+        self.settings = settings
         self._heard: dict[str, _Heard] = {}
         self._last_in_way_s: float | None = None
 
     def see(self, sighting: Sighting, now_s: float) -> None:
         """Take a sensor's verdict; one that is no newer than the last one, or of the future, is none."""
         last = self._heard.get(sighting.source)
-        if not sighting.stamp_s <= now_s + self._settings.watch_age_s:
+        if not sighting.stamp_s <= now_s + self.settings.watch_age_s:
             sighting = replace(sighting, stamp_s=-math.inf)
         if last is None or sighting.stamp_s > last.sighting.stamp_s or now_s < last.arrival_s:
             self._heard[sighting.source] = _Heard(sighting, now_s)
@@ -82,13 +82,13 @@ class ObstacleWatch:
         """Return whether to hold: something is in the way, or was until less than half a second ago, or nobody watches."""
         if any(_seen(sighting) and self._in_way(sighting, way) for sighting in self._fresh(now_s)):
             self._last_in_way_s = now_s
-        elif self._last_in_way_s is not None and now_s - self._last_in_way_s >= self._settings.obstacle_clear_s:
+        elif self._last_in_way_s is not None and now_s - self._last_in_way_s >= self.settings.obstacle_clear_s:
             self._last_in_way_s = None
         return self._last_in_way_s is not None or self.unwatched(now_s)
 
     def _fresh(self, now_s: float) -> list[Sighting]:
         """Return the verdicts that still hold: just arrived, and on a measurement that is not old."""
-        settings = self._settings
+        settings = self.settings
         return [
             heard.sighting
             for heard in self._heard.values()
@@ -96,7 +96,7 @@ class ObstacleWatch:
         ]
 
     def _in_way(self, sighting: Sighting, way: Way) -> bool:
-        settings = self._settings
+        settings = self.settings
         to_go_m = way.remaining_enu_m.horizontal
         if to_go_m < LEAST_TRAVEL_M or sighting.distance_m > to_go_m + settings.obstacle_clearance_m:
             return False

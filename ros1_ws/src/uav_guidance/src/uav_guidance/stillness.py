@@ -13,9 +13,12 @@ class StillWatch:
     """Measure the time since the last progress: 0.1 m or 2 degrees nearer than ever before under this reference."""
 
     def __init__(self, *, reached_m: float, reached_rad: float) -> None:
-        self._reached_m = reached_m
-        self._reached_rad = reached_rad
+        self.tune(reached_m=reached_m, reached_rad=reached_rad)
         self.restart(0.0)
+
+    def tune(self, *, reached_m: float, reached_rad: float) -> None:
+        """Go on with other limits."""
+        self._reached_m, self._reached_rad = reached_m, reached_rad
 
     def restart(self, now_s: float) -> None:
         """Begin with a new reference."""

@@ -78,6 +78,8 @@ class Vehicle:
     ready: bool = False
     landed: Landed = Landed.UNDEFINED
     boot_ms: int = 0
+    boots: int = 1
+    """How often the autopilot was seen to start, the first time included."""
     position_enu_m: Vec3 | None = None
     velocity_enu_m_s: Vec3 = ZERO
     quat_xyzw: Quaternion | None = None
@@ -129,7 +131,7 @@ def _extended_sys_state(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicl
 def _local_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
     if message.time_boot_ms + REBOOT_MS < vehicle.boot_ms:
         # The autopilot started anew: nothing of what it said before holds.
-        vehicle = Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed)
+        vehicle = Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
     position = enu_from_ned(Vec3(message.x, message.y, message.z))
     velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))
     return replace(vehicle, boot_ms=int(message.time_boot_ms), position_enu_m=position, velocity_enu_m_s=velocity)
