@@ -32,7 +32,7 @@ from alula_flight.beside import page_beside
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
-from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_world
+from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_sensors, read_world
 from run_analysis.conformance import Monitor
 from run_analysis.models import models_of
 from uav_simulator.sensors.faults import FAULTS
@@ -80,7 +80,10 @@ def parse(arguments: list[str]) -> RunSpec:
     parser.add_argument("--rate", type=float, help="simulated seconds per second at most, 0: no limit (default 1)")
     parser.add_argument("--autopilot", metavar="URL", help="fly a real autopilot (pymavlink connection) instead of the simulator")
     parser.add_argument(
-        "--sensors", choices=["simulated"], help="with --autopilot: ArduPilot flies the simulator's body (its JSON interface)"
+        "--sensors",
+        metavar="simulated|followed:URL",
+        help="with --autopilot, simulated ones. simulated: ArduPilot flies the simulator's body (its JSON interface); "
+        "followed:URL: they are where the autopilot says over a second MAVLink connection",
     )
     parser.add_argument(
         "--imperfections",
@@ -114,7 +117,7 @@ def parse(arguments: list[str]) -> RunSpec:
         faults=read_faults(given.fail, None if given.mock else {**FAULTS, **dict(scenario.faults)}),
         world=read_world(given.world or scenario.world),
         autopilot=given.autopilot,
-        sensors=given.sensors or "",
+        sensors=read_sensors(given.sensors or ""),
         imperfections=read_imperfections(given.imperfections),
         master_port=0 if given.mock else free_port(),
         mavlink_port=0 if given.mock else free_port(),

@@ -12,6 +12,7 @@ from alula_common.files import write_json
 from alula_common.scenarios import Scenario, ScenarioError, load_scenario
 from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections
+from uav_simulator.settings import FOLLOWED
 from uav_simulator.world.config import find_world, load_world
 
 RADIO_PORT, RADIO_PORTS = 42000, 8
@@ -47,6 +48,13 @@ def read_imperfections(text: str) -> str:
     return text
 
 
+def read_sensors(text: str) -> str:
+    """Check where a real autopilot's sensors come from, and return it."""
+    if text in {"", "simulated"} or text.removeprefix(FOLLOWED) not in {"", text}:
+        return text
+    raise RequestError(f"--sensors {text}: simulated, or {FOLLOWED}URL with a MAVLink connection as {FOLLOWED}udpin:127.0.0.1:14551")
+
+
 def read_world(text: str) -> str:
     """Check a world, given by name or file, and return its file."""
     try:
@@ -62,8 +70,9 @@ class RunSpec:
     """One run.
 
     ``world`` is a world file; ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at
-    most, 0 unlimited. ``sensors``: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors, "" where
-    real drivers run elsewhere. ``imperfections`` of the simulated autopilot and sensors.
+    most, 0 unlimited. ``sensors``: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors,
+    "followed:URL" where it has the sensors only, which are where the autopilot says over this connection, "" where real drivers run.
+    ``imperfections`` of the simulated autopilot and sensors.
     ``record``: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
     ``console``: whether the operator's page is served beside the flight.
     ``monitor``: every event is held against the models.
@@ -92,7 +101,7 @@ class RunSpec:
     @property
     def simulated(self) -> bool:
         """Tell whether the simulator takes part, with its clock, its truth and its sensors."""
-        return self.autopilot is None or self.sensors == "simulated"
+        return self.autopilot is None or bool(self.sensors)
 
     def save(self, path: Path) -> None:
         """Write the specification beside the results."""
@@ -111,7 +120,8 @@ class RunSpec:
         arguments = [
             f"out:={self.out_dir}",
             f"seed:={self.seed}",
-            f"rate:={self.rate:g}",
+            # The autopilot that is followed has its own pace: a limit here would fall behind it.
+            f"rate:={0.0 if self.sensors.startswith(FOLLOWED) else self.rate:g}",
             f"faults:={','.join(fault for fault in self.faults if fault not in others)}",
             f"world:={self.world}",
             f"mavlink_port:={self.mavlink_port}",
@@ -123,5 +133,6 @@ class RunSpec:
         if scenario.faults:
             arguments += [f"radio_faults:={','.join(others)}", f"radio_port:={RADIO_PORT + RADIO_PORTS * self.domain}"]
         if self.autopilot is not None:
-            arguments += ["vehicle:=ardupilot" if self.sensors else "simulate:=false", f"autopilot:={self.autopilot}"]
+            vehicle = {"": "simulate:=false", "simulated": "vehicle:=ardupilot"}.get(self.sensors, f"vehicle:={self.sensors}")
+            arguments += [vehicle, f"autopilot:={self.autopilot}"]
         return arguments

@@ -44,6 +44,8 @@ from uav_simulator.world.config import find_world
         (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--fail", "zed@3"], ["--autopilot", "--sensors simulated"]),
         (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--imperfections", "realistic"], ["--imperfections"]),
         (["mapping", "--sensors", "simulated"], ["--sensors", "add --autopilot"]),
+        (["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "real"], ["--sensors real", "simulated, or followed:URL"]),
+        (["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "followed:"], ["--sensors followed:", "udpin:127.0.0.1:14551"]),
         (["mapping", "--imperfections", "some"], ["--imperfections", "'some'", "realistic"]),
     ],
 )
@@ -113,6 +115,9 @@ def test_ardupilot_flies_the_simulators_body(tmp_path):
     assert {"vehicle:=ardupilot", "autopilot:=tcp:127.0.0.1:5760", "faults:=zed@30"} <= set(spec.launch_arguments())
     assert "simulate:=false" not in spec.launch_arguments()
     assert spec.simulated
+    followed = parse([*words[:4], "followed:udpin:127.0.0.1:14551", *words[5:]])
+    assert {"vehicle:=followed:udpin:127.0.0.1:14551", "rate:=0", "faults:=zed@30"} <= set(followed.launch_arguments())
+    assert followed.simulated
     assert not parse(["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--out", str(tmp_path / "run")]).simulated
     imperfect = parse(["mapping", "--imperfections", "realistic,exposure=0", "--out", str(tmp_path / "run")])
     assert "imperfections:=realistic,exposure=0" in imperfect.launch_arguments()

@@ -7,6 +7,7 @@ setup(
             "uav_simulator",
             "uav_simulator.ardupilot",
             "uav_simulator.autopilot",
+            "uav_simulator.following",
             "uav_simulator.sensors",
             "uav_simulator.vehicle",
             "uav_simulator.world",

@@ -1,4 +1,4 @@
-"""The autopilot as a MAVLink client sees it: each of the behaviours measured on ArduCopter, by its number."""
+"""The autopilot as a MAVLink client sees it, by the numbers of the behaviours measured on ArduCopter: link, modes, arming, home."""
 
 import math
 
@@ -9,25 +9,15 @@ from uav_simulator_link import (
     BRAKE,
     DENIED,
     FAILED,
-    GROUND,
     GUIDED,
-    IN_AIR,
     LAND,
-    LANDING,
     LOITER,
     POSITION,
     POSITION_YAW,
     RTL,
-    TAKING_OFF,
     UNSUPPORTED,
-    VELOCITY,
     Link,
 )
-
-from uav_simulator.autopilot.endpoint import Endpoint
-
-NAN = math.nan
-
 
 # --- 1 streams -----------------------------------------------------------------------------------------------------------
 
@@ -223,206 +213,6 @@ def test_some_modes_are_not_armable(mode):
     assert any(t.startswith("Arm: ") for t in link.texts())
 
 
-# --- 5 take-off ----------------------------------------------------------------------------------------------------------
-
-
-def test_a_take_off_spools_up_lifts_off_and_reaches_its_height():
-    link = Link().guided_and_armed()
-    assert link.command(22, 0, 0, 0, 0, 0, 0, 3.0) == ACCEPTED
-    spool_s = link.run_until(lambda: link.landed_state == TAKING_OFF, timeout_s=4.0)
-    assert spool_s == pytest.approx(2.4, abs=0.05)
-    assert link.run_until(lambda: link.landed_state == IN_AIR, timeout_s=5.0) <= 3.5
-    link.run(2.0)
-    assert link.position[2] == pytest.approx(3.0, abs=0.06)
-
-
-def test_a_take_off_needs_arming_guided_and_the_ground():
-    link = Link()
-    assert link.command(22, 0, 0, 0, 0, 0, 0, 3.0) == FAILED
-    assert link.texts()
-    link.command(400, 1)
-    assert link.command(22, 0, 0, 0, 0, 0, 0, 3.0) == FAILED, "armed but in STABILIZE"
-    link.flying()
-    assert link.command(22, 0, 0, 0, 0, 0, 0, 5.0) == FAILED, "already in the air"
-
-
-def test_setpoints_alone_do_not_lift_off():
-    link = Link().guided_and_armed()
-    link.run(5.0, each_tick=lambda: link.setpoint(POSITION, (0, 0, -3)))
-    assert link.position[2] == 0.0
-    assert link.landed_state == GROUND
-
-
-def test_a_setpoint_before_lift_off_cancels_the_take_off_silently():
-    link = Link().guided_and_armed()
-    link.command(22, 0, 0, 0, 0, 0, 0, 3.0)
-    link.run(1.0)
-    link.received.clear()
-    link.setpoint(POSITION, (0, 0, -3))
-    assert not link.received
-    link.run(5.0)
-    assert link.landed_state == GROUND
-    assert link.position[2] == 0.0
-
-
-def test_a_setpoint_during_the_climb_ends_it_and_is_flown_to():
-    link = Link().guided_and_armed()
-    link.command(22, 0, 0, 0, 0, 0, 0, 10.0)
-    link.run(4.0)
-    link.setpoint(POSITION, (3, 0, -4))
-    assert link.landed_state == IN_AIR
-    link.run(8.0)
-    assert link.distance_to((0, 3, 4)) < 0.15
-
-
-# --- 6 setpoints ---------------------------------------------------------------------------------------------------------
-
-FOLLOWED_POSITION = [0x0DF8, 0x09F8, 0x05F8, 0x01F8, 0x0000, 0x09C0, 0x01C0, 0x0FF8]
-FOLLOWED_VELOCITY = [0x0DC7, 0x09C7, 0x05C7]
-NOT_FOLLOWED = [0x0DFC, 0x0FFF, 0x09FF, 0x0C38]
-
-
-@pytest.mark.parametrize("mask", FOLLOWED_POSITION, ids=hex)
-def test_position_masks_are_followed(mask):
-    link = Link().flying()
-    link.setpoint(mask, (2, 1, -3.5))
-    link.run(6.0)
-    assert link.distance_to((1, 2, 3.5)) < 0.15
-
-
-@pytest.mark.parametrize("mask", FOLLOWED_VELOCITY, ids=hex)
-def test_velocity_masks_are_followed(mask):
-    link = Link().flying()
-    link.run(3.0, each_tick=lambda: link.setpoint(mask, velocity_ned=(0.5, 1.0, -0.2)))
-    assert link.vehicle.body.velocity == pytest.approx((1.0, 0.5, 0.2), abs=0.08)
-
-
-@pytest.mark.parametrize("mask", NOT_FOLLOWED, ids=hex)
-def test_other_masks_are_not_followed_without_a_word(mask):
-    link = Link().flying()
-    start = link.position
-    link.received.clear()
-    link.run(3.0, each_tick=lambda: link.setpoint(mask, (2, 1, -3.5), (0.5, 1.0, -0.2), yaw=2.0))
-    assert link.distance_to(start) < 0.1
-    assert {m.get_type() for _, m in link.received} <= {"HEARTBEAT", "TIMESYNC"}
-
-
-def test_nan_in_ignored_fields_is_harmless():
-    link = Link().flying()
-    link.setpoint(POSITION, (2, 1, -3.5), (NAN, NAN, NAN), yaw=NAN, yaw_rate=NAN, accel=(NAN, NAN, NAN))
-    link.run(6.0)
-    assert link.distance_to((1, 2, 3.5)) < 0.15
-
-
-def test_a_position_does_not_expire_and_a_velocity_does():
-    link = Link().flying()
-    link.setpoint(POSITION, (8, 0, -3))
-    link.run(10.0)
-    assert link.distance_to((0, 8, 3)) < 0.15
-    link.setpoint(VELOCITY, velocity_ned=(0, 1, 0))
-    link.run(2.9)
-    assert link.vehicle.body.velocity[0] == pytest.approx(1.0, abs=0.08)
-    link.run(3.0)
-    assert math.hypot(*link.vehicle.body.velocity) < 0.08
-
-
-def test_frame_7_is_an_offset_along_the_worlds_axes():
-    link = Link().flying()
-    link.setpoint(POSITION, (0, 5, -3))
-    link.run(8.0)
-    link.setpoint(POSITION, (2, 0, -1), frame=7)
-    link.run(6.0)
-    assert link.distance_to((5, 2, 4)) < 0.2
-
-
-def test_frame_8_is_an_offset_along_the_nose():
-    link = Link().flying()  # the nose points east
-    link.setpoint(POSITION, (2, 1, 0), frame=8)
-    link.run(6.0)
-    assert link.distance_to((2, -1, 3)) < 0.2
-
-
-# --- 7 yaw ---------------------------------------------------------------------------------------------------------------
-
-
-def yaw_ned_deg(link):
-    return math.degrees(math.pi / 2.0 - link.pilot.estimate.yaw_rad) % 360.0
-
-
-def test_with_both_yaw_bits_ignored_the_nose_turns_along_the_travel():
-    link = Link().flying()
-    link.setpoint(POSITION, (10, 0, -3))
-    link.run(6.0)
-    assert abs((yaw_ned_deg(link) + 180.0) % 360.0 - 180.0) < 3.0
-
-
-def test_a_yaw_in_the_setpoint_is_kept_while_moving_sideways():
-    link = Link().flying()
-    link.setpoint(POSITION_YAW, (10, 0, -3), yaw=math.radians(90))
-    link.run(1.5)
-    assert link.vehicle.body.velocity[1] > 0.5
-    assert yaw_ned_deg(link) == pytest.approx(90.0, abs=3.0)
-
-
-def test_condition_yaw_works_until_the_next_setpoint_without_yaw():
-    link = Link().flying()
-    assert link.command(115, 200, 45, 1, 0) == ACCEPTED
-    link.run(6.0)
-    assert yaw_ned_deg(link) == pytest.approx(200.0, abs=3.0)
-    link.setpoint(POSITION, (10, 0, -3))
-    link.run(6.0)
-    assert abs((yaw_ned_deg(link) + 180.0) % 360.0 - 180.0) < 3.0
-
-
-def test_condition_yaw_turns_the_way_it_is_told_and_relatively():
-    link = Link().flying()  # heading 90 degrees
-    link.command(115, 30, 45, -1, 1)
-    link.run(4.0)
-    assert yaw_ned_deg(link) == pytest.approx(60.0, abs=3.0)
-    link.command(115, 90, 60, -1, 0)  # to the east, but the long way round
-    link.run(2.0)
-    assert 0.0 <= (60.0 - yaw_ned_deg(link)) % 360.0 <= 180.0
-    link.run(8.0)
-    assert yaw_ned_deg(link) == pytest.approx(90.0, abs=3.0)
-    assert link.command(115, 500) == FAILED
-
-
-# --- 8 landed state ------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("land", [(176, 1, LAND), (21,)])
-def test_landing_ends_on_the_ground_and_disarms_half_a_second_later(land):
-    link = Link().flying()
-    link.ask(245, hz=50)
-    assert link.command(*land) == ACCEPTED
-    link.run_until(lambda: link.landed_state == GROUND, timeout_s=12.0)
-    assert link.pilot.armed
-    assert link.run_until(lambda: not link.pilot.armed, timeout_s=2.0) == pytest.approx(0.5, abs=0.05)
-    states = [m.landed_state for m in link.of("EXTENDED_SYS_STATE")]
-    assert list(dict.fromkeys(states)) == [LANDING, GROUND]
-
-
-def test_a_landing_from_high_up_is_slow_near_the_ground():
-    link = Link().flying(height=16.0)
-    link.command(21)
-    speeds = []
-    link.run_until(
-        lambda: link.position[2] == 0.0, timeout_s=40.0, each_tick=lambda: speeds.append((link.position[2], -link.vehicle.body.velocity[2]))
-    )
-    assert max(v for z, v in speeds if z > 11.0) > 1.3
-    assert max(v for z, v in speeds if z < 8.0) < 0.6
-
-
-def test_a_touch_down_in_guided_stays_armed():
-    link = Link().flying()
-    link.ask(245, hz=50)
-    link.received.clear()
-    link.run_until(lambda: link.landed_state == GROUND, timeout_s=20.0, each_tick=lambda: link.setpoint(POSITION, (0, 0, 2)))
-    link.run(3.0)
-    assert link.pilot.armed
-    assert list(dict.fromkeys(m.landed_state for m in link.of("EXTENDED_SYS_STATE"))) == [IN_AIR, GROUND]
-
-
 # --- 9 home --------------------------------------------------------------------------------------------------------------
 
 
@@ -447,107 +237,6 @@ def test_home_can_be_asked_for(ask):
     assert link.command(*ask) == ACCEPTED
     assert len(link.of("HOME_POSITION")) == 1
     assert Link(boot_before_s=0.0).command(*ask) == FAILED, "there is none before the autopilot is ready"
-
-
-# --- 10 failsafes --------------------------------------------------------------------------------------------------------
-
-
-def test_no_ground_station_is_needed_by_default():
-    link = Link().flying()
-    link.endpoint.gcs_present = False
-    link.run(20.0)
-    assert link.pilot.mode == GUIDED
-
-
-def test_with_fs_gcs_enable_it_returns_when_the_ground_station_falls_silent():
-    link = Link().flying()
-    link.send(mavlink.MAVLink_param_set_message(1, 1, b"FS_GCS_ENABLE", 1.0, mavlink.MAV_PARAM_TYPE_REAL32))
-    assert link.of("PARAM_VALUE")[-1].param_value == 1.0
-    link.endpoint.gcs_present = False
-    assert link.run_until(lambda: link.pilot.mode == RTL, timeout_s=8.0) == pytest.approx(5.0, abs=1.1)
-
-
-def ground_station(link):
-    """Open a second link, and return it with a function that sends a heartbeat over it."""
-    ground = Endpoint(link.pilot, gcs_present=False)
-    link.endpoint.gcs_present = False
-    link.endpoint.connect(ground)
-    station = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
-    beat = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3)
-    return ground, lambda: ground.feed(beat.pack(station))
-
-
-def test_a_ground_station_on_a_link_of_its_own_is_heard_and_forwarded():
-    link = Link()
-    ground, beat = ground_station(link)
-    beat()
-    link.run(0.1)
-    assert len(link.of("HEARTBEAT", system=255)) == 1
-    ground.take_output()
-    assert link.command(176, 1, GUIDED) == ACCEPTED
-    assert link.command(21) == ACCEPTED
-    heard = mavlink.MAVLink(None).parse_buffer(ground.take_output())
-    assert {m.custom_mode for m in heard if m.get_type() == "HEARTBEAT"} == {GUIDED, LAND}
-    assert not [m for m in heard if m.get_type() == "COMMAND_ACK"], "answers go to who has asked"
-    link.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
-    assert [m.get_srcComponent() for m in mavlink.MAVLink(None).parse_buffer(ground.take_output())] == [191]
-
-
-def test_the_control_link_is_lost_and_comes_back():
-    link = Link(params={"FS_GCS_ENABLE": 1.0}).flying()
-    _, beat = ground_station(link)
-    for _ in range(8):
-        beat()
-        link.run(1.0)
-    assert link.pilot.mode == GUIDED
-    link.received.clear()
-    assert link.run_until(lambda: link.pilot.mode == RTL, timeout_s=8.0) == pytest.approx(4.0, abs=0.3)
-    link.run(1.1)
-    assert "GCS Failsafe" in link.texts()
-    assert link.of("HEARTBEAT")[-1].system_status == 5
-    beat()
-    link.run(1.1)
-    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 4)
-
-
-def test_rc_loss_returns_home_and_stays_when_rc_comes_back():
-    link = Link().flying()
-    link.setpoint(POSITION, (0, 8, -3))
-    link.run(8.0)
-    link.pilot.set_rc(lost=True)
-    link.run(1.2)
-    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 5)
-    link.pilot.set_rc(lost=False)
-    link.run(1.2)
-    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 4)
-    link.run_until(lambda: not link.pilot.armed, timeout_s=90.0)
-    assert math.hypot(*link.position[:2]) < 0.5
-
-
-# --- 11 the pilot --------------------------------------------------------------------------------------------------------
-
-
-def test_a_take_over_shows_within_a_fifth_of_a_second_and_setpoints_are_ignored():
-    link = Link().flying()
-    link.received.clear()
-    link.pilot.set_mode(LOITER)
-    link.run(0.2)
-    assert link.of("HEARTBEAT")[-1].custom_mode == LOITER
-    start = link.position
-    link.run(3.0, each_tick=lambda: link.setpoint(POSITION, (5, 0, -3)))
-    assert link.distance_to(start) < 0.15
-    assert link.command(176, 1, GUIDED) == ACCEPTED, "the autopilot itself lets a companion take over again"
-
-
-def test_the_yaw_stick_overrides_the_setpoints_yaw_until_it_is_centred():
-    link = Link().flying()
-    hold = (0, 0, -3)
-    link.pilot.yaw_stick(-0.5)
-    link.run(2.0, each_tick=lambda: link.setpoint(POSITION_YAW, hold, yaw=math.radians(90)))
-    assert yaw_ned_deg(link) > 120.0
-    link.pilot.yaw_stick(0.0)
-    link.run(5.0, each_tick=lambda: link.setpoint(POSITION_YAW, hold, yaw=math.radians(90)))
-    assert yaw_ned_deg(link) == pytest.approx(90.0, abs=3.0)
 
 
 # --- the rest of the link ------------------------------------------------------------------------------------------------

@@ -114,3 +114,7 @@ class Link:
 
     def distance_to(self, position_enu):
         return math.dist(self.position, position_enu)
+
+
+def yaw_ned_deg(link):
+    return math.degrees(math.pi / 2.0 - link.pilot.estimate.yaw_rad) % 360.0

@@ -11,6 +11,7 @@ from uav_simulator.autopilot.link_server import LinkServer
 from uav_simulator.autopilot.params import parse_parameters
 from uav_simulator.errors import ConfigError
 from uav_simulator.flown import Flown, SimulatedAutopilotVehicle
+from uav_simulator.following.vehicle import FollowedVehicle
 from uav_simulator.frames import Vec3
 from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.pilot_hooks import apply_pilot_word
@@ -92,6 +93,28 @@ class ArduPilotPilot:
         self.flown.close()
 
 
+class FollowedPilot:
+    """An autopilot that flies elsewhere, with or without a simulator of its own; the guidance has another connection to it."""
+
+    def __init__(self, settings: Settings, home: Vec3) -> None:
+        self.flown = FollowedVehicle(settings.followed_url, home)
+        self.ports: dict[str, int] = {}
+
+    def serve(self, wait_s: float = 0.0) -> None:
+        """Wait: messages are taken by the vehicle's tick."""
+        time.sleep(wait_s)
+
+    def obey(self, word: str) -> None:
+        """Refuse: the pilot of a real autopilot has a remote control, or a ground station."""
+        raise ConfigError(f"/sim/pilot: {word!r} is for the simulated autopilot; the one that is followed takes it from its own pilot")
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.flown.close()
+
+
 def make_pilot(settings: Settings, home: Vec3) -> Pilot:
     """Return who the settings say flies it; raises SimulatorError when its port is taken."""
+    if settings.followed_url:
+        return FollowedPilot(settings, home)
     return ArduPilotPilot(settings, home) if settings.vehicle == "ardupilot" else SimulatedPilot(settings, home)

@@ -8,6 +8,7 @@ from typing import Any
 from uav_simulator.errors import ConfigError
 
 VEHICLES = ("simulated", "ardupilot")
+FOLLOWED = "followed:"
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,9 @@ class Settings:
     world: str = "yard"  # name of a world that comes with the simulator, or a world file
     world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
     faults: str = ""  # between commas; how each is written: alula_common.faults, what there is: sensors.faults
-    vehicle: str = "simulated"  # who flies the body: simulated (the simulator's own autopilot) or ardupilot (its JSON interface)
+    # Who flies the body: simulated (the simulator's own autopilot), ardupilot (its JSON interface), or followed:URL (it is where the
+    # autopilot at a MAVLink connection says, on that one's clock).
+    vehicle: str = "simulated"
     ardupilot_port: int = 9002  # UDP on loopback, where ArduPilot's motor outputs come
     imperfections: str = "off"  # off, realistic, or NAME=VALUE,... as in imperfections.py
     mavlink_port: int = 5760  # TCP on loopback, for the companion; 0: any free one, which the parameter then tells
@@ -29,6 +32,11 @@ class Settings:
     pace_limit_s: float = 0.3
     pace_patience_s: float = 2.0
     boot_before_s: float = 60.0  # how long the autopilot has had power when the clock starts
+
+    @property
+    def followed_url(self) -> str:
+        """Where the autopilot is that the sensors follow; empty when there is none."""
+        return self.vehicle.removeprefix(FOLLOWED) if self.vehicle.startswith(FOLLOWED) else ""
 
 
 def settings_from_params(params: dict[str, Any]) -> Settings:
@@ -42,8 +50,8 @@ def settings_from_params(params: dict[str, Any]) -> Settings:
     for name in ("seed", "rate", "pace_limit_s", "pace_patience_s", "boot_before_s"):
         if getattr(settings, name) < 0:
             raise ConfigError(f"parameter ~{name}: {getattr(settings, name)} must not be negative")
-    if settings.vehicle not in VEHICLES:
-        raise ConfigError(f"parameter ~vehicle: {settings.vehicle!r} is none of {', '.join(VEHICLES)}")
+    if settings.vehicle not in VEHICLES and not settings.followed_url:
+        raise ConfigError(f"parameter ~vehicle: {settings.vehicle!r} is none of {', '.join(VEHICLES)}, {FOLLOWED}URL")
     return settings
 
 

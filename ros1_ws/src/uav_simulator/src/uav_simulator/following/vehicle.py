@@ -1,0 +1,80 @@
+"""The body of a vehicle that somebody else simulates or flies: it is where its autopilot says, when its autopilot says."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+from uav_simulator.autopilot.types import LandedState
+from uav_simulator.following.link import ListeningLink
+from uav_simulator.following.track import LinkTrack
+from uav_simulator.frames import Vec3
+from uav_simulator.vehicle.airframe import GRAVITY_M_S2, Airframe
+from uav_simulator.vehicle.quaternion import rotate
+from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
+
+WAIT_S = 0.1  # wall clock that one call of `tick` waits for messages
+SILENCE_S = 10.0  # wall clock; then, and so often, it is told
+
+log = logging.getLogger(__name__)
+
+
+class FollowedVehicle:
+    """Follows one autopilot; its position, with its errors, counts as the truth, for nothing better is known."""
+
+    def __init__(self, url: str, home: Vec3 = ZERO) -> None:
+        self.body = RigidBody(Airframe(), home)
+        self.landed_state = LandedState.ON_GROUND
+        self._url = url
+        self._link = ListeningLink(url)
+        self._track = LinkTrack()
+        self._velocity: Vec3 | None = None
+        self._tell_wall_s = time.monotonic() + SILENCE_S
+
+    def tick(self, now_s: float, dt_s: float) -> bool:
+        """Move the body to where the autopilot was at this moment of its clock; False when it has not come so far."""
+        until_s = time.monotonic() + WAIT_S
+        while not self.known(now_s):
+            rest_s = until_s - time.monotonic()
+            if rest_s <= 0.0:
+                self._tell_silence()
+                return False
+            self.listen(rest_s)
+        self._move(now_s, dt_s)
+        return True
+
+    def listen(self, wait_s: float = 0.0) -> None:
+        """Take what the autopilot has told, or tells first within ``wait_s``."""
+        for message in self._link.read(wait_s):
+            self._take(message)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._link.close()
+
+    def known(self, now_s: float) -> bool:
+        """Tell whether the autopilot has come so far."""
+        newest_s = self._track.newest_s
+        return newest_s is not None and newest_s >= now_s
+
+    def _take(self, message: object) -> None:
+        self._tell_wall_s = time.monotonic() + SILENCE_S
+        self._track.take(message)
+        state = getattr(message, "landed_state", None)
+        if state in LandedState._value2member_map_:
+            self.landed_state = LandedState(state)
+
+    def _move(self, now_s: float, dt_s: float) -> None:
+        motion, body = self._track.at(now_s), self.body
+        before = self._velocity or motion.velocity
+        self._velocity = motion.velocity
+        ax, ay, az = ((after - then) / dt_s for after, then in zip(motion.velocity, before, strict=True))
+        w, x, y, z = motion.attitude
+        body.specific_force = rotate((w, -x, -y, -z), (ax, ay, az + GRAVITY_M_S2))
+        body.position, body.velocity, body.attitude, body.rates = motion.position, motion.velocity, motion.attitude, motion.rates
+        body.on_ground = self.landed_state is LandedState.ON_GROUND
+
+    def _tell_silence(self) -> None:
+        if time.monotonic() >= self._tell_wall_s:
+            self._tell_wall_s += SILENCE_S
+            log.warning("no position and attitude from the autopilot at %s for %g s", self._url, SILENCE_S)

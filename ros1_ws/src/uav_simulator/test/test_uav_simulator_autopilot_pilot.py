@@ -1,0 +1,119 @@
+"""Failsafes and the pilot, by the numbers of the behaviours measured on ArduCopter."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from uav_simulator_link import (
+    ACCEPTED,
+    GUIDED,
+    LAND,
+    LOITER,
+    POSITION,
+    POSITION_YAW,
+    RTL,
+    Link,
+    yaw_ned_deg,
+)
+
+from uav_simulator.autopilot.endpoint import Endpoint
+
+# --- 10 failsafes --------------------------------------------------------------------------------------------------------
+
+
+def test_no_ground_station_is_needed_by_default():
+    link = Link().flying()
+    link.endpoint.gcs_present = False
+    link.run(20.0)
+    assert link.pilot.mode == GUIDED
+
+
+def test_with_fs_gcs_enable_it_returns_when_the_ground_station_falls_silent():
+    link = Link().flying()
+    link.send(mavlink.MAVLink_param_set_message(1, 1, b"FS_GCS_ENABLE", 1.0, mavlink.MAV_PARAM_TYPE_REAL32))
+    assert link.of("PARAM_VALUE")[-1].param_value == 1.0
+    link.endpoint.gcs_present = False
+    assert link.run_until(lambda: link.pilot.mode == RTL, timeout_s=8.0) == pytest.approx(5.0, abs=1.1)
+
+
+def ground_station(link):
+    """Open a second link, and return it with a function that sends a heartbeat over it."""
+    ground = Endpoint(link.pilot, gcs_present=False)
+    link.endpoint.gcs_present = False
+    link.endpoint.connect(ground)
+    station = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    beat = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3)
+    return ground, lambda: ground.feed(beat.pack(station))
+
+
+def test_a_ground_station_on_a_link_of_its_own_is_heard_and_forwarded():
+    link = Link()
+    ground, beat = ground_station(link)
+    beat()
+    link.run(0.1)
+    assert len(link.of("HEARTBEAT", system=255)) == 1
+    ground.take_output()
+    assert link.command(176, 1, GUIDED) == ACCEPTED
+    assert link.command(21) == ACCEPTED
+    heard = mavlink.MAVLink(None).parse_buffer(ground.take_output())
+    assert {m.custom_mode for m in heard if m.get_type() == "HEARTBEAT"} == {GUIDED, LAND}
+    assert not [m for m in heard if m.get_type() == "COMMAND_ACK"], "answers go to who has asked"
+    link.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+    assert [m.get_srcComponent() for m in mavlink.MAVLink(None).parse_buffer(ground.take_output())] == [191]
+
+
+def test_the_control_link_is_lost_and_comes_back():
+    link = Link(params={"FS_GCS_ENABLE": 1.0}).flying()
+    _, beat = ground_station(link)
+    for _ in range(8):
+        beat()
+        link.run(1.0)
+    assert link.pilot.mode == GUIDED
+    link.received.clear()
+    assert link.run_until(lambda: link.pilot.mode == RTL, timeout_s=8.0) == pytest.approx(4.0, abs=0.3)
+    link.run(1.1)
+    assert "GCS Failsafe" in link.texts()
+    assert link.of("HEARTBEAT")[-1].system_status == 5
+    beat()
+    link.run(1.1)
+    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 4)
+
+
+def test_rc_loss_returns_home_and_stays_when_rc_comes_back():
+    link = Link().flying()
+    link.setpoint(POSITION, (0, 8, -3))
+    link.run(8.0)
+    link.pilot.set_rc(lost=True)
+    link.run(1.2)
+    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 5)
+    link.pilot.set_rc(lost=False)
+    link.run(1.2)
+    assert (link.of("HEARTBEAT")[-1].custom_mode, link.of("HEARTBEAT")[-1].system_status) == (RTL, 4)
+    link.run_until(lambda: not link.pilot.armed, timeout_s=90.0)
+    assert math.hypot(*link.position[:2]) < 0.5
+
+
+# --- 11 the pilot --------------------------------------------------------------------------------------------------------
+
+
+def test_a_take_over_shows_within_a_fifth_of_a_second_and_setpoints_are_ignored():
+    link = Link().flying()
+    link.received.clear()
+    link.pilot.set_mode(LOITER)
+    link.run(0.2)
+    assert link.of("HEARTBEAT")[-1].custom_mode == LOITER
+    start = link.position
+    link.run(3.0, each_tick=lambda: link.setpoint(POSITION, (5, 0, -3)))
+    assert link.distance_to(start) < 0.15
+    assert link.command(176, 1, GUIDED) == ACCEPTED, "the autopilot itself lets a companion take over again"
+
+
+def test_the_yaw_stick_overrides_the_setpoints_yaw_until_it_is_centred():
+    link = Link().flying()
+    hold = (0, 0, -3)
+    link.pilot.yaw_stick(-0.5)
+    link.run(2.0, each_tick=lambda: link.setpoint(POSITION_YAW, hold, yaw=math.radians(90)))
+    assert yaw_ned_deg(link) > 120.0
+    link.pilot.yaw_stick(0.0)
+    link.run(5.0, each_tick=lambda: link.setpoint(POSITION_YAW, hold, yaw=math.radians(90)))
+    assert yaw_ned_deg(link) == pytest.approx(90.0, abs=3.0)
