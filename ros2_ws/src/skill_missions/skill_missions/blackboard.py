@@ -40,6 +40,8 @@ class Blackboard:
     pending: PendingInterrupts
     failures: list[Failure] = field(default_factory=list)
     reason: str = ""
+    remarks: dict[str, str] = field(default_factory=dict)
+    """Why a resource is as it is, in the robot's own words, by ``skillset.resource``."""
 
     @property
     def now_s(self) -> float:
@@ -54,3 +56,12 @@ class Blackboard:
         """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""
         sentences = dict.fromkeys(failure.sentence() for failure in self.failures)
         self.reason = "; then ".join(sentences)
+
+    def explained(self) -> str:
+        """Return the reason as it is told at the end; a robot's blackboard may add what it knows beyond the skills."""
+        return self.reason
+
+    def because(self, resource: str) -> str:
+        """Return what is remarked on a resource, to be put behind a sentence; empty when there is nothing."""
+        remark = self.remarks.get(resource, "")
+        return f": {remark}" if remark else ""

@@ -100,6 +100,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _make_director(self) -> Director:
         mission, blackboard = self._plan.make(self._skillsets, self._clock_ns, self._values)
+        self._plan.listen(self, blackboard)
         return Director(mission, blackboard, start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S))
 
     def _parameter(self, name: str, default: float) -> Any:

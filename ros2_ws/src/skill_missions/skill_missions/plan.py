@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from skill_missions.blackboard import Blackboard
 from skill_missions.director import Mission
@@ -18,6 +19,10 @@ def nothing_more() -> Mapping[str, object]:
     return {}
 
 
+def hear_nothing(_node: object, _blackboard: Blackboard) -> None:
+    """Listen to nothing beyond the skillsets."""
+
+
 @dataclass(frozen=True)
 class MissionPlan:
     """One mission.
@@ -29,6 +34,7 @@ class MissionPlan:
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         departure: resource and state; the run's files count time from when this state is left first.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
+        listen: on ROS 2, has the node listen to whoever says why a resource is as it is (``Blackboard.remarks``).
     """
 
     scenario: str
@@ -37,3 +43,4 @@ class MissionPlan:
     parameters: Mapping[str, float] = field(default_factory=dict)
     departure: tuple[str, str] | None = None
     facts: Callable[[], Mapping[str, object]] = nothing_more
+    listen: Callable[[Any, Blackboard], None] = hear_nothing

@@ -55,14 +55,28 @@ def test_nothing_starts_before_the_vehicle_is_ready_and_the_wait_is_bounded():
     ],
 )
 def test_each_condition_of_the_start_counts(resource, state):
-    assert unmet_conditions(clients(World(resources=dict(READY)))) == []
-    assert len(unmet_conditions(clients(World(resources={**READY, resource: state})))) == 1
+    assert unmet(World(resources=dict(READY))) == []
+    assert len(unmet(World(resources={**READY, resource: state}))) == 1
+
+
+def unmet(world: World, **remarks: str) -> list[str]:
+    blackboard = make_blackboard(world)
+    blackboard.remarks.update({name.replace("__", "."): remark for name, remark in remarks.items()})
+    return unmet_conditions(clients(world), blackboard)
+
+
+def test_a_missing_driver_is_named():
+    world = World(resources={**READY, "zed_status": "UNKNOWN"})
+    assert unmet(world, perception__zed_status="no images on /zed/left/image_raw") == [
+        "nothing is known of the ZED: no images on /zed/left/image_raw"
+    ]
 
 
 def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():
-    skillsets = clients(World(resources=dict(READY)))
+    world = World(resources=dict(READY))
+    skillsets = clients(world)
     skillsets.mapping.ready = False
-    assert unmet_conditions(skillsets) == ["the skillset mapping can't be called"]
+    assert unmet_conditions(skillsets, make_blackboard(world)) == ["the skillset mapping can't be called"]
 
 
 def test_a_broken_zed_does_not_keep_the_mission_from_starting():

@@ -9,6 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from skill_missions.blackboard import Blackboard
+from uav_missions.remarks import AUTHORITY_INVARIANT, who_has_it
 from uav_missions.route import Route, Waypoint
 
 
@@ -25,6 +26,12 @@ class RouteBlackboard(Blackboard):
         waypoint = None if self.waypoint is None else list(self.waypoint)
         own = {"waypoint": waypoint, "waypoints_reached": self.route.reached, "aligned_yaw_rad": self.aligned_yaw_rad}
         return {**super().values(), **own}
+
+    def explained(self) -> str:
+        """Return the reason; where the authority was lost, with who has it."""
+        lost = any(failure.result == AUTHORITY_INVARIANT for failure in self.failures)
+        remark = who_has_it(self) if lost else ""
+        return f"{self.reason} ({remark})" if remark else self.reason
 
 
 class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped

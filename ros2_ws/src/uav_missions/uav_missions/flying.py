@@ -16,6 +16,7 @@ from skill_missions.leaves import Awaits, Check, Do, SkillLeaf, Stays
 from skill_missions.skillset import Client
 from skill_model.execution_state import ExecutionState
 from uav_missions.blackboard import RouteBlackboard, WaypointWriter
+from uav_missions.remarks import AUTHORITY
 from uav_missions.route import wrap_rad
 
 AUTHORITY_INVARIANTS = frozenset({"keep_sdk_authority", "sdk_authority"})
@@ -147,12 +148,12 @@ class Flying:
         return yaw_rad is not None and abs(wrap_rad(yaw_rad - sideways_yaw_rad(self._blackboard))) < HEADING_TOLERANCE_RAD
 
 
-def unmet_of_flight(navigation: Client, clients: Iterable[Client]) -> list[str]:
+def unmet_of_flight(navigation: Client, clients: Iterable[Client], blackboard: RouteBlackboard) -> list[str]:
     """Return what keeps any mission from starting, in words."""
     resources = navigation.resources
     unmet = [f"the skillset {client.skillset} can't be called" for client in clients if not client.ready]
     if resources.get("SDK_authority") != "AVAILABLE":
-        unmet.append("the autopilot is not ready, or not ours to command (SDK_authority)")
+        unmet.append("the autopilot is not ready, or not ours to command (SDK_authority)" + blackboard.because(AUTHORITY))
     if resources.get("homepoint_status") != "VALID":
         unmet.append("the home point is not valid")
     if resources.get("flight_status") != "ON_GROUND":

@@ -105,10 +105,11 @@ class InspectionMission:
 
     def unmet_conditions(self) -> list[str]:
         """Return what keeps the mission from starting, in words."""
-        unmet = unmet_of_flight(self._clients.navigation, vars(self._clients).values())
+        unmet = unmet_of_flight(self._clients.navigation, vars(self._clients).values(), self._blackboard)
         lidar = self._clients.perception.resources.get("lidar_status", "UNKNOWN")
         if lidar != "OK":
-            unmet.append("nothing is known of the LiDAR" if lidar == "UNKNOWN" else "the LiDAR is broken: nothing would look ahead")
+            told = "nothing is known of the LiDAR" if lidar == "UNKNOWN" else "the LiDAR is broken, nothing would look ahead"
+            unmet.append(told + self._blackboard.because("perception.lidar_status"))
         if self._clients.video.resources.get("link") != "UP":
             unmet.append("the ground station is not heard of (link)")
         return unmet

@@ -93,7 +93,7 @@ class MappingMission:
 
     def unmet_conditions(self) -> list[str]:
         """Return what keeps the mission from starting, in words."""
-        return unmet_conditions(self._clients)
+        return unmet_conditions(self._clients, self._blackboard)
 
     def stop_here(self) -> Behaviour:
         """Make a tree that stops the vehicle and lands it where it is; also what an abort from outside ends with."""
@@ -129,15 +129,15 @@ class MappingMission:
         return SkillLeaf(name, self._clients.perception, skill, {}, blackboard=self._blackboard)
 
 
-def unmet_conditions(clients: Clients) -> list[str]:
+def unmet_conditions(clients: Clients, blackboard: RouteBlackboard) -> list[str]:
     """Return what keeps the mission from starting, in words."""
     perception = clients.perception.resources
-    unmet = unmet_of_flight(clients.navigation, vars(clients).values())
+    unmet = unmet_of_flight(clients.navigation, vars(clients).values(), blackboard)
     for sensor, name in (("zed_status", "ZED"), ("lidar_status", "LiDAR")):
         if perception.get(sensor, "UNKNOWN") == "UNKNOWN":
-            unmet.append(f"nothing is known of the {name}")
+            unmet.append(f"nothing is known of the {name}" + blackboard.because(f"perception.{sensor}"))
     if perception.get("lidar_status") == "BROKEN":
-        unmet.append("the LiDAR is broken: there is nothing to map with")
+        unmet.append("the LiDAR is broken, there is nothing to map with" + blackboard.because("perception.lidar_status"))
     return unmet
 
 

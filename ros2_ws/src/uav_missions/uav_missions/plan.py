@@ -13,6 +13,7 @@ from skill_missions.director import Mission
 from skill_missions.pending import PendingInterrupts
 from skill_missions.plan import MissionPlan
 from skill_missions.skillset import Client, Clock
+from uav_missions import remarks
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.flying import FlightSettings
 from uav_missions.route import Route
@@ -42,7 +43,7 @@ def route_plan(name: str, skillsets: tuple[str, ...], make_tree: MakeTree, setti
 
     waypoints = [list(waypoint) for waypoint in route.waypoints]
     facts = lambda: {"waypoints": len(waypoints), "waypoints_reached": route.reached, "route": waypoints}  # noqa: E731
-    return MissionPlan(name, skillsets, make, vars(settings), DEPARTURE, facts)
+    return MissionPlan(name, skillsets, make, vars(settings), DEPARTURE, facts, remarks.listen)
 
 
 def settings_of(defaults: FlightSettings, values: Mapping[str, float]) -> FlightSettings:

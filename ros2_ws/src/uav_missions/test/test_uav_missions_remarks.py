@@ -1,0 +1,56 @@
+"""Who has the vehicle is told at the end: the pilot, or nobody over a lost link."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from uav_missions_fakes import World, make_blackboard
+
+from skill_missions.blackboard import Failure
+from skill_model.execution_state import ExecutionState
+from uav_missions.remarks import note_authority, note_health
+
+LOST = Failure("fly", "navigation.goto", ExecutionState.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority", "")
+
+
+def state(**changes: object) -> SimpleNamespace:
+    return SimpleNamespace(**{"authority": False, "link": True, "mode": "LOITER", "landed_state": 2, "ready": True, **changes})
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        (state(), "the vehicle is in LOITER: the pilot or a failsafe has it"),
+        (state(link=False, mode="GUIDED"), "the link to the autopilot is lost"),
+        (state(landed_state=1, ready=False, mode="STABILIZE"), "the vehicle stands in STABILIZE, its own checks are not passed"),
+    ],
+)
+def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, words):
+    blackboard = make_blackboard(World())
+    note_authority(blackboard, told)
+    note_authority(blackboard, state(authority=True))
+    blackboard.failures.append(LOST)
+    blackboard.note_reason()
+    assert blackboard.explained() == f"navigation.goto: RESOURCE_INVARIANT_VIOLATED keep_sdk_authority ({words})"
+
+
+def test_an_autopilot_that_starts_anew_leaves_the_guidance_in_command():
+    blackboard = make_blackboard(World())
+    note_authority(blackboard, state(landed_state=1, ready=False, mode="STABILIZE"))
+    note_authority(blackboard, state(landed_state=1, authority=True, mode="GUIDED"))
+    note_authority(blackboard, state(authority=True, mode="GUIDED"))
+    blackboard.failures.append(LOST)
+    blackboard.note_reason()
+    assert blackboard.explained().endswith("keep_sdk_authority (the autopilot has started anew)")
+
+
+def test_other_failures_are_told_without_it():
+    blackboard = make_blackboard(World())
+    note_authority(blackboard, state())
+    note_health(blackboard, "perception.zed_status", SimpleNamespace(reason="no images"))
+    blackboard.failures.append(Failure("watch", "perception.zed_depthmap", ExecutionState.TERMINATED, "LOST", ""))
+    blackboard.note_reason()
+    assert blackboard.explained() == "perception.zed_depthmap: LOST"
+    assert blackboard.because("perception.zed_status") == ": no images"
+    assert blackboard.because("perception.lidar_status") == ""
