@@ -62,7 +62,8 @@ class GroundModel:
         return heights
 
     def _envelope(self, lowest: Floats) -> Floats:
-        return np.min(self._cones + lowest.astype(np.float32), axis=1).astype(np.float64)
+        envelope: Floats = np.min(self._cones + lowest.astype(np.float32), axis=1).astype(np.float64)
+        return envelope
 
     def _remembered(self, origin: Floats, direction: Floats) -> Floats:
         """Return how high the ground can be by what was seen near the vehicle before; at first the ground of the take-off is at 0."""

@@ -52,7 +52,7 @@ def deskew(sweep: Sweep, poses: PoseBuffer, T_base_sensor: Floats) -> Floats:  #
     if not len(sweep.points):
         return np.empty((0, 3))
     begin, end = float(sweep.times_s.min()), float(sweep.times_s.max())
-    knots_s = np.linspace(begin, end, max(2, int(np.ceil((end - begin) / KNOT_S)) + 1))
+    knots_s = np.linspace(begin, end, max(2, int(np.ceil((end - begin) / KNOT_S)) + 1), dtype=np.float64)
     at_knots = poses.at([sweep.stamp_ns + int(knot * NS) for knot in knots_s])
     return straighten(sweep.points @ T_base_sensor[:3, :3].T + T_base_sensor[:3, 3], sweep.times_s, knots_s, at_knots)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
@@ -51,8 +52,9 @@ class RawSubscriber(Generic[Message]):
         self._lock = Lock()
         self._heard_s = time.monotonic()
         self._patience_s = SILENCE_S
-        self._subscriber = self._subscribe()
+        self._reconnected_s = -math.inf
         self._ended = False
+        self._subscriber = self._subscribe()
         self._watch = Thread(target=self._watch_connections, daemon=True)
         self._watch.start()
 
@@ -61,8 +63,10 @@ class RawSubscriber(Generic[Message]):
 
     @property
     def published(self) -> bool:
-        """Whether somebody publishes there."""
-        return bool(self._subscriber.get_num_connections())
+        """Whether somebody publishes there; somebody did if the connections are just being made anew."""
+        with self._lock:
+            connected = not self._ended and bool(self._subscriber.get_num_connections())
+        return connected or time.monotonic() - self._reconnected_s < SILENCE_S
 
     def close(self) -> None:
         """End the subscription."""
@@ -94,9 +98,10 @@ class RawSubscriber(Generic[Message]):
 
     def _reconnect(self) -> None:
         with self._lock:
-            if self._ended or not self.published:
+            if self._ended or not self._subscriber.get_num_connections():
                 self._heard_s = time.monotonic()
                 return
+            self._reconnected_s = time.monotonic()
             self._subscriber.unregister()
             self._subscriber = self._subscribe()
         self._heard_s, self._patience_s = time.monotonic(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)

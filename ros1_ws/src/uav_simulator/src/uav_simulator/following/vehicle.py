@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from typing import Any
 
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.following.link import ListeningLink
@@ -57,12 +58,11 @@ class FollowedVehicle:
         newest_s = self._track.newest_s
         return newest_s is not None and newest_s >= now_s
 
-    def _take(self, message: object) -> None:
+    def _take(self, message: Any) -> None:
         self._tell_wall_s = time.monotonic() + SILENCE_S
         self._track.take(message)
-        state = getattr(message, "landed_state", None)
-        if state in LandedState._value2member_map_:
-            self.landed_state = LandedState(state)
+        if message.get_type() == "EXTENDED_SYS_STATE" and message.landed_state in LandedState._value2member_map_:
+            self.landed_state = LandedState(message.landed_state)
 
     def _move(self, now_s: float, dt_s: float) -> None:
         motion, body = self._track.at(now_s), self.body
