@@ -64,7 +64,7 @@ def lift_off_of(bag: rosbag.Bag) -> int:
 def make_nodes(graph: offline.Graph, map_path: str) -> list[object]:
     """Make the nodes as their executables do, on the offline graph."""
     setattr(importlib.import_module("perception_core.ros.health"), "ResourceReporter", offline.OfflineReporter)  # noqa: B010
-    read_settings = importlib.import_module("perception_core.ros").read_settings
+    override = importlib.import_module("perception_core.ros.settings").override
     made: list[object] = []
     for name, (node, settings) in NODES.items():
         module = importlib.import_module(f"{name}.node")
@@ -75,7 +75,7 @@ def make_nodes(graph: offline.Graph, map_path: str) -> list[object]:
         if hasattr(defaults, "map_path"):
             defaults = replace(defaults, map_path=map_path)
         with graph.node(name):
-            made.append(getattr(module, node)(read_settings(defaults)))
+            made.append(getattr(module, node)(override(defaults, graph.own_parameters())))
     return made
 
 

@@ -102,6 +102,14 @@ class OfflinePublisher:
         return 0
 
 
+class OfflineSubscription:
+    """A topic's reading end; the bag stands for the driver that publishes there."""
+
+    def get_num_connections(self) -> int:
+        """Return how many publish."""
+        return 1
+
+
 class OfflineService:
     """A service."""
 
@@ -165,8 +173,9 @@ def install(graph: Graph) -> None:
     OfflineWorker.graph = OfflineReporter.graph = graph
     genpy.Time.now = rospy.Time.now = staticmethod(now)
 
-    def subscribe(name: str, kind: Any, callback: Callable[[Any], None], **_: object) -> None:
+    def subscribe(name: str, kind: Any, callback: Callable[[Any], None], **_: object) -> OfflineSubscription:
         graph.subscribers.setdefault(graph.resolve(name), []).append((kind, callback))
+        return OfflineSubscription()
 
     def repeat(period: Any, callback: Callable[[object], None], **_: object) -> None:
         def again() -> None:
