@@ -45,6 +45,11 @@ def test_a_mock_flight_is_as_the_paper_shows_it_and_the_other_is_not(runs, figur
     assert len(problems(path, runs[differs])) > 3
 
 
+@pytest.mark.parametrize(("figure", "recording"), [("11", "mapping"), ("12", "mapping-zed")])
+def test_a_flight_of_the_whole_stack_is_as_the_paper_shows_it(figure, recording):
+    assert problems(FIGURES / f"figure-{figure}.yaml", load_run(ROOT / "tests" / "recordings" / recording)) == []
+
+
 @pytest.mark.parametrize("name", ["nominal", "failing"])
 def test_what_is_written_from_a_run_is_fulfilled_by_it_and_by_no_other(runs, name, tmp_path):
     path = written(tmp_path / "e.yaml", expectations_of(runs[name]))

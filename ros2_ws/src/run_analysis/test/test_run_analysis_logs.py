@@ -81,6 +81,12 @@ def test_every_kind_of_log_says_the_same(tmp_path, flown, capsys):
         assert (verdict["conforms"], verdict["events"], verdict["cut"]) == (True, len(flown), "")
 
 
+@pytest.mark.parametrize("name", ["mapping", "mapping-zed", "mapping-both", "inspection", "inspection-radio"])
+def test_flights_of_the_whole_stack_conform(name, capsys):
+    assert main([str(ROOT / "tests" / "recordings" / name)]) == 0
+    assert ": conforms: " in capsys.readouterr().out
+
+
 def test_what_does_not_conform_is_told_and_ends_with_1(tmp_path, flown, capsys):
     at = next(number for number, event in enumerate(flown) if getattr(event, "resource", "") == "axes_authority")
     lines(tmp_path / "events.jsonl", [*flown[:at], *flown[at + 1 :]])
