@@ -35,6 +35,7 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["bench", "nosuch"], "nosuch"),
         (["mock", "no/such/folder"], "no/such/folder"),
         (["panel", "--run", "no/such/run"], "no/such/run"),
+        (["console", "--run", "no/such/run"], "no/such/run"),
         (["new", "robot", "Small-Rover"], "Small-Rover"),
         (["conform", "no/such/run"], "no/such/run"),
         (["expect", "no/such/run"], "no/such/run"),
