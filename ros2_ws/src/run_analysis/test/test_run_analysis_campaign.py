@@ -148,7 +148,9 @@ def test_the_coverage_counts_answers_and_keeps_the_worst():
     assert page.count("<tr>") == 3
 
 
-@pytest.mark.parametrize("other", [{"conforms": False}, {"open": ["x"]}, {"collisions": 1}, {"landed": False}, {"problems": ["x"]}])
+@pytest.mark.parametrize(
+    "other", [{"conforms": False}, {"open": ["x"]}, {"collisions": 1}, {"landed": False}, {"problems": ["x"]}, {"outcome": "not_started"}]
+)
 def test_what_must_not_be_is_trouble(other):
     assert not is_troubled(row())
     assert is_troubled(row(**other))

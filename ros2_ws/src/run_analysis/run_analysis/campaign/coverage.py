@@ -45,7 +45,7 @@ class Coverage:
     flights: int
     outcomes: Mapping[str, int]
     troubled: Sequence[int]
-    """Flights that did not conform, left something open, collided, did not land, or had problems."""
+    """Flights that did not come to an end or conform, left something open, collided, did not land, or had problems."""
 
     @property
     def never(self) -> list[Way]:
@@ -82,7 +82,8 @@ def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
 
 def is_troubled(row: Row) -> bool:
     """Tell whether something is wrong with a flight, whatever failed in it."""
-    return bool(not row["conforms"] or row["open"] or row["collisions"] or row["landed"] is False or row["problems"])
+    unfinished = row["outcome"] in {"not_started", "running", None}
+    return bool(unfinished or not row["conforms"] or row["open"] or row["collisions"] or row["landed"] is False or row["problems"])
 
 
 def _count(one: Cover, row: Row, answer: str, after_s: float | None) -> None:
