@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula_common.files import write_json, write_text
+from alula_common.runs import runs_folder
 from run_analysis.campaign.coverage import Coverage, cover, processes
 from run_analysis.campaign.failures import ways_to_fail
 from run_analysis.campaign.plan import MOCKS, Campaign, load_campaign
@@ -79,7 +80,7 @@ def finish(table: Table, out: Path, title: str) -> Coverage:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Fly; return the exit code."""
     given = parse(sys.argv[1:] if arguments is None else arguments)
-    out = given.out or Path("runs") / f"campaign-{given.file.stem}"
+    out = given.out or runs_folder() / f"campaign-{given.file.stem}"
     try:
         campaign = load_campaign(given.file)
         check_faults(campaign)
