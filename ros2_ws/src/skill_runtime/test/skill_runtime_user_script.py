@@ -21,6 +21,7 @@ async def go(uav: Uav) -> str:
     """Fly to a point, unless the vehicle lands first."""
     leg = uav.navigation.goto(target=(4.0, 2.0, 3.0), speed=1.5)
     uav.navigation.flight_status.on_change(lambda state: leg.interrupt() if state == "ON_GROUND" else None)
+    print("on the way")
     ended = await leg
     return ended.outcome
 
