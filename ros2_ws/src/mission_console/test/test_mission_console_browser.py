@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import HOSTILE, LIFT_OFF_S, Story, failing_story, tree, write_record
+from mission_console_records import HOSTILE, LIFT_OFF_S, Story, failing_story, tree, write_record
 
 from alula_common.network import free_port
 from alula_common.record import EVENTS, MISSION, TREE

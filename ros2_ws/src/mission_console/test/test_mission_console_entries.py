@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import HOSTILE, failing_story, tree, write_map, write_record
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
+from mission_console_records import HOSTILE, failing_story, tree, write_map, write_record
 
 from alula_common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
 from mission_console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
