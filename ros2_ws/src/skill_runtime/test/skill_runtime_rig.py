@@ -132,7 +132,9 @@ class Navigation:
             take(self.node, resource, state)
 
     def fly(self):
+        dispatched = self.hooks["goto_straight"].dispatched
+        dispatched.clear()  # of an execution before
         handle = self.client.start("goto_straight", target=(1, 2.5, 3), speed=1)
         until(lambda: handle.state is S.RUNNING, f"goto_straight runs, it is {handle}")
-        assert self.hooks["goto_straight"].dispatched.wait(SOON_S)
+        assert dispatched.wait(SOON_S)
         return handle
