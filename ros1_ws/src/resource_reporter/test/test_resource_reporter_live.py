@@ -27,6 +27,7 @@ class Skillset:
         self.state = "UNKNOWN"
         self.calls: list[tuple[float, str]] = []
         self.hangs: threading.Event | None = None
+        self._lock = threading.Lock()  # one transition at a time, shown in its order, as a real manager does
         self._publisher = rospy.Publisher(f"/{SKILLSET}/resource_states", ResourceStates, queue_size=5, latch=True)
         self._service: object = None
         self.show()
@@ -52,11 +53,12 @@ class Skillset:
         self.calls.append((time.monotonic(), request.to))
         if self.hangs is not None:
             self.hangs.wait(10.0)
-        if (self.state, request.to) not in ARROWS:
-            return TransitionResponse(False, f"no arrow from {self.state} to {request.to}", self.state)
-        self.state = request.to
-        self.show()
-        return TransitionResponse(True, "", self.state)
+        with self._lock:
+            if (self.state, request.to) not in ARROWS:
+                return TransitionResponse(False, f"no arrow from {self.state} to {request.to}", self.state)
+            self.state = request.to
+            self.show()
+            return TransitionResponse(True, "", self.state)
 
 
 @pytest.fixture

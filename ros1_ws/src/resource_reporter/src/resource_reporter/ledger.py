@@ -24,9 +24,9 @@ class _Entry:
     not_before_s: float = 0.0
     retry_s: float = FIRST_RETRY_S
 
-    def put_off(self, now_s: float) -> None:
-        """Ask again later: 25 ms after the first attempt, then twice as long each time, at most 0.2 s."""
-        self.not_before_s = now_s + self.retry_s
+    def put_off(self, now_s: float, least_s: float) -> None:
+        """Ask again later: 25 ms after the first attempt, then twice as long each time, at most 0.2 s, and never below ``least_s``."""
+        self.not_before_s = now_s + max(self.retry_s, least_s)
         self.retry_s = min(2.0 * self.retry_s, LONGEST_RETRY_S)
 
 
@@ -34,8 +34,9 @@ class _Entry:
 class Ledger:
     """Keep what the hardware says beside what the skillset says. Times are seconds of any clock that only grows.
 
-    Level-triggered: only the last wanted state of a resource counts, and it is asked for again whenever the skillset disagrees,
-    for instance because it was started anew. Before the skillset has shown its states nothing is asked.
+    Level-triggered: only the last wanted state of a resource counts, and it is asked for again whenever the skillset shows another,
+    for instance because it was restarted. Before the skillset has shown its states nothing is asked. Only what it shows counts as
+    its state: an answer comes over another connection, and may be older than the last state shown.
     """
 
     _wanted: dict[str, _Entry] = field(default_factory=dict)
@@ -71,14 +72,13 @@ class Ledger:
         times = [entry.not_before_s for name, entry in self._wanted.items() if self._differs(name)]
         return max(0.0, min(times) - now_s) if times else None
 
-    def accepted(self, call: Call, state: str, now_s: float) -> None:
-        """Note that the call was accepted and which state it left; what is shown meanwhile may be older than the answer."""
-        self._actual[call.resource] = state
-        self._put_off(call, now_s)
+    def reached(self, call: Call, now_s: float) -> None:
+        """Note an answer by which the resource has the state asked for; the skillset gets the longest wait to show it."""
+        self._put_off(call, now_s, LONGEST_RETRY_S)
 
     def refused(self, call: Call, reason: str, now_s: float) -> bool:
         """Note a refusal or a failed call, to be tried again; return whether this (call, reason) is told for the first time."""
-        self._put_off(call, now_s)
+        self._put_off(call, now_s, FIRST_RETRY_S)
         first = (call, reason) not in self._told
         self._told.add((call, reason))
         return first
@@ -87,10 +87,10 @@ class Ledger:
         """Return the wanted resources that the skillset, which has shown its states, does not have."""
         return [name for name in self._wanted if self._actual and name not in self._actual]
 
-    def _put_off(self, call: Call, now_s: float) -> None:
+    def _put_off(self, call: Call, now_s: float, least_s: float) -> None:
         entry = self._wanted.get(call.resource)
         if entry is not None and entry.state == call.to:
-            entry.put_off(now_s)
+            entry.put_off(now_s, least_s)
 
     def _differs(self, resource: str) -> bool:
         return resource in self._actual and self._actual[resource] != self._wanted[resource].state

@@ -84,9 +84,9 @@ class ResourceReporter:
             self._note_refusal(call, str(error))
             return
         tell_call(service, request, answer, begin_s)
-        if answer.accepted:
+        if answer.accepted or answer.state == call.to:  # refused there: it had that state already
             with self._changed:
-                self._ledger.accepted(call, answer.state, time.monotonic())
+                self._ledger.reached(call, time.monotonic())
             return
         self._note_refusal(call, answer.reason)
 
