@@ -1,7 +1,7 @@
 """Build the ROS 2 workspace with colcon: the packages that have changed since they were last built, and those that need them.
 
 Runs in the ROS 2 world's environment. What was built from what is kept in ``$ALULA_STATE/ros2/built.json``: contents decide, not time
-stamps, so a fresh checkout may take over the state of another. A change of compiler, Python or generators builds everything anew.
+stamps, so a fresh checkout may take over the state of another. A change of compiler, Python or generators builds everything again.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def is_younger(name: str, package: Package) -> bool:
 
 
 def has_leftovers(name: str, package: Package) -> bool:
-    """Tell whether code generated of a definition that is gone is left: rosidl does not make its lists of messages anew then."""
+    """Tell whether code generated of a definition that is gone is left: rosidl does not make its lists of messages again then."""
     generated = (BUILD / name / "rosidl_generator_py" / name).glob("*/_*.py")
     kept = {path.stem.replace("_", "").lower() for path in generated if path.name != "__init__.py"}
     defined = {path.stem.replace("_", "").lower() for path in build_files(package.folder) if path.suffix in {".msg", ".srv", ".action"}}

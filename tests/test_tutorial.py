@@ -26,7 +26,7 @@ def checkout(tmp_path):
     """Return the words before a command that has it work on the checkout and leave the checkout as it is, also what was built.
 
     Mounting needs a mount namespace: root's own, or one of a user namespace. A machine that allows neither skips the test: without
-    the layer everything would have to be set up anew.
+    the layer everything would have to be set up again.
     """
     layer = tmp_path / "layer"
     for name in ("upper", "work"):

@@ -46,7 +46,7 @@ class Watch:
         self.ending = False
 
     def process_died(self, process_name: str, exit_code: int | None) -> None:
-        """Note a death; called by the process monitor's thread, again and again until the process runs anew."""
+        """Note a death; called by the process monitor's thread, again and again until the process runs again."""
         if self.ending:
             return
         process = self.monitor.get_process(process_name)

@@ -80,7 +80,7 @@ def make_nodes(graph: offline.Graph, map_path: str) -> list[object]:
 
 
 def _untuned(_settings: object, _apply: object) -> None:
-    """Nobody changes parameters on the way."""
+    """Offer no parameters to change: a replay keeps those it began with."""
 
 
 class Perception:

@@ -77,7 +77,7 @@ class Graph:
                 callback(wanted().deserialize(data))
 
     def call(self, service: str, request: Mapping[str, Any]) -> bool:
-        """Call a service as it was called; tell whether somebody serves it here."""
+        """Repeat a recorded call of a service; return whether a node here serves it."""
         served = self.services.get(service)
         if served is None:
             return False

@@ -1,6 +1,6 @@
 """Ways to spoil a log of one skillset.
 
-Where events are taken away, added or moved, the log is numbered and stamped anew (``renumbered``): numbers alone would give it away,
+Where events are taken away, added or moved, the log is numbered and stamped again (``renumbered``): numbers alone would give it away,
 and only what the events say is left to tell.
 """
 

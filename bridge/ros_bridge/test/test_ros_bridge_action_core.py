@@ -252,7 +252,7 @@ def test_any_course_of_events_gives_each_ros1_client_exactly_one_result(events):
     table.connect(server, clients)
     now, sent = 0.0, set()
     for kind, *what in events:
-        if now > 4.0:  # actionlib takes a name anew when it has forgotten it
+        if now > 4.0:  # actionlib takes a name again when it has forgotten it
             break
         uuids = [table._goals[f"{number}"].uuid if f"{number}" in table._goals else bytes(16) for number in range(3)]
         match kind:

@@ -1,4 +1,4 @@
-"""The bridge as a process from its beginning to its end: signals, wrong configurations, a master that is not there yet or starts anew."""
+"""The bridge as a process from its beginning to its end: signals, wrong configurations, a master that is not there yet or restarts."""
 
 import json
 import signal

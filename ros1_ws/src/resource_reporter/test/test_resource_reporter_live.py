@@ -123,6 +123,6 @@ def test_a_hanging_service_blocks_nobody_for_long(skillset, reporter):
     begin_s = time.monotonic()
     reporter.report("zed_status", "BROKEN")
     assert time.monotonic() - begin_s < 0.5
-    wait_until(lambda: len(skillset.calls) >= 2, timeout_s=4.0, what="it is called anew after two seconds")
+    wait_until(lambda: len(skillset.calls) >= 2, timeout_s=4.0, what="it is called again after two seconds")
     skillset.hangs.set()
     becomes(skillset, "BROKEN")

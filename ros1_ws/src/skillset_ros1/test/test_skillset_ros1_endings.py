@@ -1,4 +1,4 @@
-"""Managers in a process of their own that is ended, killed, stopped and started anew: no client waits for ever."""
+"""Managers in a process of their own that is ended, killed, stopped and restarted: no client waits for ever."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_managers_that_are_started_anew_at_once_do_not_know_the_execution(served
     served.start()
     assert handle.wait(SOON_S)
     assert handle.state is S.FAILED
-    assert "gone" in handle.message or "started anew" in handle.message
+    assert "gone" in handle.message or "restarted" in handle.message
     until(lambda: served.client.resources.get("SDK_authority") == "UNAVAILABLE", "the states are those of the new ones")
     assert served.take_off().state is S.RUNNING
 

@@ -71,7 +71,7 @@ class FakeVehicle:
         self._change_mode(mode)
 
     def restart(self, mode: int) -> None:
-        """The autopilot's computer starts anew in the air: streams, boot time, what it was told, and where it counts from."""
+        """The autopilot's computer restarts in the air: streams, boot time, what it was told, and where it counts from."""
         self.forget_streams()
         self._booted_s = self.now_s
         self._change_mode(mode)

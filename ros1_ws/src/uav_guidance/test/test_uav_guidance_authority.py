@@ -161,7 +161,7 @@ def test_an_autopilot_that_starts_anew_in_guided_is_told_held_in_place_and_can_b
     flying.run(3.0)
     flying.vehicle.restart(GUIDED)
     flying.until(lambda r: r.vehicle.boots == 2, 4.0)
-    assert [record.getMessage() for record in caplog.records] == ["the autopilot has started anew, in GUIDED"]
+    assert [record.getMessage() for record in caplog.records] == ["the autopilot has restarted, in GUIDED"]
     flying.until(lambda r: r.course.reference == "hover", 3.0)
     place = flying.report.vehicle.position_enu_m
     flying.run(3.0)
@@ -181,7 +181,7 @@ def test_an_autopilot_that_starts_anew_in_another_mode_is_told_from_the_pilot_an
     flying.vehicle.restart(STABILIZE)
     flying.until(lambda r: r.vehicle.boots == 2, 4.0)
     assert flying.guidance.resources()["SDK_authority"] == "UNAVAILABLE"
-    assert flying.ask(HoverRequest()).reason == "no authority: the autopilot has started anew, in STABILIZE"
+    assert flying.ask(HoverRequest()).reason == "no authority: the autopilot has restarted, in STABILIZE"
     flying.run(5.0)
     assert flying.commands == commands
     assert flying.agreed(AuthorityRequest()).accepted

@@ -131,7 +131,7 @@ def test_a_clock_that_is_set_is_followed_at_once():
     for i in range(30):
         clock.stamp_ns(i * 20, i * 20 * 10**6)
     assert clock.stamp_ns(600, 50 * 10**9) == 50 * 10**9
-    assert clock.stamp_ns(20, 51 * 10**9) == 51 * 10**9  # the autopilot started anew
+    assert clock.stamp_ns(20, 51 * 10**9) == 51 * 10**9  # the autopilot restarted
 
 
 @pytest.mark.parametrize("rate", [0.3, 1.0, 4.0])

@@ -132,7 +132,7 @@ def test_where_nobody_has_watched_in_this_flight_it_flies_unwatched(flying):
     flying.agreed(LandRequest())
     flying.until(lambda r: not r.vehicle.armed)
     flying.run(0.2)
-    assert not flying.report.course.unwatched, "the next flight begins anew"
+    assert not flying.report.course.unwatched, "the next flight begins again"
 
 
 def test_standing_vehicle_is_not_stopped(flying):

@@ -208,9 +208,9 @@ def test_an_autopilot_that_starts_anew_finds_the_body_and_a_time_from_zero(vehic
     peer = Peer(vehicle.port)
     now_s = tick_while(vehicle, lambda: peer.fly(3.0, math.pi / 2, 2.0))
     assert vehicle.body.position[2] > 1.0
-    anew = Peer(vehicle.port)
-    now_s = tick_while(vehicle, lambda: [anew.step([1000] * 6) for _ in range(4)], now_s)
-    assert anew.state["timestamp"] == pytest.approx(0.01)
-    assert -anew.state["position"][2] == pytest.approx(vehicle.body.position[2])
-    now_s = tick_while(vehicle, lambda: anew.fly(-1.0, math.pi / 2, 8.0, until=lambda s: s["position"][2] == 0.0), now_s)
+    restarted = Peer(vehicle.port)
+    now_s = tick_while(vehicle, lambda: [restarted.step([1000] * 6) for _ in range(4)], now_s)
+    assert restarted.state["timestamp"] == pytest.approx(0.01)
+    assert -restarted.state["position"][2] == pytest.approx(vehicle.body.position[2])
+    now_s = tick_while(vehicle, lambda: restarted.fly(-1.0, math.pi / 2, 8.0, until=lambda s: s["position"][2] == 0.0), now_s)
     assert now_s > 2.0, "the simulation's clock goes on"

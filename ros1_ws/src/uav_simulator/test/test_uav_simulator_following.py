@@ -1,4 +1,4 @@
-"""Sensors that follow an autopilot over MAVLink: they are where it says, when it says, also after it has started anew."""
+"""Sensors that follow an autopilot over MAVLink: they are where it says, when it says, also after it has restarted."""
 
 from __future__ import annotations
 

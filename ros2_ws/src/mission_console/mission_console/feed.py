@@ -29,7 +29,7 @@ class Place:
 
 
 class Feed:
-    """The entries of one run. ``session`` names this life of the feed: who comes with another one begins anew."""
+    """The entries of one run. ``session`` names this life of the feed: who comes with another one begins again."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -53,7 +53,7 @@ def lines(log: Log, verdict: Verdict) -> Iterator[str]:
         yield f"  {finding}"
         yield "    would have been allowed: " + "; ".join(finding.allowed)
     for name, stamps in verdict.restarts.items():
-        yield f"  {name} was started anew at {', '.join(f'{stamp_s:.3f} s' for stamp_s in stamps)}"
+        yield f"  {name} was restarted at {', '.join(f'{stamp_s:.3f} s' for stamp_s in stamps)}"
     if verdict.open:
         yield f"  open at the end: {', '.join(verdict.open)}"
     if verdict.owed:

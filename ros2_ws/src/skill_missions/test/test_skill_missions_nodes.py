@@ -169,6 +169,6 @@ def test_another_chance_comes_after_its_wait_of_mission_clock_and_only_as_often_
     assert (ticked(retry), child.begun) == (R, 1)
     clock.s = 1.0
     assert (ticked(retry), child.begun) == (F, 2)
-    assert (ticked(retry), child.begun) == (R, 3)  # begun anew: all chances are back
+    assert (ticked(retry), child.begun) == (R, 3)  # begun again: all chances are back
     hopeless = RetryAfter("retry", Script(F), chances=2, wait_s=1.0, worth_it=lambda: False, blackboard=clock.board)
     assert ticked(hopeless) is F

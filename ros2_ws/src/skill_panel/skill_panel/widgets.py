@@ -131,7 +131,7 @@ class ResourceLine(Horizontal):
     def show(self, row: ResourceRow) -> None:
         """Show the state and its buttons at once; where one that goes had the focus, the line's first one takes it.
 
-        The buttons of all states stay mounted: making them anew takes several turns of the event loop, and a focus that is set
+        The buttons of all states stay mounted: rebuilding them takes several turns of the event loop, and a focus that is set
         after those would take the keys from where the user has gone meanwhile.
         """
         focused = self.screen.focused

@@ -146,7 +146,7 @@ TOPICS: Mapping[str, TopicCodec] = {
 }
 
 
-# Most of what these messages hold is what the one before has held: with many skills, to make it anew would take most of the time.
+# Most of what these messages hold is what the one before has held: with many skills, to rebuild it would take most of the time.
 # Of each name the last is kept, so that nothing grows with the time that passes.
 _resources: dict[str, tuple[ResourceValue, Any]] = {}
 _encoded: dict[tuple[str, str], tuple[SkillRecord, Any]] = {}

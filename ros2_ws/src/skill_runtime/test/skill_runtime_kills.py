@@ -60,7 +60,7 @@ class Mission:
         assert self.client.wait_ready(READY_S)
 
     def pid(self, part: str) -> int:
-        """The process of a part; waits while it is being started anew."""
+        """The process of a part; waits while it is being restarted."""
         end = time.monotonic() + END_S
         while True:
             for place in Path("/proc").glob("[0-9]*/cmdline"):

@@ -223,7 +223,7 @@ def test_a_goal_that_was_given_up_on_its_way_is_cancelled_at_managers_that_were_
 def test_managers_that_were_started_anew_do_not_know_what_runs(graph, client):
     handle = running(graph, client)
     graph.sign("two")
-    assert (handle.state, "started anew" in handle.message) == (S.FAILED, True)
+    assert (handle.state, "restarted" in handle.message) == (S.FAILED, True)
     graph.states("one", after=99, sdk="BROKEN")  # late, of those that are no more
     assert client.resources == {"sdk": "AVAILABLE"}
 

@@ -47,7 +47,7 @@ def alive(pid: int) -> bool:
 
 
 def runs(mission):
-    """An execution that runs, however often it has to be asked for: processes are being started anew."""
+    """An execution that runs, however often it has to be asked for: processes are being restarted."""
     handles = [mission.client.start(SKILL)]
 
     def one_runs() -> bool:

@@ -42,7 +42,7 @@ def test_an_autopilot_that_starts_anew_leaves_the_guidance_in_command():
     note_authority(blackboard, state(authority=True, mode="GUIDED"))
     blackboard.failures.append(LOST)
     blackboard.note_reason()
-    assert blackboard.explained().endswith("keep_sdk_authority (the autopilot has started anew)")
+    assert blackboard.explained().endswith("keep_sdk_authority (the autopilot has restarted)")
 
 
 def test_other_failures_are_told_without_it():

@@ -85,7 +85,7 @@ class Flying:
         on_ground = Stays("stays on the ground", self.on_ground, settings.settle_s, blackboard=self._blackboard)
         down = Selector("come down", memory=True, children=[on_ground, land])
         stop = Sequence("stop and land", memory=True, children=[FailureIsSuccess("if it can", hover), down])
-        # For a while: a navigation that was started anew does not know yet that the vehicle is ours.
+        # For a while: a navigation that was restarted does not know yet that the vehicle is ours.
         pilot: Behaviour = Stays("the pilot has control", lambda: not self.obeys(), settings.settle_s, blackboard=self._blackboard)
         if settings.others_landing_s > 0.0:
             lands = Awaits("somebody else lands it", self.on_ground, settings.others_landing_s, blackboard=self._blackboard)

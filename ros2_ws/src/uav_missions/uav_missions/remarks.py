@@ -48,4 +48,4 @@ def note_authority(blackboard: Blackboard, state: GuidanceState | Any) -> None:
 def who_has_it(blackboard: Blackboard) -> str:
     """Return who has a vehicle whose authority was lost; empty where nobody listened to the guidance."""
     # The guidance takes it from the skills and keeps it in one case only.
-    return (blackboard.remarks[AUTHORITY] or "the autopilot has started anew") if AUTHORITY in blackboard.remarks else ""
+    return (blackboard.remarks[AUTHORITY] or "the autopilot has restarted") if AUTHORITY in blackboard.remarks else ""

@@ -29,7 +29,7 @@ class FunctionalPart:
     """One part of the functional layer: a queue of calls, and a watch that notices when nothing is heard.
 
     ``now_s`` is mission clock without its jumps: when the clock itself did not come through for a while (the bridge was started
-    anew), nothing else came either, and what was not heard meanwhile must not count as silent.
+    again), nothing else came either, and what was not heard meanwhile must not count as silent.
     """
 
     def __init__(self, node: Node) -> None:

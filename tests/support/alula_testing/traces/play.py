@@ -144,7 +144,7 @@ class Player:
         return [event["sequence"], *(event[field] for field in _EVENT_FIELDS[event["kind"]])]
 
     def _with_labels(self, trace: Trace) -> Trace:
-        """Return the trace with labels for the ids that each play makes anew."""
+        """Return the trace with labels for the ids that each play makes again."""
         text = json.dumps(trace)
         for label, handle in self._handles.items():
             if handle.id:

@@ -128,7 +128,7 @@ class HealthWatch:
             self._good_ns.popleft()
 
     def tick(self, now_ns: int, *, missing: str = "") -> Verdict:
-        """Return the verdict at this moment; call at 20 Hz or faster. A clock that jumps back by a second starts the watch anew.
+        """Return the verdict at this moment; call at 20 Hz or faster. A clock that jumps back by a second starts the watch again.
 
         ``missing`` says what has no driver: as long as nothing was received either, the sensor is not there yet, which is not broken.
         """

@@ -148,7 +148,7 @@ class Guidance:
         """Return the states of navigation's resources that the hardware decides; what is not known is left out.
 
         The authority is of use once the autopilot can fly: with a position, and its checks passed, or armed already. It is not taken
-        away when these checks fail again on the ground, but when the autopilot starts anew in flight. Nothing is known before the
+        away when these checks fail again on the ground, but when the autopilot restarts in flight. Nothing is known before the
         vehicle has introduced itself: a guidance that was started again in flight must not take away from the skills what they rightly
         have, only because it has not heard of it yet.
         """
@@ -263,15 +263,15 @@ class Guidance:
     # ---- at each step --------------------------------------------------------------------------------------------------
 
     def _start_over(self, now_s: float) -> None:
-        """Drop what was asked of an autopilot that has started anew since: it has forgotten it, and its origin may be another one.
+        """Drop what was asked of an autopilot that has restarted since: it has forgotten it, and its origin may be another one.
 
         Where it comes back in GUIDED and in the air, the vehicle is held where it is, and can be landed; another mode is not ours. The
         skills do not get the authority back before somebody gives it: their places may be others now.
         """
         self._restarted = True
-        log.warning("the autopilot has started anew, in %s", mode_name(self.vehicle.mode))
+        log.warning("the autopilot has restarted, in %s", mode_name(self.vehicle.mode))
         if self._procedure is not None:
-            self._procedure.abort("the autopilot has started anew")
+            self._procedure.abort("the autopilot has restarted")
         self._follower.heading.locked = False
         self._follower.take(None, self.vehicle, now_s)
 
@@ -298,7 +298,7 @@ class Guidance:
             return f"the link is lost, nothing was heard of the autopilot for {silent_s:.1f} s"
         mode = mode_name(self.vehicle.mode)
         if self._restarted:
-            return f"the autopilot has started anew, in {mode}"
+            return f"the autopilot has restarted, in {mode}"
         return f"the vehicle is in {mode}: the pilot or a failsafe has it"
 
     def _introduce(self, now_s: float) -> None:

@@ -63,11 +63,11 @@ class ObstacleWatch:
             self._heard[sighting.source] = _Heard(sighting, now_s)
 
     def forget_sensors(self) -> None:
-        """Begin anew on the ground: nobody watches before somebody says so."""
+        """Begin again on the ground: nobody watches before somebody says so."""
         self._heard.clear()
 
     def forget_hold(self) -> None:
-        """Start anew with another reference: its way is another one."""
+        """Restart with another reference: its way is another one."""
         self._last_in_way_s = None
 
     def nearest_m(self, now_s: float) -> float:

@@ -136,7 +136,7 @@ class Travel(Reference):
         self.line = self._carrot.line
 
     def start(self, vehicle: Vehicle, heading: Heading) -> None:
-        """Draw the line anew from where the vehicle is now."""
+        """Draw the line again from where the vehicle is now."""
         self.accept(vehicle, heading)
 
     def setpoint(self, vehicle: Vehicle, *, blocked: bool, dt_s: float) -> Vec3:

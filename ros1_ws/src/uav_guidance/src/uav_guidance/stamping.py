@@ -56,7 +56,7 @@ class StampClock:
         """Return the time of measurement in ns of the mission clock; None if it is not later than the one before."""
         offset_ns = arrival_ns - boot_ms * 1_000_000
         if self._offsets_ns and abs(offset_ns - median_low(self._offsets_ns)) > JUMP_NS:
-            # One of the two clocks was set or started anew.
+            # One of the two clocks was set or restarted.
             self._offsets_ns.clear()
             self._last_ns = 0
         self._offsets_ns.append(offset_ns)

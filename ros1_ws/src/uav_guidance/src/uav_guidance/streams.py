@@ -22,7 +22,7 @@ class StreamKeeper:
         self._heard_s: dict[int, float] = {}
 
     def forget(self) -> None:
-        """Begin anew, on a new connection."""
+        """Begin again, on a new connection."""
         self._heard_s.clear()
 
     def hear(self, message_id: int, now_s: float) -> None:

@@ -130,7 +130,7 @@ def _extended_sys_state(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicl
 
 def _local_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
     if message.time_boot_ms + REBOOT_MS < vehicle.boot_ms:
-        # The autopilot started anew: nothing of what it said before holds.
+        # The autopilot restarted: nothing of what it said before holds.
         vehicle = Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
     position = enu_from_ned(Vec3(message.x, message.y, message.z))
     velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))

@@ -28,7 +28,7 @@ class Encoded:
 
 
 class Encoder:
-    """Encodes RGB frames; begins anew, with a key frame, when size or bit rate have changed enough."""
+    """Encodes RGB frames; begins again, with a key frame, when size or bit rate have changed enough."""
 
     def __init__(self) -> None:
         self._packetizer = H264Encoder()

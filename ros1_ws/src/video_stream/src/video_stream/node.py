@@ -152,7 +152,7 @@ class _SentLog:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
         self._film: Film | None = None
-        # Started anew after a crash, it goes on in files of its own: a film can't be continued.
+        # Restarted after a crash, it goes on in files of its own: a film can't be continued.
         lives = sum(1 for _ in folder.glob("sent*.jsonl"))
         self._name = "sent" if not lives else f"sent-{lives + 1}"
         self._lines = (folder / f"{self._name}.jsonl").open("w", encoding="utf-8", buffering=1)

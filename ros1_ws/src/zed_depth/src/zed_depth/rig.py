@@ -52,7 +52,7 @@ class StereoRig:
         self._valid = FINE
 
     def take_info(self, side: str, info: InfoLike) -> None:
-        """Take a camera_info of the side ``left`` or ``right``; the calibration is made anew only when it changes."""
+        """Take a camera_info of the side ``left`` or ``right``; the calibration is rebuilt only when it changes."""
         before = self._infos.get(side)
         if before is not None and _same(before, info):
             return

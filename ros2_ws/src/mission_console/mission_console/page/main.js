@@ -241,7 +241,7 @@ class Link {
   }
 }
 
-/** Forgets what was folded: the server has begun anew, or another run is shown. */
+/** Forgets what was folded: the server has restarted, or another run is shown. */
 function clear() {
   Object.assign(run, newRun());
   cursor = null;

@@ -67,7 +67,7 @@ class MapView {
     event.preventDefault();
   }
 
-  draw(run, t, anew = false) {
+  draw(run, t, redrawn = false) {
     [this.run, this.t] = [run, t];
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
@@ -80,7 +80,7 @@ class MapView {
     this.facts = facts;
     this.size = [width, height];
     const box = this.box();
-    if (sized || anew || changed || String(box) !== String(this.boxed)) {
+    if (sized || redrawn || changed || String(box) !== String(this.boxed)) {
       this.boxed = box;
       this.fit(box);
       this.drawCloud(ratio);

@@ -47,7 +47,7 @@ class SkillsetMonitor:
         self.skillset = skillset
         self.finding: Finding | None = None
         self.restarts: list[float] = []
-        """When the managers were started anew, seconds of mission clock."""
+        """When the managers were restarted, seconds of mission clock."""
         self.events = 0
         self._steps = PossibleSteps(skillset)
         self._begin("")
@@ -98,7 +98,7 @@ class SkillsetMonitor:
         return tuple(told(happening) for happening in self._beliefs[0].expected)
 
     def _anew(self, event: EngineEvent, life: str) -> bool:
-        """Tell whether an event is the first of managers that were started anew: they count from 1 again, and time has passed."""
+        """Tell whether an event is the first of managers that were restarted: they count from 1 again, and time has passed."""
         if self._last is None or event.sequence != 1:
             return False
         if life and self._life:

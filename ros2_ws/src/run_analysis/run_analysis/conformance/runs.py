@@ -17,7 +17,7 @@ class Verdict:
     Attributes:
         events: how many were held against the models.
         findings: the first event of each skillset that does not conform, the earliest first.
-        restarts: when managers were started anew, by skillset, seconds of mission clock.
+        restarts: when managers were restarted, by skillset, seconds of mission clock.
         open: executions that had not ended when the log did, of skillsets without a finding.
         owed: what had to follow in the step with which the log ends, of the same.
     """

@@ -11,7 +11,7 @@ from skill_language.prove.steps import Key, Move, State, World
 
 @dataclass(frozen=True)
 class Edge:
-    """A step between two situations, by their numbers. ``move`` is without the details of the step: they are made anew for a story."""
+    """A step between two situations, by their numbers. ``move`` is without the details of the step: they are rebuilt for a story."""
 
     source: int
     target: int

@@ -103,7 +103,7 @@ class GoalTracker:
     def on_ending(self, ending: Ending | None) -> None:
         """Take the ending as the action tells it; the event of the same end, which says when it was, is waited for a little."""
         if ending is None:
-            self.abandon(f"the managers of {self._skillset} do not know this execution; were they started anew?")
+            self.abandon(f"the managers of {self._skillset} do not know this execution; were they restarted?")
         elif self._end is None and not self.handle.done:
             self._acknowledge()
             self._end = (2**63, ending)

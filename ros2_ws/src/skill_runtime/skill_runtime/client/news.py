@@ -175,14 +175,14 @@ class ClientNews:
         """Forget what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
         self.last.clear()
-        # A goal that nobody has acknowledged may still be on its way, also to managers that were started anew.
+        # A goal that nobody has acknowledged may still be on its way, also to managers that were restarted.
         ended = [tracker for tracker in self._orphans.values() if tracker.life]
         for tracker in ended:
             del self._orphans[tracker.handle.id]
             tracker.link.release(tracker.handle.id)
         for tracker in self._trackers():
             if tracker.life:
-                tracker.abandon(f"the managers of {self.skillset} were started anew and do not know this execution")
+                tracker.abandon(f"the managers of {self.skillset} were restarted and do not know this execution")
 
     def _on_gone(self) -> None:
         self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life", orphans=True)

@@ -2,7 +2,7 @@
 
 The engine is whole and in one process, so each step is atomic as ever; ``RemoteHooks`` is a caller of hooks among others. The end of
 the pipe is the notice of death: a skill's process that ends fails its executions with their interrupt effect, and the end of the
-engine's process has the functions stopped. Each finds the other again when it is started anew.
+engine's process has the functions stopped. Each finds the other again when it is restarted.
 
 To a skill's process go ``("call", number, hook, snapshot)``, ``("event", snapshot)`` and ``("reply", number, value)``; to the engine's
 ``("hello", skill, written)``, ``("answer", number, HookAnswer)`` and ``("ask", number, method, arguments)``. All are pickled, which only

@@ -32,7 +32,7 @@ class EngineAlarm:
         self._timer: Timer | None = None
 
     def look(self) -> None:
-        """Have the alarm set anew where that has changed."""
+        """Have the alarm set again where that has changed."""
         with self._lock:
             # Asked with the lock held: two threads that look at once leave the later answer standing.
             due_ns = self._engine.due_ns

@@ -78,7 +78,7 @@ FUNCTIONS: Mapping[str, Callable[..., object]] = {
     "cos": math.cos,
 }
 DRAWS = ("uniform", "normal", "exponential", "chance")
-"""Drawn anew at each evaluation: between two numbers; by mean and deviation; by mean; true with a probability."""
+"""Drawn again at each evaluation: between two numbers; by mean and deviation; by mean; true with a probability."""
 
 
 def _drawing(source: random.Random) -> dict[str, Callable[..., object]]:

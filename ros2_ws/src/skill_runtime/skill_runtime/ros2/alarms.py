@@ -44,7 +44,7 @@ class Alarms:
         node: whose executor does them.
         clock: the moments are of this clock.
         group: of the callbacks.
-        on_loop: tells whether the caller is inside a callback of the executor, which sets its timers anew afterwards.
+        on_loop: tells whether the caller is inside a callback of the executor, which sets its timers again afterwards.
     """
 
     def __init__(self, node: Node, clock: Clock, group: CallbackGroup, on_loop: Callable[[], bool]) -> None:

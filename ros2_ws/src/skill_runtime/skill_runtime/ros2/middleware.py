@@ -273,7 +273,7 @@ class RclpyMiddleware:
         return made
 
     def _await(self, entity: Any, awaited: bool) -> None:  # noqa: FBT001 - one of two
-        """Have an entity rest or not; an executor that waits without one that is awaited now has to gather its entities anew."""
+        """Have an entity rest or not; an executor that waits without one that is awaited now has to gather its entities again."""
         if not awaited:
             self._group.resting.add(entity)
         elif entity in self._group.resting:

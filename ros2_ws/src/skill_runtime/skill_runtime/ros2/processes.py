@@ -1,4 +1,4 @@
-"""Runs each part of a skillset in a process of its own, and starts anew what has ended."""
+"""Runs each part of a skillset in a process of its own, and restarts what has ended."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Part:
     def __init__(self, name: str, command: Sequence[str], stop: threading.Event) -> None:
         self.name = name
         self.code = 0
-        """What the process ended with, when it is of no use to start it anew."""
+        """What the process ended with, when it is of no use to start it again."""
         self._command = command
         self._stop = stop
         self._over = threading.Event()
@@ -82,7 +82,7 @@ class Part:
             code = self._once()
             if self._over.is_set():
                 return
-            sys.stderr.write(f"the process of {self.name} has ended ({code}); it is started anew\n")
+            sys.stderr.write(f"the process of {self.name} has ended ({code}); it is restarted\n")
             if code > 0 and time.monotonic() - begun_s < CONVINCING_S:
                 self.code = code
                 self._stop.set()
@@ -102,7 +102,7 @@ class Part:
 
 
 def supervise(skillset: str, skills: Sequence[str], words: Sequence[str], stop: threading.Event) -> int:
-    """Run all parts until ``stop``, or until one is of no use to start anew; return the exit code."""
+    """Run all parts until ``stop``, or until one is of no use to restart; return the exit code."""
     names = [RESOURCES, *skills]
     parts = [Part(f"{skillset} {name}", own_command(["--part", name, *words]), stop) for name in names]
     for part in parts:

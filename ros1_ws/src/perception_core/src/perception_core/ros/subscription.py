@@ -34,7 +34,7 @@ class RawSubscriber(Generic[Message]):
 
     rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
     So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A stream that has lost the
-    borders between its messages can't be decoded at all: after `SILENCE_S` without a message the connections are made anew, at growing
+    borders between its messages can't be decoded at all: after `SILENCE_S` without a message the connections are rebuilt, at growing
     intervals.
     """
 
@@ -63,7 +63,7 @@ class RawSubscriber(Generic[Message]):
 
     @property
     def published(self) -> bool:
-        """Whether somebody publishes there; somebody did if the connections are just being made anew."""
+        """Whether somebody publishes there; somebody did if the connections are just being rebuilt."""
         with self._lock:
             connected = not self._ended and bool(self._subscriber.get_num_connections())
         return connected or time.monotonic() - self._reconnected_s < SILENCE_S

@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 class ArduPilotVehicle:
-    """Serves one ArduPilot; one that is started anew finds the body where it is, and its own time at zero."""
+    """Serves one ArduPilot; one that is restarted finds the body where it is, and its own time at zero."""
 
     def __init__(self, *, seed: int, home: Vec3 = ZERO, port: int = PORT, address: str = "127.0.0.1") -> None:
         """Listen on UDP; raises SimulatorError when the port is taken."""
@@ -111,10 +111,10 @@ class ArduPilotVehicle:
 
     def _take(self, packet: MotorPacket, dt_s: float) -> bool:
         """Make the packet's step and answer; one that comes twice gets its answer again. Return whether there was a step."""
-        anew = self._peer != self._served or packet.frame < self._frame
-        fresh = anew or packet.frame != self._frame
+        restarted = self._peer != self._served or packet.frame < self._frame
+        fresh = restarted or packet.frame != self._frame
         if fresh:
-            if anew:
+            if restarted:
                 self._session_s = self._time_s + self._steps_done * (dt_s / max(self._steps, 1))
             self._served, self._frame = self._peer, packet.frame
             if self._steps_done == 0:

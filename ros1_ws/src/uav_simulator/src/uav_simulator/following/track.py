@@ -25,7 +25,7 @@ class Motion:
 
 
 class LinkTrack:
-    """Time is counted in seconds from the first moment at which position and attitude were told; an autopilot that starts anew goes on."""
+    """Time is counted in seconds from the first moment at which position and attitude were told; an autopilot that restarts goes on."""
 
     def __init__(self) -> None:
         self._places: list[tuple[int, Vec3, Vec3]] = []
