@@ -87,6 +87,12 @@ class Bench:
     def run(self, skill: str = "takeoff", **inputs: object):
         return self.engine.request(skill, inputs)
 
+    def progress(self, execution) -> float | None:
+        """Have the execution's progress asked for; return the answer of hooks that answer at once."""
+        told: list[float | None] = []
+        self.engine.ask_progress(execution.id, told.append)
+        return told[0]
+
     def states(self) -> dict[str, str]:
         return {name: status.state for name, status in self.engine.resources.items()}
 

@@ -149,6 +149,8 @@ def perform(bench, ids, program):
                 bench.engine.tick()
             case ("terminate", index, result) if ids:
                 bench.engine.terminate(ids[index % len(ids)], result)
+            case ("progress", index) if ids:
+                bench.engine.ask_progress(ids[index % len(ids)], lambda _: None)
             case (what, index) if ids:
                 arguments = ("asked for",) if what == "fail" else ()
                 getattr(bench.engine, what)(ids[index % len(ids)], *arguments)

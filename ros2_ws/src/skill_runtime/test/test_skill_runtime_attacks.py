@@ -44,7 +44,7 @@ def provoke(bench: Bench, misbehaviour: Misbehaviour):
     bench.hooks["takeoff"].acts[hook] = misbehaviour.act
     execution = bench.run()
     if hook == "progress":
-        bench.engine.progress(execution.id)
+        bench.progress(execution)
     elif hook == "on_interrupt":
         bench.engine.interrupt(execution.id)
     elif hook in {"on_pause", "on_resume"}:
@@ -250,7 +250,7 @@ def test_a_hook_that_does_not_return_ends_its_own_execution_and_stops_the_functi
     replies: list = []
     execution = hanging.run() if hook in {"validate", "on_dispatch"} else hanging.running()
     provoked = {
-        "progress": lambda: engine.progress(execution.id),
+        "progress": lambda: bench.progress(execution),
         "on_interrupt": lambda: engine.interrupt(execution.id),
         "on_pause": lambda: engine.set_paused(execution.id, replies.append, paused=True),
         "on_violation": lambda: engine.transition("sdk", "UNAVAILABLE"),
@@ -282,15 +282,15 @@ def test_a_pause_that_waits_for_a_hook_that_hangs_is_answered(hanging):
 
 
 def test_progress_that_takes_its_time_is_not_asked_again_and_holds_up_nobody(hanging):
-    engine, hooks = hanging.bench.engine, hanging.bench.hooks
+    bench, hooks = hanging.bench, hanging.bench.hooks
     hooks["takeoff"].acts["progress"] = hanging.hang
     execution, other = hanging.running(), hanging.run("watch")
-    hanging.workers.submit(lambda: engine.progress(execution.id))
+    hanging.workers.submit(lambda: bench.progress(execution))
     waits.until(lambda: "progress" in hooks["takeoff"].calls, "the hook is called", SOON_S)
-    assert engine.progress(execution.id) == 0.0
+    assert bench.progress(execution) == 0.0
     assert hooks["takeoff"].calls.count("progress") == 1
     waits.until(lambda: other.state is S.RUNNING, "the other runs", SOON_S)
-    assert engine.progress(other.id) == 0.5
+    assert bench.progress(other) == 0.5
 
 
 @pytest.mark.parametrize("value", ["refused", None])

@@ -13,6 +13,7 @@ from skill_model.execution_state import ExecutionState
 from skill_model.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
 from skill_runtime.core import SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.core.hook_calls import LocalHooks
 from skill_runtime.hooks import SkillHooks
 
 S = ExecutionState
@@ -22,7 +23,7 @@ def test_a_whole_execution_tells_its_story_in_order():
     bench = Bench()
     execution = bench.run(height=3.0)
     assert execution.state is S.RUNNING
-    assert bench.engine.progress(execution.id) == 0.5
+    assert bench.progress(execution) == 0.5
     assert execution.terminate("DONE", "there", {"reached": 2.9})
     assert (execution.state, execution.result, execution.message, execution.outputs) == (S.TERMINATED, "DONE", "there", {"reached": 2.9})
     assert bench.story() == ["sdk AVAILABLE", "REQUESTED", "axes USED", "RUNNING", "axes AVAILABLE", "TERMINATED"]
@@ -31,6 +32,39 @@ def test_a_whole_execution_tells_its_story_in_order():
     assert bench.events[0].cause == "extern"
     assert bench.hooks["takeoff"].calls == ["validate", "on_dispatch", "progress"]
     assert bench.engine.executions == ()
+
+
+class HooksElsewhere(LocalHooks):
+    """Hooks whose answers arrive when ``arrive`` is called, as from another process."""
+
+    def __init__(self, skillset, hooks) -> None:
+        super().__init__(skillset, hooks)
+        self._answers: list = []
+
+    def call(self, execution, hook, then) -> None:
+        super().call(execution, hook, lambda answer: self._answers.append(lambda: then(answer)))
+
+    def arrive(self) -> None:
+        while self._answers:
+            self._answers.pop(0)()
+
+
+def test_a_progress_that_arrives_later_counts_as_well():
+    skillset = flying_skillset()
+    hooks = HooksElsewhere(skillset, {skill.name: Recorder() for skill in skillset.skills})
+    engine = SkillsetEngine(skillset, lambda: 0, hooks, lambda _: None)
+    assert engine.transition("sdk", "AVAILABLE").accepted
+    execution = engine.request("takeoff", {})
+    hooks.arrive()
+    assert execution.state is S.RUNNING
+    told: list = []
+    engine.ask_progress(execution.id, told.append)
+    assert told == []
+    engine.ask_progress(execution.id, told.append)
+    assert told == [0.0], "it is asked already"
+    hooks.arrive()
+    assert told == [0.0, 0.5]
+    assert execution.progress == 0.5
 
 
 def test_validate_refuses_in_its_own_words():
@@ -201,7 +235,7 @@ def test_a_hook_may_end_its_own_execution_anywhere():
         bench = Bench()
         bench.hooks["takeoff"].acts[hook] = lambda e: e.terminate("DONE") and 1.0
         execution = bench.run()
-        bench.engine.progress(execution.id)
+        bench.progress(execution)
         bench.engine.interrupt(execution.id)
         assert execution.state is S.TERMINATED
         assert bench.story().count("TERMINATED") == 1
@@ -239,7 +273,7 @@ def test_a_hook_that_raises_fails_its_execution_only(hook):
     bench = Bench()
     bench.hooks["takeoff"].acts[hook] = burst
     execution = bench.run()
-    bench.engine.progress(execution.id)
+    bench.progress(execution)
     if hook == "on_violation":
         bench.engine.transition("sdk", "UNAVAILABLE")
         assert execution.state is S.RESOURCE_INVARIANT_VIOLATED  # it had ended
@@ -316,7 +350,7 @@ def test_hooks_are_never_called_with_the_lock_held():
         bench.hooks["takeoff"].acts[hook] = from_another_thread
     bench.hooks["takeoff"].acts["progress"] = lambda execution: len(from_another_thread(execution))
     execution = bench.run()
-    bench.engine.progress(execution.id)
+    bench.progress(execution)
     bench.engine.interrupt(execution.id)
     assert execution.state is S.INTERRUPTED
 

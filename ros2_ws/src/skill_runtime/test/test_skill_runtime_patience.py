@@ -206,10 +206,10 @@ def test_an_execution_without_progress_fails_at_its_deadline():
     assert bench.engine.due_ns == 5000 * MS
     bench.at(1000)
     bench.hooks["takeoff"].acts["progress"] = lambda _: 0.25
-    assert bench.engine.progress(execution.id) == 0.25
+    assert bench.progress(execution) == 0.25
     assert bench.engine.due_ns == 6000 * MS
     bench.at(3000)
-    bench.engine.progress(execution.id)  # the same number again is no progress
+    bench.progress(execution)  # the same number again is no progress
     assert bench.engine.due_ns == 6000 * MS
     bench.at(6000)
     assert (execution.state, execution.message) == (S.FAILED, "no progress for 5 s")

@@ -138,11 +138,11 @@ def test_an_emergency_hook_that_raises_is_told():
 def test_pause_and_resume_hold_resources_and_rest_the_function():
     bench = Bench()
     execution = bench.run()
-    bench.engine.progress(execution.id)
+    bench.progress(execution)
     assert bench.engine.pause(execution.id).accepted
     assert bench.engine.pause(execution.id).accepted  # as it is
     assert (execution.state, bench.states()["axes"]) == (S.PAUSED, "USED")
-    assert bench.engine.progress(execution.id) == 0.5
+    assert bench.progress(execution) == 0.5
     assert bench.engine.resume(execution.id).accepted
     assert execution.state is S.RUNNING
     assert bench.story()[-3:] == ["RUNNING", "PAUSED", "RUNNING"]

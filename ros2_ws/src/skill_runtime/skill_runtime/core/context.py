@@ -44,6 +44,11 @@ class Entry:
     waiting: list[Callable[[], None]] = field(default_factory=list)
     """Pauses and resumptions that were asked for while a hook was being called; they come after it, and after a stop."""
 
+    @property
+    def free(self) -> bool:
+        """Tell whether ``progress`` may be called: no hook is being called, and none is to stop the function."""
+        return not (self.asking or self.dispatching or self.stop_hook)
+
 
 class ExecutionContext:
     """Records steps; ``publish`` gets the events of each, numbered from 1 without gaps."""

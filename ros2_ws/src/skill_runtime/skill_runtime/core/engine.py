@@ -35,7 +35,7 @@ from skill_runtime.core.outbox import Outbox
 from skill_runtime.core.records import SkillRecord
 from skill_runtime.core.watchdog import WATCHDOG
 from skill_runtime.core.why import Why, resources_of, sentence, unmet
-from skill_runtime.core.wire import as_text, fitted_outputs, fitted_return
+from skill_runtime.core.wire import as_text, fitted_outputs
 from skill_runtime.hooks import SkillHooks
 
 _LOG = logging.getLogger(__name__)
@@ -405,36 +405,30 @@ class SkillsetEngine:
         except ValueError as error:
             return {}, as_text(error)
 
-    def progress(self, execution_id: str) -> float | None:
-        """Ask the ``progress`` hook; return its answer within 0 to 1, or None when the execution is not running.
+    def ask_progress(self, execution_id: str, then: Callable[[float | None], None]) -> None:
+        """Ask the ``progress`` hook; ``then`` gets its answer within 0 to 1, or None when the execution is not running.
 
-        Only a RUNNING execution is asked, and not again before its hook has answered; else this returns the progress that it
+        Only a RUNNING execution is asked, and not again before its hook has answered; else ``then`` gets the progress that it
         had. An answer that differs from the one before is progress, which puts off the progress deadline. The hook may wait, so
-        managers call this on a thread of its own. Hooks elsewhere tell theirs by ``report_progress``.
+        managers call this on a thread of its own; ``then`` is called there, or where the answer of a hook elsewhere arrives.
         """
         self.tick()
         with self._lock:
             entry = self._context.active(execution_id)
-            if entry is None:
-                return None
-            execution = entry.execution
-            if entry.asking or entry.dispatching or entry.stop_hook or execution.state is not ExecutionState.RUNNING:
-                return execution.progress
-            entry.asking = True
-        answers: list[HookAnswer] = []
-        self._call(entry, "progress", answers.append)
-        return self.report_progress(execution_id, answers[0].value) if answers and not answers[0].error else None
+            known = None if entry is None else entry.execution.progress
+            ask = entry is not None and entry.free and entry.execution.state is ExecutionState.RUNNING
+            if entry is not None and ask:
+                entry.asking = True
+        if entry is not None and ask:
+            self._call(entry, "progress", lambda answer: then(None if answer.error else self._progressed(execution_id, answer.value)))
+        else:
+            then(known)
 
-    def report_progress(self, execution_id: str, value: object) -> float | None:
-        """Keep an execution's progress, held within 0 to 1; what is no number ends it as FAILED."""
-        try:
-            told = float(str(fitted_return("progress", value)))
-        except ValueError as error:
-            self._fail(execution_id, str(error))
-            return None
+    def _progressed(self, execution_id: str, told: object) -> float | None:
+        """Keep an execution's progress, as ``call_hook`` has fitted it."""
         with self._lock:
             entry = self._context.active(execution_id)
-            if entry is None:
+            if entry is None or not isinstance(told, float):
                 return None
             if told != entry.execution.progress and entry.execution.state is ExecutionState.RUNNING:
                 self._context.progressed(entry)

@@ -75,9 +75,10 @@ class SkillManager:
 
     def _report(self, goal_id: str) -> None:
         """Send the progress of a goal, and again after a period; not before the hook has answered."""
-        if goal_id not in self._goals:
-            return
-        progress = self._engine.progress(goal_id)
+        if goal_id in self._goals:
+            self._engine.ask_progress(goal_id, lambda progress: self._told(goal_id, progress))
+
+    def _told(self, goal_id: str, progress: float | None) -> None:
         goal, execution = self._goals.get(goal_id), self._engine.execution(goal_id)
         if goal is None or execution is None:
             return
