@@ -227,7 +227,13 @@ def test_time_waits_for_who_works_for_it_and_lets_go_of_the_dead(start_simulator
     held_at, held_from = now_s(), time.monotonic()
     wait_until(lambda: now_s() > held_at + 0.1, timeout_s=6.0, what="time lets go")
     assert time.monotonic() - held_from > 1.0
+    stamp = now_s()
+    work.publish(Header(stamp=rospy.Time.from_sec(stamp)))
+    wait_until(lambda: now_s() >= stamp + 0.29, timeout_s=1.4, what="time waits again")
+    held_from = time.monotonic()
     work.unregister()
+    wait_until(lambda: now_s() > stamp + 0.6, timeout_s=6.0, what="time lets go")
+    assert time.monotonic() - held_from < 1.0, "who has gone is not waited for"
     # Before the second word and once the patience is over, time runs flat out.
     assert set(clock_steps_ns(seen, from_s=words[2], to_s=held_at)) == {20_000_000}, "paced, no tick is lost"
 

@@ -46,6 +46,18 @@ def test_time_lets_go_after_its_patience_until_the_topic_speaks_again():
     assert not p.may_advance(15.3, 54.0)
 
 
+def test_time_does_not_wait_for_a_topic_that_nothing_publishes_any_more():
+    p = pacer()
+    p.heard("/a", 10.0)
+    assert not p.may_advance(11.0, 50.0)
+    p.gone("/a")
+    p.gone("/never heard")
+    assert p.may_advance(11.0, 50.0)
+    assert p.left_out == ["/a"]
+    p.heard("/a", 11.0)
+    assert not p.may_advance(11.4, 50.1)
+
+
 def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
     p = pacer()
     p.heard("/a", 10.0)

@@ -68,8 +68,10 @@ class SimulatorNode:
             rospy.set_param(f"~{name}", port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
         rospy.Subscriber("/sim/pilot", String, lambda m: self._pilot_words.put(m.data))
-        for topic in (word.partition("=")[0] for word in settings.pace_topics):
-            rospy.Subscriber(topic, rospy.AnyMsg, self._on_paced, callback_args=topic, tcp_nodelay=True)
+        paced = [word.partition("=")[0] for word in settings.pace_topics]
+        self._paced = {
+            topic: rospy.Subscriber(topic, rospy.AnyMsg, self._on_paced, callback_args=topic, tcp_nodelay=True) for topic in paced
+        }
 
     def stop(self) -> None:
         """End ``run`` soon; may be called by a signal's handler."""
@@ -98,6 +100,8 @@ class SimulatorNode:
         while not self._ended:
             now = time.monotonic()
             held = not self._pacer.may_advance(self._simulation.now_s, now)
+            if held:
+                self._leave_out_the_dead()
             rest = max(due - now, WAIT_S if held else 0.0)
             self._pilot.serve(rest)
             if not held and rest <= 0.0:
@@ -141,10 +145,16 @@ class SimulatorNode:
     def _on_paced(self, message: rospy.AnyMsg, topic: str) -> None:
         self._pacer.heard(topic, header_stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
 
+    def _leave_out_the_dead(self) -> None:
+        for topic, subscriber in self._paced.items():
+            if not subscriber.get_num_connections():
+                self._pacer.gone(topic)
+
     def _tell_left_out(self) -> None:
         left_out = self._pacer.left_out
         for topic in set(left_out) - set(self._left_out):
-            rospy.logwarn(f"simulated time no longer waits for {topic}: silent for {self._settings.pace_patience_s} s")
+            silent = f"silent for {self._settings.pace_patience_s:g} s" if self._paced[topic].get_num_connections() else "its node has gone"
+            rospy.logwarn(f"simulated time no longer waits for {topic}: {silent}")
         self._left_out = left_out
 
 

@@ -59,6 +59,12 @@ class Pacer:
             held = [self._holds(listener, self._lag_s(topic, listener, now_s), wall_s) for topic, listener in self._listeners.items()]
             return not any(held)
 
+    def gone(self, topic: str) -> None:
+        """Note that nothing publishes the topic any more: it is not waited for until it is heard again."""
+        with self._lock:
+            if topic in self._listeners:
+                self._listeners[topic].live = False
+
     @property
     def left_out(self) -> list[str]:
         """Return the topics that are not waited for any more."""

@@ -30,7 +30,7 @@ class Settings:
     rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
     pace_topics: tuple[str, ...] = ()  # of those who work for simulated time: TOPIC, or TOPIC=SENSOR for who deals with its measurements
     pace_limit_s: float = 0.3
-    pace_patience_s: float = 2.0
+    pace_patience_s: float = 15.0  # wall clock; a node that hangs is waited for so long, one that has died is not
     boot_before_s: float = 60.0  # how long the autopilot has had power when the clock starts
 
     @property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
@@ -13,8 +12,9 @@ import rospy
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-SILENCE_S = 2.0  # wall clock: what is wrong is a connection, not the mission
+SILENCE_S = 2.0  # mission clock: while it is held, or the machine is slow, no message is due
 LONGEST_SILENCE_S = 30.0
+LOOK_S = 0.5  # wall clock
 
 
 class MessageLike(Protocol):
@@ -50,7 +50,7 @@ class RawSubscriber(Generic[Message]):
         self._topic, self._kind, self._buffer_bytes = topic, kind, buffer_bytes
         self._on_message, self._on_garbage = on_message, on_garbage
         self._lock = Lock()
-        self._heard_s = time.monotonic()
+        self._heard_s = rospy.get_time()
         self._patience_s = SILENCE_S
         self._reconnected_s = -math.inf
         self._ended = False
@@ -66,7 +66,7 @@ class RawSubscriber(Generic[Message]):
         """Whether somebody publishes there; somebody did if the connections are just being rebuilt."""
         with self._lock:
             connected = not self._ended and bool(self._subscriber.get_num_connections())
-        return connected or time.monotonic() - self._reconnected_s < SILENCE_S
+        return connected or rospy.get_time() - self._reconnected_s < SILENCE_S
 
     def close(self) -> None:
         """End the subscription."""
@@ -75,7 +75,7 @@ class RawSubscriber(Generic[Message]):
             self._subscriber.unregister()
 
     def _on_bytes(self, raw: rospy.AnyMsg) -> None:
-        self._heard_s, self._patience_s = time.monotonic(), SILENCE_S
+        self._heard_s, self._patience_s = rospy.get_time(), SILENCE_S
         sent = raw._connection_header.get("type", "*")  # noqa: SLF001 -- rospy's documented way to the publisher's type
         wanted = self._kind._type  # noqa: SLF001 -- generated messages have it
         if sent not in {"*", wanted}:
@@ -92,16 +92,16 @@ class RawSubscriber(Generic[Message]):
     def _watch_connections(self) -> None:
         pause = rospy.rostime.wallsleep
         while not (rospy.is_shutdown() or self._ended):
-            pause(SILENCE_S / 4)
-            if time.monotonic() - self._heard_s >= self._patience_s:
+            pause(LOOK_S)
+            if abs(rospy.get_time() - self._heard_s) >= self._patience_s:  # also where the clock went back
                 self._reconnect()
 
     def _reconnect(self) -> None:
         with self._lock:
             if self._ended or not self._subscriber.get_num_connections():
-                self._heard_s = time.monotonic()
+                self._heard_s = rospy.get_time()
                 return
-            self._reconnected_s = time.monotonic()
+            self._reconnected_s = rospy.get_time()
             self._subscriber.unregister()
             self._subscriber = self._subscribe()
-        self._heard_s, self._patience_s = time.monotonic(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)
+        self._heard_s, self._patience_s = rospy.get_time(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)
