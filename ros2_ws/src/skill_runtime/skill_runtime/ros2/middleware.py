@@ -25,6 +25,7 @@ from skill_runtime.plain import message_class
 from skill_runtime.ros2.actions import ID_DIGITS, RclpyLink, RclpyServer
 from skill_runtime.ros2.alarms import Alarm, Alarms
 from skill_runtime.ros2.calls import Calls
+from skill_runtime.ros2.empty_wakes import watch_empty_wakes
 from skill_runtime.ros2.names import ALIVE, SERVICE, SOURCE, action_type, latched
 from skill_runtime.ros2.spinning import SpunHost
 from skill_runtime.views import Sample
@@ -70,6 +71,7 @@ class RclpyMiddleware:
     def __init__(self, node: Node, skillset: str, *, root: str = "", interfaces: Any = None) -> None:
         self.node = node
         self.host: Host = SpunHost(node)
+        watch_empty_wakes(node)
         self._skillset = skillset
         self._root = root or skillset
         self._interfaces = interfaces
