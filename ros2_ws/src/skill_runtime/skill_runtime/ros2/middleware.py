@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
@@ -36,6 +36,9 @@ LOOK_S = 0.05
 """How often (wall clock) the graph is looked at for what it does not tell."""
 AT_ONCE = 100
 """So many messages of a topic are taken in one turn of the executor, which by itself takes one."""
+QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
+"""For the skillset's own topics, whose both ends are made here: each of rclpy's warnings about the other end's QoS and type is one more
+entity that the executor gathers at each of its turns, and more than half of them all. A node made elsewhere gets its own warning."""
 CallbackT = TypeVar("CallbackT", bound=Callable[..., Any])
 
 
@@ -163,7 +166,8 @@ class RclpyMiddleware:
         else:
             kind = message_class(topic.type_name)
             encode = functools.partial(_wrap if topic.wrapped else _value, kind)
-        return RclpyPublisher(self.node.create_publisher(kind, self.name(topic.name), latched(topic.keep)), encode)
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        return RclpyPublisher(self.node.create_publisher(kind, self.name(topic.name), latched(topic.keep), event_callbacks=quiet), encode)
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; the type of a data is asked of the graph where it is not known."""
@@ -176,12 +180,12 @@ class RclpyMiddleware:
             return lambda: bool(self.node.count_publishers(publishers))
         take: OnValue = lambda message: callback(Sample(message.data if topic.wrapped else message, None))  # noqa: E731
         if topic.outside:
-            self._listen(topic.name, message_class(topic.type_name), take, SOURCE)
+            self._listen(topic.name, message_class(topic.type_name), take, SOURCE, events=None)
         else:
             self._listen_once_known(self.name(topic.name), take, latched(topic.keep))
         return lambda: True
 
-    def _listen(self, name: str, kind: Any, callback: OnValue, qos: QoSProfile) -> Any:
+    def _listen(self, name: str, kind: Any, callback: OnValue, qos: QoSProfile, events: Any = QUIET) -> Any:
         """Subscribe; all messages that are there are taken in one turn of the executor."""
         made: list[Any] = []
 
@@ -194,7 +198,7 @@ class RclpyMiddleware:
                     return
                 callback(taken[0])
 
-        made.append(self.node.create_subscription(kind, name, self.on_loop(hear), qos, callback_group=self._group))
+        made.append(self.node.create_subscription(kind, name, self.on_loop(hear), qos, callback_group=self._group, event_callbacks=events))
         return made[0]
 
     def _listen_once_known(self, name: str, callback: OnValue, qos: QoSProfile) -> None:
@@ -342,7 +346,7 @@ class RclpyMiddleware:
             self.on_loop(hear),
             ALIVE,
             callback_group=self._group,
-            event_callbacks=SubscriptionEventCallbacks(liveliness=self.on_loop(changed)),
+            event_callbacks=SubscriptionEventCallbacks(liveliness=self.on_loop(changed), use_default_callbacks=False),
         )
 
     def close_hooks(self, timeout_s: float) -> bool:
