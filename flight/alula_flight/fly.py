@@ -67,8 +67,8 @@ class Arguments(argparse.Namespace):
     behaviour: list[Path]
 
 
-def parse(arguments: list[str]) -> RunSpec:
-    """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
+def _parser() -> argparse.ArgumentParser:
+    """Return the options of ``alula fly``."""
     parser = argparse.ArgumentParser(prog="alula fly", description="Fly a scenario through the whole stack.", add_help=True)
     parser.add_argument("scenario", help=f"what to fly: {', '.join(scenario_names())}")
     parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="break a sensor, seconds after lift-off")
@@ -100,7 +100,12 @@ def parse(arguments: list[str]) -> RunSpec:
         "--record", choices=["functional", "sensors"], default="functional", help="sensors: functional.bag also holds raw measurements"
     )
     parser.add_argument("--monitor", action="store_true", help="hold every event of the skillsets against the models, while it flies")
-    given = parser.parse_args(arguments, namespace=Arguments())
+    return parser
+
+
+def parse(arguments: list[str]) -> RunSpec:
+    """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
+    given = _parser().parse_args(arguments, namespace=Arguments())
     scenario = read_scenario(given.scenario)
     if not 0 <= given.seed < 2**31:
         raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")

@@ -23,7 +23,8 @@ from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, d
 from alula_flight.spec import RunSpec
 
 GIVEN_UP = 1
-LANDING_PATIENCE_S = 90.0  # wall clock; a landing from 20 m takes about 40 s
+LANDING_PATIENCE_S = 120.0  # mission clock; a landing from 20 m takes about 40 s, the way home from 60 m some 15 s more
+FAILSAFE_MODES = frozenset({"RTL", "SMART_RTL", "LAND"})  # which bring the vehicle down by themselves
 STATE_PATIENCE_S = 10.0  # wall clock until the guidance, perhaps just started again, says how things are
 ABORT_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 STANDSTILL_PATIENCE_S = 60.0  # wall clock without a tick of the mission clock
@@ -193,28 +194,31 @@ class Supervisor:
     def _land(self) -> None:
         """Land through the guidance, because nobody decides any more; return when the vehicle is down or it takes too long.
 
-        Nothing is done where the vehicle is down already, or where the pilot has it.
+        Where the autopilot's own failsafe brings it down, that is waited for. Nothing is done where the vehicle is down already, or
+        where the pilot has it.
         """
         import rospy
         from uav_msgs.msg import GuidanceState
         from uav_msgs.srv import Command
 
         heard, down = threading.Event(), threading.Event()
-        commanded, reference = False, ""
+        commanded, reference, mode = False, "", ""
 
         def look(state: Any) -> None:
-            nonlocal commanded, reference
-            commanded, reference = state.authority, state.reference
+            nonlocal commanded, reference, mode
+            commanded, reference, mode = state.authority, state.reference, state.mode
             if not state.armed:
                 down.set()
             heard.set()
 
         rospy.Subscriber("/uav_guidance/state", GuidanceState, look, queue_size=1)
-        end = time.monotonic() + LANDING_PATIENCE_S
-        if not heard.wait(STATE_PATIENCE_S) or down.is_set() or not commanded:
+        if not heard.wait(STATE_PATIENCE_S):
             return
+        end_s = (self._clock.now_s or 0.0) + LANDING_PATIENCE_S
         # Again where something else is followed instead: a skill that was running may have answered the first with a hover.
-        while not down.is_set() and time.monotonic() < end and not self._clock.stands_still:
+        while (commanded or mode in FAILSAFE_MODES) and not down.is_set() and not self._clock.stands_still:
+            if (self._clock.now_s or 0.0) > end_s or (not commanded and self._asked_to_end.is_set()):
+                return
             if reference != "land" and commanded:
                 try:
                     rospy.wait_for_service("/uav_guidance/land", timeout=10.0)

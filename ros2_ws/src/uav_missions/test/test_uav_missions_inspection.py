@@ -111,6 +111,7 @@ def test_who_takes_the_vehicle_is_left_alone_until_it_is_down(taker: str):
     taken = itertools.dropwhile(lambda end: end[1] != "RESOURCE_INVARIANT_VIOLATED", ends(mission))
     after = [end for end in taken if end[0] in {"hover", "land"}]
     assert after == [], "nothing is commanded any more"
+    assert on_ground(mission) is (taker == "control"), "the failsafe lands; a pilot does as he likes"
 
 
 def test_without_a_ground_station_nobody_takes_off():

@@ -92,11 +92,15 @@ class Happening:
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that a user can have fail: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``."""
+    """Something that a user can have fail: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``.
+
+    ``changes`` are what the robot does about it by itself, after it was noticed: a failsafe that lands, for instance.
+    """
 
     states: Mapping[Place, str]
     delay: Value = 0.0
     anchor: tuple[Place, str] | None = None
+    changes: tuple[Change, ...] = ()
     source: str = ""
 
 

@@ -153,10 +153,11 @@ class _Reader:
         return Happening(after, self._states(self._needed(part, said, "set")), anchor, part.place)
 
     def _fault(self, name: str, part: Located) -> Fault:
-        said = part.record(f"the fault {name}", ("since", "delay", "set"))
+        said = part.record(f"the fault {name}", ("since", "delay", "set", "then"))
         anchor = self._anchor(said["since"]) if "since" in said else None
         delay = self._duration(said["delay"], self._memory) if "delay" in said else 0.0
-        return Fault(self._states(self._needed(part, said, "set")), delay, anchor, part.place)
+        changes = tuple(self._change(change, self._memory) for change in said["then"].elements()) if "then" in said else ()
+        return Fault(self._states(self._needed(part, said, "set")), delay, anchor, changes, part.place)
 
     def _anchor(self, part: Located) -> tuple[Place, str]:
         words = part.text("`since`").split()
