@@ -94,7 +94,8 @@ def vehicle_at(
         start_s = min(entry.stamp_s for entry in recorded.entries)
         return RecordedSkills(skillsets, recorded, behaviour, start_s=start_s), recorded.entries
     # Late: it needs the interfaces, which a replay of skills does without.
-    from mission_replay.functional import RecordedFunctions, begin_of, entries_of
+    from mission_replay.functional import RecordedFunctions
+    from mission_replay.functional_bag import begin_of, entries_of
 
     bag = bag_of(recorded, options.run)
     functions = RecordedFunctions(skillsets, bag, behaviour, start_s=begin_of(recorded, bag))
@@ -177,7 +178,7 @@ def replay(options: argparse.Namespace) -> int:
 
 def perception_alone(options: argparse.Namespace) -> int:
     """Tell what the perception says of a bag that belongs to no mission: the transitions that it asks for; return the exit code."""
-    from mission_replay.functional import read_calls
+    from mission_replay.functional_bag import read_calls
 
     if not options.run.is_file():
         raise ReplayError(f"{options.run}: there is no such bag")

@@ -3,161 +3,30 @@
 from __future__ import annotations
 
 import functools
-import heapq
 import importlib
 import json
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.interfaces import ConnectionExtRosbag1
-from rosbags.rosbag1 import ReaderError
-from rosbags.typesys import Stores, get_typestore
-
-from alula_common.record import OPERATOR, TICKS, Entry
+from alula_common.record import Entry
+from mission_replay.bag_node import BagNode, RecordedFuture
 from mission_replay.comparison import alike
-from mission_replay.recorded import Decision, Recorded, ReplayError
+from mission_replay.functional_bag import CALLS, MESSAGE, Call, read_calls
+from mission_replay.recorded import Decision
 from mission_replay.vehicle import Vehicle
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.core.execution import Execution
 from skill_runtime.hooks import SkillHooks
-from skill_runtime.local import LocalManagers, Timer, VirtualClock
+from skill_runtime.local import LocalManagers
 from skill_runtime.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from skill_runtime.plain import to_plain
 from skill_runtime.ros2.convert import fill, values_of
-
-CALLS = "/calls"
-MESSAGE = "message"
-
-
-@dataclass(frozen=True)
-class Call:
-    """A call of a service; ``response`` None: there was none. Seconds of mission clock."""
-
-    service: str
-    request: Mapping[str, Any]
-    response: Mapping[str, Any] | None
-    end_s: float
-
-
-def read_bag(path: Path, topics: Iterable[str]) -> Iterator[Entry]:
-    """Yield messages of a ROS 1 bag in the order in which they were recorded, ``{"message": object with the fields}``.
-
-    Raises:
-        ReplayError: it is no bag, or damaged.
-    """
-    wanted = set(topics)
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS1_NOETIC)) as reader:
-            found = [c for c in reader.connections if c.topic in wanted and isinstance(c.ext, ConnectionExtRosbag1)]
-            # No connections would mean all of them.
-            for connection, stamp_ns, raw in reader.messages(connections=found) if found else ():
-                yield Entry(connection.topic, stamp_ns, {MESSAGE: reader.deserialize(raw, connection.msgtype)})
-    except (AnyReaderError, ReaderError, OSError, ValueError, KeyError, AssertionError) as error:
-        raise ReplayError(f"{path}: {str(error) or type(error).__name__}") from error
-
-
-def read_calls(path: Path) -> list[Call]:
-    """Return the calls of services that a bag tells of; raises ReplayError where it tells of none, as older ones do not."""
-    calls = []
-    try:
-        for entry in read_bag(path, [CALLS]):
-            value = json.loads(entry.value[MESSAGE].data)
-            calls.append(Call(str(value["service"]), dict(value["request"]), value["response"], float(value["end_s"])))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ReplayError(f"{path}: holds what is no call of a service on {CALLS}: {type(error).__name__} {error}") from error
-    if not calls:
-        raise ReplayError(f"{path}: holds no calls of services ({CALLS}), so nobody knows what the functional layer answered")
-    return calls
-
-
-# --- what hooks need of a node ----------------------------------------------------------------------------------------------
-
-
-class RecordedFuture:
-    """An answer that comes, or does not."""
-
-    def __init__(self) -> None:
-        self._result: Any = None
-        self._callbacks: list[Callable[[RecordedFuture], None]] = []
-
-    def add_done_callback(self, callback: Callable[[RecordedFuture], None]) -> None:
-        """Have a callback called when the answer comes."""
-        self._callbacks.append(callback)
-
-    def result(self) -> Any:
-        """Return the answer."""
-        return self._result
-
-    def resolve(self, result: Any) -> None:
-        """Let the answer come."""
-        self._result = result
-        for callback in self._callbacks:
-            callback(self)
-
-
-class RecordedService:
-    """A client of a service whose answers are recorded."""
-
-    def __init__(self, answers: RecordedFunctions, name: str) -> None:
-        self.srv_name = name
-        self._answers = answers
-
-    def service_is_ready(self) -> bool:
-        """Tell that it is there."""
-        return True
-
-    def call_async(self, request: Any) -> RecordedFuture:
-        """Call it."""
-        return self._answers.called(self.srv_name, to_plain(request))
-
-    def remove_pending_request(self, future: RecordedFuture) -> None:
-        """Nothing waits here."""
-
-
-class BagNode:
-    """What the drone's hooks use of an rclpy node, in virtual time, over a bag."""
-
-    def __init__(self, functions: RecordedFunctions) -> None:
-        self._functions = functions
-        self._clock: VirtualClock = functions.world.clock
-
-    def get_clock(self) -> BagNode:
-        """Return what tells the time."""
-        return self
-
-    def now(self) -> SimpleNamespace:
-        """Return the mission clock."""
-        return SimpleNamespace(nanoseconds=self._clock.now_ns)
-
-    def create_timer(self, period_s: float, callback: Callable[[], None], **_: object) -> Timer:
-        """Have a callback called again and again."""
-
-        def again() -> None:
-            if not self._functions.silent:
-                self._clock.after(period_s, again)
-                callback()
-
-        return self._clock.after(period_s, again)
-
-    def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
-        """Connect to a service."""
-        return RecordedService(self._functions, name)
-
-    def create_subscription(self, _kind: object, topic: str, callback: Callable[[Any], None], *_: object, **__: object) -> None:
-        """Follow a topic."""
-        self._functions.subscribers.setdefault(topic, []).append(callback)
-
-    def declare_parameter(self, _name: str, value: object) -> SimpleNamespace:
-        """Return the parameter's default."""
-        return SimpleNamespace(value=value)
-
 
 # --- hooks that are real as long as the record knows what comes of them -----------------------------------------------------
 
@@ -364,19 +233,6 @@ class RecordedFunctions(Vehicle):
             self.stage.mocked.add(managers.skillset.name)
         if managers.alive and managers.skillset.name not in self.stage.mocked:
             managers.publish(data, message)
-
-
-def begin_of(recorded: Recorded, bag: Path) -> float:
-    """Return when the first of both begins, seconds of mission clock."""
-    first = next(read_bag(bag, [CALLS]), None)
-    stamps = [entry.stamp_ns for entry in (*recorded.entries[:1], first) if entry is not None]
-    return min(stamps, default=0) / 1e9
-
-
-def entries_of(recorded: Recorded, bag: Path, topics: Iterable[str]) -> Iterator[Entry]:
-    """Yield the bag's messages, and when the tree was ticked and told to stop, in the order of time."""
-    asked = (entry for entry in recorded.entries if entry.topic in {TICKS, OPERATOR})
-    return heapq.merge(read_bag(bag, topics), asked, key=lambda entry: entry.stamp_ns)
 
 
 def _tell_ends(hooks: Mapping[str, SwitchedSkill], events: Sequence[EngineEvent]) -> None:
