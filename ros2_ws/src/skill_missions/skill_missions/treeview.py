@@ -58,21 +58,37 @@ def kind_of(node: Behaviour) -> str:
     return next((kind for cls, kind in KINDS if isinstance(node, cls)), "action")
 
 
+class _Memory:
+    """What one node last was; ``left``: while it was running, by a tick that did not come to it."""
+
+    __slots__ = ("kind", "left", "message", "node", "status")
+
+    def __init__(self, node: Behaviour) -> None:
+        self.node = node
+        self.kind = kind_of(node)
+        self.status = Status.INVALID
+        self.left = False
+        self.message = ""
+
+
 class TreeWatch:
     """Remembers what each node last was: py_trees forgets it when it leaves a branch. To be asked, or told, after each tick."""
 
     def __init__(self, root: Behaviour) -> None:
         self._root = root
-        self._kinds = {node: kind_of(node) for node in root.iterate()}
-        self._last: dict[Behaviour, tuple[str, str]] = dict.fromkeys(self._kinds, (Status.INVALID.value, ""))
+        self._memories = {node: _Memory(node) for node in root.iterate()}
 
     def remember(self) -> None:
         """Take note of the tree now."""
-        for node in self._kinds:
-            if node.status is not Status.INVALID:
-                self._last[node] = (node.status.value, node.feedback_message)
-            elif self._last[node][0] == Status.RUNNING.value:
-                self._last[node] = (INTERRUPTED, node.feedback_message)
+        # Of each node at each tick: a tenth of a mocked flight's time, so nothing is made here.
+        invalid, running = Status.INVALID, Status.RUNNING
+        for memory in self._memories.values():
+            node = memory.node
+            status = node.status
+            if status is not invalid:
+                memory.status, memory.left, memory.message = status, False, node.feedback_message
+            elif memory.status is running and not memory.left:
+                memory.left, memory.message = True, node.feedback_message
 
     def look(self) -> NodeView:
         """Return the tree now."""
@@ -80,6 +96,7 @@ class TreeWatch:
         return self._view(self._root)
 
     def _view(self, node: Behaviour) -> NodeView:
-        status, message = self._last[node]
+        memory = self._memories[node]
+        status = INTERRUPTED if memory.left else memory.status.value
         skill = node.skill_name if isinstance(node, SkillLeaf) else ""
-        return NodeView(node.name, self._kinds[node], status, message, skill, tuple(self._view(child) for child in node.children))
+        return NodeView(node.name, memory.kind, status, memory.message, skill, tuple(self._view(child) for child in node.children))
