@@ -24,8 +24,9 @@ from alula_flight.spec import RunSpec
 
 GIVEN_UP = 1
 LANDING_PATIENCE_S = 120.0  # mission clock; a landing from 20 m takes about 40 s, the way home from 60 m some 15 s more
+FOR_EVER_S = 2**31
 FAILSAFE_MODES = frozenset({"RTL", "SMART_RTL", "LAND"})  # which bring the vehicle down by themselves
-STATE_PATIENCE_S = 10.0  # wall clock until the guidance, perhaps just started again, says how things are
+STATE_PATIENCE_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
 ABORT_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 STANDSTILL_PATIENCE_S = 60.0  # wall clock without a tick of the mission clock
 START_PATIENCE_S = 120.0  # wall clock until the mission clock runs
@@ -111,6 +112,7 @@ class Supervisor:
         self._asked_to_end = threading.Event()
         self._front = os.getppid()
         self._front_died = False
+        self._last_heartbeat: Any = None
 
     @property
     def front_died(self) -> bool:
@@ -201,6 +203,7 @@ class Supervisor:
         from uav_msgs.msg import GuidanceState
         from uav_msgs.srv import Command
 
+        self._end_heartbeats()
         heard, down = threading.Event(), threading.Event()
         commanded, reference, mode = False, "", ""
 
@@ -227,6 +230,15 @@ class Supervisor:
                 except (rospy.ROSException, rospy.ServiceException) as error:
                     log.error("the guidance could not be told to land: %s", error)
             down.wait(1.0)
+
+    def _end_heartbeats(self) -> None:
+        """Have simulated time wait no more for a mission that has ended: its heartbeats came over the bridge, which goes on."""
+        import rospy
+        from std_msgs.msg import Header
+
+        if self._last_heartbeat is None:
+            self._last_heartbeat = rospy.Publisher("/mission/heartbeat", Header, queue_size=1, latch=True)
+            self._last_heartbeat.publish(Header(stamp=rospy.Time(FOR_EVER_S), frame_id="supervisor"))
 
 
 def main(arguments: list[str]) -> int:
