@@ -134,22 +134,10 @@ def break_stamps_and_infos(set_sensor, seen):
     wait_until(lambda: seen.messages["info"][-1].width == 480, timeout_s=5.0, what="the right info again")
 
 
-def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, collect, tmp_path):
-    port = start_simulator("_rate:=0", f"_world_path:={tmp_path / 'world.ply'}", "_faults:=imu")
-    seen = collect(
-        left=("/zed/left/image_raw", Image),
-        right=("/zed/right/image_raw", Image),
-        info=("/zed/right/camera_info", CameraInfo),
-        lidar=("/lidar/points", PointCloud2),
-        imu=("/imu/data", Imu),
-        pose=("/sim/true_pose", PoseStamped),
-        state=("/sim/state", String),
-        tf=("/tf_static", TFMessage),
-        clock=("/clock", Clock),
-    )
+def check_measurements(seen):
+    """The first of each kind are what the real drivers send; the IMU was broken before."""
     seen.wait("right")
     seen.wait("lidar")
-    assert (tmp_path / "world.ply").stat().st_size > 10_000
     left = {m.header.stamp.to_nsec(): m for m in seen.messages["left"]}
     right = seen.wait("right")
     wait_until(
@@ -162,6 +150,9 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
     assert {t.child_frame_id for t in seen.messages["tf"][0].transforms} == {"zed_left", "zed_right", "camera", "lidar", "imu"}
     assert seen.count("imu") == 0, "broken from the beginning"
 
+
+def climb(port, seen):
+    """Take off as a companion does, over MAVLink."""
     client = Client(port)
     assert client.command(511, 245, 100_000) == 0
     assert client.command(176, 1, 4) == 0
@@ -174,7 +165,9 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
     assert again.command(512, 242) == 0, "a client may come back"
     again.close()
 
-    set_sensor = rospy.ServiceProxy("/sim/set_sensor", SetSensor)
+
+def break_the_zed(set_sensor, seen):
+    """Each mode shows in the images; what is dead is silent, and nothing else is."""
     assert not set_sensor("sonar", "dead").accepted
     assert set_sensor("zed", "dead").accepted
     seen.wait("clock", 5)
@@ -190,6 +183,26 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
     wait_until(lambda: not any(seen.messages["left"][-1].data), timeout_s=5.0, what="a black image")
     assert set_sensor("zed", "ok").accepted
     wait_until(lambda: any(seen.messages["left"][-1].data), timeout_s=5.0, what="an image again")
+
+
+def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, collect, tmp_path):
+    port = start_simulator("_rate:=0", f"_world_path:={tmp_path / 'world.ply'}", "_faults:=imu")
+    seen = collect(
+        left=("/zed/left/image_raw", Image),
+        right=("/zed/right/image_raw", Image),
+        info=("/zed/right/camera_info", CameraInfo),
+        lidar=("/lidar/points", PointCloud2),
+        imu=("/imu/data", Imu),
+        pose=("/sim/true_pose", PoseStamped),
+        state=("/sim/state", String),
+        tf=("/tf_static", TFMessage),
+        clock=("/clock", Clock),
+    )
+    check_measurements(seen)
+    assert (tmp_path / "world.ply").stat().st_size > 10_000
+    climb(port, seen)
+    set_sensor = rospy.ServiceProxy("/sim/set_sensor", SetSensor)
+    break_the_zed(set_sensor, seen)
     break_stamps_and_infos(set_sensor, seen)
     state = json.loads(seen.wait("state").data)
     assert state["lift_off_s"] > 0.0
