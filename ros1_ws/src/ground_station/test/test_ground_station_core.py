@@ -143,10 +143,10 @@ def test_loss_is_counted_over_the_wrap_of_sequence_numbers():
     assert meter.loss(65_546) == pytest.approx(5 / 20, abs=0.06)
 
 
-def test_the_control_link_is_a_ground_station_s_heartbeat_a_second():
+def test_the_control_link_is_a_ground_station_s_heartbeat_twice_a_second():
     link = ControlLink()
     beats = [link.due(n * NS // 10) for n in range(30)]
-    assert sum(beat is not None for beat in beats) == 3
+    assert sum(beat is not None for beat in beats) == 6
     assert beats[0][0] == 0xFD, "MAVLink 2"
     assert (beats[0][5], beats[0][6]) == (255, 190)
 

@@ -18,4 +18,4 @@ class GroundSettings:
     width: int = 640
     height: int = 360
     video_path: str = ""  # folder for received.mkv and shown.jsonl; empty: nothing is recorded
-    heartbeat: bool = True  # the telepilot's control link: a MAVLink heartbeat once a second
+    heartbeat: bool = True  # the telepilot's control link: a MAVLink heartbeat twice a second
