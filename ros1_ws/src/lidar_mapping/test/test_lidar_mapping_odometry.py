@@ -131,7 +131,7 @@ FREE = OdometrySettings(noise=InertialNoise(start_velocity_m_s=10.0), autopilot_
 
 
 def odometry() -> LidarInertialOdometry:
-    return LidarInertialOdometry(FREE, Keyframes(voxel_m=FREE.map_voxel_m, patch_m=FREE.patch_m, limit=10), 0, IDENTITY)
+    return LidarInertialOdometry(FREE, Keyframes(voxel_m=FREE.map_voxel_m, limit=10), 0, IDENTITY)
 
 
 def still(k, points, times=None) -> Sweep:

@@ -40,8 +40,8 @@ class Keyframe:
 class Keyframes:
     """All keyframes in the order of time; a keyframe costs about 300 kB, so a limit bounds the memory."""
 
-    def __init__(self, *, voxel_m: float, patch_m: float, limit: int) -> None:
-        self._voxel_m, self._patch_m, self._limit = voxel_m, patch_m, limit
+    def __init__(self, *, voxel_m: float, limit: int) -> None:
+        self._voxel_m, self._limit = voxel_m, limit
         self.all: list[Keyframe] = []
 
     @property
@@ -54,7 +54,7 @@ class Keyframes:
         fresh = downsample(points, self._voxel_m)
         around = np.vstack([fresh, *(frame.points_in_map() for frame in self.all[-NEIGHBOUR_KEYFRAMES:])])
         back: Floats = np.asarray(np.linalg.inv(pose), dtype=np.float64)
-        patches = flat_patches(downsample(fresh, self._patch_m), around).moved(back)
+        patches = flat_patches(fresh, around).moved(back)
         inside = (fresh @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
         frame = Keyframe(stamp_ns, pose, inside, patches)
         self.all.append(frame)

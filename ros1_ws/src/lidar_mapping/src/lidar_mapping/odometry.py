@@ -34,8 +34,6 @@ FIRST_SWEEPS = 3
 class OdometrySettings:
     """Metres, radians. Scans are thinned to ``scan_voxel_m`` and ``scan_points``; the surface is what keyframes within ``reach_m`` saw.
 
-    Of that a flat patch in each cube of ``patch_m`` counts, found among points thinned to ``map_voxel_m``.
-
     A keyframe is taken after ``keyframe_m`` or ``keyframe_rad``; it holds the sweeps since the last one, ``keyframe_sweeps`` at most. What
     the autopilot says of attitude and velocity is believed to ``autopilot_rad`` and ``autopilot_m_s``: the velocity loosely, because
     its errors go on for seconds, so that it counts only where no surface holds a direction for long. A fitness below
@@ -45,7 +43,6 @@ class OdometrySettings:
     scan_voxel_m: float = 0.2
     scan_points: int = 2000
     map_voxel_m: float = 0.08
-    patch_m: float = 0.2
     reach_m: float = 15.0
     keyframe_m: float = 0.6
     keyframe_rad: float = 0.2

@@ -57,9 +57,7 @@ class Slam:
     def __init__(self, settings: SlamSettings) -> None:
         self._settings = settings
         self.map = VoxelMap(voxel_m=settings.voxel_m, max_voxels=settings.max_voxels)
-        self.keyframes = Keyframes(
-            voxel_m=settings.odometry.map_voxel_m, patch_m=settings.odometry.patch_m, limit=settings.odometry.max_keyframes
-        )
+        self.keyframes = Keyframes(voxel_m=settings.odometry.map_voxel_m, limit=settings.odometry.max_keyframes)
         self.count = SlamCount()
         self.T_map_odom: Floats = np.eye(4)
         self._graph = PoseGraph(settings.graph, settings.odometry.registration)
