@@ -23,9 +23,8 @@ from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, d
 from alula_flight.spec import RunSpec
 
 GIVEN_UP = 1
-LANDING_PATIENCE_S = 120.0  # mission clock; a landing from 20 m takes about 40 s, the way home from 60 m some 15 s more
+LANDING_PATIENCE_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
 FOR_EVER_S = 2**31
-FAILSAFE_MODES = frozenset({"RTL", "SMART_RTL", "LAND"})  # which bring the vehicle down by themselves
 STATE_PATIENCE_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
 ABORT_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 STANDSTILL_PATIENCE_S = 60.0  # wall clock without a tick of the mission clock
@@ -196,8 +195,7 @@ class Supervisor:
     def _land(self) -> None:
         """Land through the guidance, because nobody decides any more; return when the vehicle is down or it takes too long.
 
-        Where the autopilot's own failsafe brings it down, that is waited for. Nothing is done where the vehicle is down already, or
-        where the pilot has it.
+        Nothing is done where the vehicle is down already, or where the pilot has it.
         """
         import rospy
         from uav_msgs.msg import GuidanceState
@@ -205,23 +203,21 @@ class Supervisor:
 
         self._end_heartbeats()
         heard, down = threading.Event(), threading.Event()
-        commanded, reference, mode = False, "", ""
+        commanded, reference = False, ""
 
         def look(state: Any) -> None:
-            nonlocal commanded, reference, mode
-            commanded, reference, mode = state.authority, state.reference, state.mode
+            nonlocal commanded, reference
+            commanded, reference = state.authority, state.reference
             if not state.armed:
                 down.set()
             heard.set()
 
         rospy.Subscriber("/uav_guidance/state", GuidanceState, look, queue_size=1)
-        if not heard.wait(STATE_PATIENCE_S):
+        if not heard.wait(STATE_PATIENCE_S) or down.is_set() or not commanded:
             return
         end_s = (self._clock.now_s or 0.0) + LANDING_PATIENCE_S
         # Again where something else is followed instead: a skill that was running may have answered the first with a hover.
-        while (commanded or mode in FAILSAFE_MODES) and not down.is_set() and not self._clock.stands_still:
-            if (self._clock.now_s or 0.0) > end_s or (not commanded and self._asked_to_end.is_set()):
-                return
+        while not down.is_set() and (self._clock.now_s or 0.0) < end_s and not self._clock.stands_still:
             if reference != "land" and commanded:
                 try:
                     rospy.wait_for_service("/uav_guidance/land", timeout=10.0)
@@ -236,7 +232,7 @@ class Supervisor:
         import rospy
         from std_msgs.msg import Header
 
-        if self._last_heartbeat is None:
+        if self._spec.simulated and self._last_heartbeat is None:
             self._last_heartbeat = rospy.Publisher("/mission/heartbeat", Header, queue_size=1, latch=True)
             self._last_heartbeat.publish(Header(stamp=rospy.Time(FOR_EVER_S), frame_id="supervisor"))
 

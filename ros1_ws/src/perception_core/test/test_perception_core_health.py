@@ -75,7 +75,7 @@ def test_one_glitch_breaks_nothing() -> None:
     assert run.changes == [(0.1, Verdict.OK)]
 
 
-def test_recovery_starts_anew_at_each_bad_measurement() -> None:
+def test_recovery_starts_again_at_each_bad_measurement() -> None:
     run = Run(lambda t: True if t < 1 or (t > 2 and round(t * 10) % 8) else "black").go(8)
     assert [verdict for _, verdict in run.changes] == [Verdict.OK, Verdict.BROKEN]
 
@@ -91,7 +91,7 @@ def test_a_late_tick_waits_for_what_is_still_in_the_socket() -> None:
     assert run.go(1).watch.verdict is Verdict.BROKEN
 
 
-def test_a_clock_that_jumps_back_starts_anew() -> None:
+def test_a_clock_that_jumps_back_starts_again() -> None:
     run = Run(lambda _t: True).go(1)
     assert run.watch.tick(5 * NS) is Verdict.UNKNOWN
     run.watch.take(FINE, 5 * NS + TICK)

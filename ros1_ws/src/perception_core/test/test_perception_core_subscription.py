@@ -10,7 +10,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from alula_testing.ros1 import wait_until
-from perception_core.ros import RawSubscriber
+from perception_core.ros import RawSubscriber, subscription
 from perception_core.testing import framed, send_raw
 
 
@@ -37,7 +37,7 @@ def test_a_message_cut_short_is_told_and_the_next_one_is_heard(link) -> None:
     assert garbage[0].startswith("a message of 12 bytes can't be decoded")
 
 
-def test_a_stream_that_lost_its_borders_is_connected_anew(link) -> None:
+def test_a_stream_that_lost_its_borders_is_connected_again(link) -> None:
     publisher, heard, _ = link
     send_raw(publisher, struct.pack("<I", 2**31) + b"the rest never comes")
 
@@ -46,6 +46,27 @@ def test_a_stream_that_lost_its_borders_is_connected_anew(link) -> None:
         return bool(heard)
 
     wait_until(publish_and_hear, timeout_s=30.0, what="messages on a new connection")
+
+
+def test_a_held_clock_is_no_silence(ros_master, monkeypatch) -> None:
+    """Simulated time waits for slow nodes: no message is due, so the connections stay as they are."""
+    now_s, looks = [5.0], []
+    monkeypatch.setattr(subscription, "LOOK_S", 0.01)
+    monkeypatch.setattr(subscription, "SILENCE_S", 0.2)
+    monkeypatch.setattr(rospy, "get_time", lambda: (looks.append(1), now_s[0])[1])
+    subscribed: list[str] = []
+    subscribe = RawSubscriber._subscribe
+    monkeypatch.setattr(RawSubscriber, "_subscribe", lambda self: (subscribed.append(self._topic), subscribe(self))[1])
+    publisher = rospy.Publisher("/raw/held", Point, queue_size=10)
+    subscriber = RawSubscriber("/raw/held", Point, lambda _message: None, lambda _why: None, buffer_bytes=1 << 16)
+    wait_until(publisher.get_num_connections, timeout_s=15.0, what="connected")
+    looks.clear()
+    wait_until(lambda: len(looks) > 50, timeout_s=15.0, what="50 looks, half a second of wall clock")
+    assert len(subscribed) == 1
+    now_s[0] += 0.2
+    wait_until(lambda: len(subscribed) == 2, timeout_s=15.0, what="connected again when the clock has gone on")
+    subscriber.close()
+    publisher.unregister()
 
 
 def test_another_type_is_told(ros_master) -> None:

@@ -39,7 +39,7 @@ def test_an_older_state_shown_after_the_answer_is_not_believed_at_once():
     assert ledger.next_call(1.0) is None
 
 
-def test_a_skillset_that_starts_anew_is_told_again():
+def test_a_skillset_that_restarts_is_told_again():
     ledger = Ledger()
     ledger.observe({"a": "UNKNOWN"})
     ledger.want("a", "BROKEN")

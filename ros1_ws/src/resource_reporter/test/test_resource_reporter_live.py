@@ -97,7 +97,7 @@ def test_reports_within_milliseconds_once_connected(skillset, reporter):
     assert len(skillset.calls) == 21
 
 
-def test_a_service_that_appears_late_and_a_skillset_that_starts_anew_are_told(skillset, reporter):
+def test_a_service_that_appears_late_and_a_skillset_that_restarts_are_told(skillset, reporter):
     reporter.report("zed_status", "BROKEN")
     skillset.serve()
     becomes(skillset, "BROKEN")

@@ -86,7 +86,7 @@ def test_killed_managers_and_those_that_follow_them(served):
     assert again.state is S.INTERRUPTED
 
 
-def test_managers_that_are_started_anew_at_once_do_not_know_the_execution(served):
+def test_managers_that_are_restarted_at_once_do_not_know_the_execution(served):
     first = served.start()
     handle = served.take_off()
     first.kill()

@@ -156,7 +156,7 @@ def test_lost_link_takes_the_authority_and_a_new_one_makes_it_hover(flying):
     assert flying.report.course.reference == "hover"
 
 
-def test_an_autopilot_that_starts_anew_in_guided_is_told_held_in_place_and_can_be_landed(flying, caplog):
+def test_an_autopilot_that_restarts_in_guided_is_told_held_in_place_and_can_be_landed(flying, caplog):
     flying.go(20.0, 0.0)
     flying.run(3.0)
     flying.vehicle.restart(GUIDED)
@@ -174,7 +174,7 @@ def test_an_autopilot_that_starts_anew_in_guided_is_told_held_in_place_and_can_b
     assert flying.guidance.resources()["SDK_authority"] == "AVAILABLE", "for another flight"
 
 
-def test_an_autopilot_that_starts_anew_in_another_mode_is_told_from_the_pilot_and_gets_no_command(flying):
+def test_an_autopilot_that_restarts_in_another_mode_is_told_from_the_pilot_and_gets_no_command(flying):
     flying.go(20.0, 0.0)
     flying.run(3.0)
     commands = list(flying.commands)

@@ -273,7 +273,7 @@ def test_home_from_the_global_origin_or_from_its_local_fields():
     assert heard().home_enu_m is None
 
 
-def test_an_autopilot_that_started_anew_is_known_anew():
+def test_an_autopilot_that_restarted_is_known_again():
     vehicle = heard(
         mavlink.MAVLink_extended_sys_state_message(0, 2),
         mavlink.MAVLink_local_position_ned_message(90_000, 1.0, 2.0, -3.0, 0, 0, 0),

@@ -204,7 +204,7 @@ def test_a_flight_is_flown_by_motor_outputs_and_the_sensors_agree_with_the_motio
     assert max(np.abs(s["imu"]["accel_body"]).max() for s in states) < 16 * 9.81, "within the accelerometers' range"
 
 
-def test_an_autopilot_that_starts_anew_finds_the_body_and_a_time_from_zero(vehicle):
+def test_an_autopilot_that_restarts_finds_the_body_and_a_time_from_zero(vehicle):
     peer = Peer(vehicle.port)
     now_s = tick_while(vehicle, lambda: peer.fly(3.0, math.pi / 2, 2.0))
     assert vehicle.body.position[2] > 1.0

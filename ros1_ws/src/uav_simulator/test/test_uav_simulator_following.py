@@ -50,7 +50,7 @@ def test_between_two_messages_the_motion_is_linear_in_map_and_body_axes():
     assert euler_zyx(end.attitude) == pytest.approx((0.1, -0.2, math.pi / 2.0 - 0.1))
 
 
-def test_an_autopilot_that_starts_anew_goes_on_at_the_time_that_was_reached():
+def test_an_autopilot_that_restarts_goes_on_at_the_time_that_was_reached():
     track = LinkTrack()
     for boot_ms in (90_000, 90_100):
         track.take(place(boot_ms, 0.0))

@@ -44,7 +44,7 @@ def test_a_tree_is_sent_once_and_then_what_changed() -> None:
     assert failed == [(NODES, 3.0, [[1, "FAILURE", ""], [2, "FAILURE", "zed_ok"], [3, "RUNNING", ""], [4, "RUNNING", ""]])]
 
 
-def test_a_tree_of_another_shape_is_sent_anew() -> None:
+def test_a_tree_of_another_shape_is_sent_whole() -> None:
     converter = Converter()
     list(converter.convert(entry(TREE, 1.0, tree("RUNNING", "INVALID"))))
     assert [wire[0] for wire in converter.convert(entry(TREE, 2.0, tree("RUNNING", "INVALID", name="aborted")))] == [TREE, NODES]

@@ -58,7 +58,7 @@ def read_calls(path: Path) -> list[Call]:
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ReplayError(f"{path}: holds what is no call of a service on {CALLS}: {type(error).__name__} {error}") from error
     if not calls:
-        raise ReplayError(f"{path}: holds no calls of services ({CALLS}), so nobody knows what the functional layer answered")
+        raise ReplayError(f"{path}: holds no calls of services ({CALLS}), so the answers of the functional layer are missing")
     return calls
 
 

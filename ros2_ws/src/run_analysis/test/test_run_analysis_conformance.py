@@ -163,7 +163,7 @@ def test_what_data_and_time_decide_may_go_either_way_but_not_too_early():
     assert finding(ROVER, late) is None
 
 
-def test_managers_that_are_started_anew_count_from_one_and_know_nothing_of_before():
+def test_managers_that_are_restarted_count_from_one_and_know_nothing_of_before():
     first, again = Story().started().events, Story().enter(S.REQUESTED).events
     later = [replace(event, stamp_ns=event.stamp_ns + NS) for event in again]
     monitor = Monitor([ROVER])

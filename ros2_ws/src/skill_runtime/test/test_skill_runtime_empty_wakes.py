@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import time
+import contextlib
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +15,9 @@ from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from alula_testing.waits import until  # noqa: E402
+from skill_runtime.ros2 import empty_wakes  # noqa: E402
 from skill_runtime.ros2.empty_wakes import AT_ONCE_S, KINDS, ROW, watch_empty_wakes  # noqa: E402
+from skill_runtime.ros2.middleware import RclpyMiddleware  # noqa: E402
 
 SOON_S = 10.0
 
@@ -36,32 +39,41 @@ def node(ros2_domain):
     node.destroy_node()
 
 
-def turn(wakes, wait_set, *, after_s: float = 0.0) -> bool:
-    wakes.add_to_wait_set(wait_set)
-    time.sleep(after_s)
-    ready = wakes.is_ready(wait_set)
-    if ready:
-        wakes.take_data()
-    return ready
-
-
-def test_a_row_of_empty_wakes_is_a_busy_loop(node):
+@pytest.fixture
+def turn(node, monkeypatch):
+    """Return a function that makes the executor's wait, as far as the watch sees it, by a clock of its own."""
+    now_s = [100.0]
+    monkeypatch.setattr(empty_wakes, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
     wakes = watch_empty_wakes(node)
-    assert watch_empty_wakes(node) is wakes
-    assert [turn(wakes, WaitSet()) for _ in range(2 * ROW)] == ([False] * (ROW - 1) + [True]) * 2
+
+    def wait(*, lasts_s: float = 0.0, **ready: int) -> bool:
+        wakes.add_to_wait_set(None)
+        now_s[0] += lasts_s
+        busy = wakes.is_ready(WaitSet(**ready))
+        if busy:
+            wakes.take_data()
+        return busy
+
+    return wait
+
+
+def test_a_node_has_one_watch(node):
+    assert watch_empty_wakes(node) is watch_empty_wakes(node)
+
+
+def test_a_row_of_empty_wakes_is_a_busy_loop(turn):
+    assert [turn() for _ in range(2 * ROW)] == ([False] * (ROW - 1) + [True]) * 2
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_wake_with_something_ready_ends_the_row(node, kind):
-    wakes = watch_empty_wakes(node)
+def test_a_wake_with_something_ready_ends_the_row(turn, kind):
     for _ in range(3):
-        assert not any(turn(wakes, WaitSet()) for _ in range(ROW - 1))
-        assert not turn(wakes, WaitSet(**{kind: 1}))
+        assert not any(turn() for _ in range(ROW - 1))
+        assert not turn(**{kind: 1})
 
 
-def test_a_wait_that_has_lasted_ends_the_row(node):
-    wakes = watch_empty_wakes(node)
-    assert not any(turn(wakes, WaitSet(), after_s=2.0 * AT_ONCE_S) for _ in range(2 * ROW))
+def test_a_wait_that_has_lasted_ends_the_row(turn):
+    assert not any(turn(lasts_s=2.0 * AT_ONCE_S) for _ in range(2 * ROW))
 
 
 def test_what_is_taken_on_the_way_is_dealt_with(node):
@@ -77,11 +89,16 @@ def test_what_is_taken_on_the_way_is_dealt_with(node):
     executor.add_node(node)
 
     def end_a_loop() -> bool:
-        executor.create_task(wakes.execute, None)
-        executor.spin_once(timeout_sec=0)
+        """Take from all readers, without a turn of the executor: what is heard was taken here."""
+        with contextlib.suppress(StopIteration):
+            wakes.execute(None).send(None)
         return sorted(heard) == ["asked", "one"]
 
     until(end_a_loop, "both are dealt with", SOON_S)
-    assert wakes.ended
     executor.shutdown()
     other.destroy_node()
+
+
+def test_the_nodes_of_skillsets_and_their_clients_are_watched(node):
+    RclpyMiddleware(node, "navigation")
+    assert [type(one).__name__ for one in node.waitables].count("EmptyWakes") == 1

@@ -232,17 +232,6 @@ def test_faults_wait_for_their_anchor_and_are_noticed_late(read):
         mocked.play.fail(FaultRequest("zed", begin_s=1.0))
 
 
-def test_what_the_robot_does_about_a_fault_by_itself_follows_when_it_was_noticed(read):
-    then = "then: [{after: wait + 1, set: {flying.sdk: AVAILABLE}}]"
-    mocked = Mocked(read(f"memory: {{wait: 2}}\nfaults: {{pilot: {{delay: 0.5, set: {{flying.sdk: UNAVAILABLE}}, {then}}}}}"))
-    mocked.play.fail(FaultRequest("pilot", begin_s=1.0))
-    mocked.world.run_for(4.4)
-    assert (mocked.client.resources["sdk"], mocked.play.coming) == ("UNAVAILABLE", 1)
-    mocked.world.run_for(0.2)
-    assert (mocked.client.resources["sdk"], mocked.play.coming) == ("AVAILABLE", 0)
-    assert mocked.play.stage.notes == []
-
-
 def test_a_fault_with_an_end_gives_back_what_it_took(read):
     text = "faults: {pilot: {delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, 'pilot:twice': {set: {flying.sdk: UNAVAILABLE}}}"
     mocked = Mocked(read(text))

@@ -96,7 +96,7 @@ def test_a_duration_runs_out_to_the_nanosecond_and_is_told_beforehand():
     assert bench.states()["axes"] == "AVAILABLE"
 
 
-def test_a_break_in_a_duration_begins_it_anew():
+def test_a_break_in_a_duration_begins_it_again():
     bench = watching(Hold(2.0))
     execution = bench.run("film")
     bench.fps(3.0)

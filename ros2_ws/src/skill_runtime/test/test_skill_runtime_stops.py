@@ -226,7 +226,7 @@ def test_a_request_can_be_interrupted_from_the_moment_it_is_taken_down():
     assert bench.hooks["takeoff"].calls == []
 
 
-def test_a_second_run_does_not_start_anew():
+def test_a_second_run_does_not_restart():
     bench = Bench(flying_skillset(flying_skill("takeoff", start=TAKE)))
     execution = bench.run()
     bench.engine.run(execution.id)

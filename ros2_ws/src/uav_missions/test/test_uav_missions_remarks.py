@@ -35,7 +35,7 @@ def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, w
     assert blackboard.explained() == f"navigation.goto: RESOURCE_INVARIANT_VIOLATED keep_sdk_authority ({words})"
 
 
-def test_an_autopilot_that_starts_anew_leaves_the_guidance_in_command():
+def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
     blackboard = make_blackboard(World())
     note_authority(blackboard, state(landed_state=1, ready=False, mode="STABILIZE"))
     note_authority(blackboard, state(landed_state=1, authority=True, mode="GUIDED"))

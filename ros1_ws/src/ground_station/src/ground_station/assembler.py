@@ -65,7 +65,7 @@ class Assembler:
         if mark.frame_id <= self._given_id:
             if mark.stamp_ns <= self._given_stamp_ns:
                 return False
-            self._begin_anew()  # a sender that was started again counts from 0, but its time goes on
+            self._restart()  # a sender that was started again counts from 0, but its time goes on
         partial = self._partial.get(mark.frame_id)
         if partial is None:
             partial = self._partial[mark.frame_id] = _Partial(mark.stamp_ns, mark.key, mark.count, now_ns)
@@ -101,7 +101,7 @@ class Assembler:
                 break
         return tuple(wanted[:MOST_MISSING])
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         self._partial.clear()
         self._given_id = self.newest_id = -1
         self._next_id = None

@@ -24,9 +24,9 @@ class _Entry:
     not_before_s: float = 0.0
     retry_s: float = FIRST_RETRY_S
 
-    def put_off(self, now_s: float, least_s: float) -> None:
-        """Ask again later: 25 ms after the first attempt, then twice as long each time, at most 0.2 s, and never below ``least_s``."""
-        self.not_before_s = now_s + max(self.retry_s, least_s)
+    def put_off(self, now_s: float) -> None:
+        """Ask again later: 25 ms after the first attempt, then twice as long each time, at most 0.2 s."""
+        self.not_before_s = now_s + self.retry_s
         self.retry_s = min(2.0 * self.retry_s, LONGEST_RETRY_S)
 
 
@@ -74,11 +74,15 @@ class Ledger:
 
     def reached(self, call: Call, now_s: float) -> None:
         """Note an answer by which the resource has the state asked for; the skillset gets the longest wait to show it."""
-        self._put_off(call, now_s, LONGEST_RETRY_S)
+        entry = self._asked_for(call)
+        if entry is not None:
+            entry.not_before_s = now_s + LONGEST_RETRY_S
 
     def refused(self, call: Call, reason: str, now_s: float) -> bool:
         """Note a refusal or a failed call, to be tried again; return whether this (call, reason) is told for the first time."""
-        self._put_off(call, now_s, FIRST_RETRY_S)
+        entry = self._asked_for(call)
+        if entry is not None:
+            entry.put_off(now_s)
         first = (call, reason) not in self._told
         self._told.add((call, reason))
         return first
@@ -87,10 +91,10 @@ class Ledger:
         """Return the wanted resources that the skillset, which has shown its states, does not have."""
         return [name for name in self._wanted if self._actual and name not in self._actual]
 
-    def _put_off(self, call: Call, now_s: float, least_s: float) -> None:
+    def _asked_for(self, call: Call) -> _Entry | None:
+        """Return what a call was for, if that is still wanted."""
         entry = self._wanted.get(call.resource)
-        if entry is not None and entry.state == call.to:
-            entry.put_off(now_s, least_s)
+        return entry if entry is not None and entry.state == call.to else None
 
     def _differs(self, resource: str) -> bool:
         return resource in self._actual and self._actual[resource] != self._wanted[resource].state

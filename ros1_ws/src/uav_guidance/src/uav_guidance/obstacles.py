@@ -63,11 +63,11 @@ class ObstacleWatch:
             self._heard[sighting.source] = _Heard(sighting, now_s)
 
     def forget_sensors(self) -> None:
-        """Begin again on the ground: nobody watches before somebody says so."""
+        """Forget all sensors, on the ground: the way counts as watched once a sensor reports it."""
         self._heard.clear()
 
     def forget_hold(self) -> None:
-        """Restart with another reference: its way is another one."""
+        """Forget the last obstacle in the way: another reference has another way."""
         self._last_in_way_s = None
 
     def nearest_m(self, now_s: float) -> float:

@@ -63,7 +63,7 @@ class SkillsetMonitor:
         if self.finding is not None:
             return None
         self.events += 1
-        if self._anew(event, life):
+        if self._restarted(event, life):
             self.restarts.append(event.stamp_s)
             self._begin(life)
         self._life = self._life or life
@@ -97,7 +97,7 @@ class SkillsetMonitor:
             return ()
         return tuple(told(happening) for happening in self._beliefs[0].expected)
 
-    def _anew(self, event: EngineEvent, life: str) -> bool:
+    def _restarted(self, event: EngineEvent, life: str) -> bool:
         """Tell whether an event is the first of managers that were restarted: they count from 1 again, and time has passed."""
         if self._last is None or event.sequence != 1:
             return False

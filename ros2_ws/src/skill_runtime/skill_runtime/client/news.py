@@ -175,7 +175,7 @@ class ClientNews:
         """Forget what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
         self.last.clear()
-        # A goal that nobody has acknowledged may still be on its way, also to managers that were restarted.
+        # A goal without an acknowledgement may still be on its way, also to restarted managers.
         ended = [tracker for tracker in self._orphans.values() if tracker.life]
         for tracker in ended:
             del self._orphans[tracker.handle.id]

@@ -45,9 +45,9 @@ class Entry:
     """Pauses and resumptions that were asked for while a hook was being called; they come after it, and after a stop."""
 
     @property
-    def free(self) -> bool:
-        """Tell whether ``progress`` may be called: no hook is being called, and none is to stop the function."""
-        return not (self.asking or self.dispatching or self.stop_hook)
+    def may_be_asked(self) -> bool:
+        """Tell whether ``progress`` may be called: it runs, no hook is being called, and none is to stop the function."""
+        return self.execution.state is ExecutionState.RUNNING and not (self.asking or self.dispatching or self.stop_hook)
 
 
 class ExecutionContext:

@@ -416,13 +416,13 @@ class SkillsetEngine:
         with self._lock:
             entry = self._context.active(execution_id)
             known = None if entry is None else entry.execution.progress
-            ask = entry is not None and entry.free and entry.execution.state is ExecutionState.RUNNING
-            if entry is not None and ask:
-                entry.asking = True
-        if entry is not None and ask:
-            self._call(entry, "progress", lambda answer: then(None if answer.error else self._progressed(execution_id, answer.value)))
-        else:
+            asked = entry if entry is not None and entry.may_be_asked else None
+            if asked is not None:
+                asked.asking = True
+        if asked is None:
             then(known)
+        else:
+            self._call(asked, "progress", lambda answer: then(None if answer.error else self._progressed(execution_id, answer.value)))
 
     def _progressed(self, execution_id: str, told: object) -> float | None:
         """Keep an execution's progress, as ``call_hook`` has fitted it."""

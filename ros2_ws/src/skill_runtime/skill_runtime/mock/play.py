@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from alula_common.faults import FaultRequest
 from skill_model.model import Skill, Skillset
-from skill_runtime.mock.behaviour import Behaviour, Change, DataScript, Fault, Place, Rule, Value
+from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Place, Rule, Value
 from skill_runtime.mock.formula import Formula, FormulaError
 from skill_runtime.mock.skill import MockSkill
 from skill_runtime.mock.stage import Job, Stage
@@ -30,8 +30,6 @@ class Play:
         self.stage = stage
         self.faults: dict[str, float] = {}
         """When which fault happened, seconds of mission clock."""
-        self.coming = 0
-        """How many changes that follow from faults are still to come."""
         self._behaviour = behaviour
         self._seed = seed
         self._chance = random.Random(f"{seed} timeline")  # noqa: S311 - a play, not a secret
@@ -159,13 +157,7 @@ class Play:
         self._held |= fault.states
         self.take(fault.states)
         for change in fault.changes:
-            self.coming += 1
-            self._do(self.number(change.after_s, {}), functools.partial(self._follow, change))
-
-    def _follow(self, change: Change) -> None:
-        self.coming -= 1
-        self._held |= {place: state for place, state in change.states.items() if place in self._held}
-        self.take(change.states)
+            self._do(self.number(change.after_s, {}), functools.partial(self.take, change.states))
 
     def _release(self, name: str) -> None:
         before = self._before.pop(name, {})

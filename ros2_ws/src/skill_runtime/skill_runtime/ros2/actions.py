@@ -218,7 +218,7 @@ class RclpyLink:
         self._results.call(self._action.Impl.GetResultService.Request(goal_id=identifier), answered, _nothing, timeout_s=GOAL_S, once=True)
 
     def release(self, goal_id: str) -> None:
-        """Follow a goal no more, and offer it to nobody: managers that were restarted would take it for a new one."""
+        """Stop following a goal and stop offering it: restarted managers would take it for a new one."""
         withdraw = self._offers.pop(goal_id, None)
         if withdraw is not None:
             withdraw()

@@ -34,8 +34,6 @@ class EmptyWakes(Waitable):  # type: ignore[misc]  # rclpy has no types
         self._node = weakref.ref(node)
         self._begun_s = 0.0
         self._row = 0
-        self.ended = 0
-        """How many busy loops were ended."""
 
     def get_num_entities(self) -> NumberOfEntities:
         """Return that it waits for nothing of its own."""
@@ -61,7 +59,6 @@ class EmptyWakes(Waitable):  # type: ignore[misc]  # rclpy has no types
         executor = None if node is None else node.executor
         if node is None or executor is None:
             return
-        self.ended += 1
         takes = (
             (executor._take_subscription, node.subscriptions),  # noqa: SLF001 - rclpy 7.1.6 has no other way to take in a callback's order
             (executor._take_client, node.clients),  # noqa: SLF001

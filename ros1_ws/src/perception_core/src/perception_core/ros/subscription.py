@@ -63,10 +63,10 @@ class RawSubscriber(Generic[Message]):
 
     @property
     def published(self) -> bool:
-        """Whether somebody publishes there; somebody did if the connections are just being rebuilt."""
+        """Whether the topic has a publisher; one whose connection is being rebuilt counts."""
         with self._lock:
             connected = not self._ended and bool(self._subscriber.get_num_connections())
-        return connected or rospy.get_time() - self._reconnected_s < SILENCE_S
+        return connected or abs(rospy.get_time() - self._reconnected_s) < SILENCE_S
 
     def close(self) -> None:
         """End the subscription."""

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class ListeningLink:
-    """Reads in the caller's thread, connects again by itself, and asks again for streams that stay away (an autopilot restarted)."""
+    """Reads in the caller's thread, connects again by itself, and asks again for streams that stay away (the autopilot restarted)."""
 
     def __init__(self, url: str) -> None:
         self._url = url
