@@ -232,6 +232,14 @@ def test_faults_wait_for_their_anchor_and_are_noticed_late(read):
         mocked.play.fail(FaultRequest("zed", begin_s=1.0))
 
 
+def test_a_fault_may_end_what_runs_of_a_skill(read):
+    mocked = Mocked(read("skills: {flying.takeoff: {never: true}}", "faults: {rotor: {delay: 1, ends: {flying.takeoff: BLOCKED}}}"))
+    mocked.play.fail(FaultRequest("rotor", begin_s=3.0))
+    assert mocked.call() == (("TERMINATED", "BLOCKED"), 4.0)
+    assert mocked.call(limit_s=10.0)[0][0] == "", "only what runs at that moment"
+    assert mocked.play.stage.notes == []
+
+
 def test_a_fault_with_an_end_gives_back_what_it_took(read):
     text = "faults: {pilot: {delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, 'pilot:twice': {set: {flying.sdk: UNAVAILABLE}}}"
     mocked = Mocked(read(text))
@@ -322,6 +330,8 @@ WRONG = {
     "timeline: [{after: 1, set: {flying.axes: USED}}]": "1: flying.axes has no extern transition to USED; there are some to none",
     "timeline: [{after: 1, since: flying.sdk, set: {flying.sdk: AVAILABLE}}]": "write a resource and a state, as",
     "faults: {zed: {set: {flying.wings: BROKEN}}}": "1: skillset flying has no resource wings; it has sdk, axes",
+    "faults: {zed: {ends: {flying.takeoff: BROKEN}}}": "1: flying.takeoff has no result BROKEN; it has DONE, BLOCKED, SAFE",
+    "faults: {zed: {delay: 1}}": "1: `set` is missing",
     "data: {flying.fuel: {value: 1}}": "1: skillset flying has no data fuel; it has battery, pose",
     "data: {flying.battery: {}}": "1: flying.battery needs either `value` or `values`",
     "data: {flying.battery: {values: {soon: 1}}}": "`soon` should be seconds since the start",

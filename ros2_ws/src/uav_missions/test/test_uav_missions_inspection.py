@@ -78,6 +78,24 @@ def test_from_the_stream_s_failure_to_hover_takes_less_than_a_second():
     assert 0 < stamps["hover", "RUNNING"] - stamps["stream", "RESOURCE_INVARIANT_VIOLATED"] < 1e9
 
 
+def test_a_dead_encoder_is_told_as_such_and_ends_the_flight_as_a_lost_video_does():
+    mission = fly("encoder@40")
+    assert mission.end.outcome is Outcome.DEGRADED
+    assert mission.end.reason.startswith("video.stream: LOST")
+    last = ends(mission)
+    motion = [end for end in last[last.index(("stream", "TERMINATED", "LOST")) :] if end[0] in {"goto", "hover", "land"}]
+    assert motion == [("goto", "INTERRUPTED", ""), ("hover", "TERMINATED", "DONE"), ("land", "TERMINATED", "LANDED")]
+    assert on_ground(mission)
+
+
+def test_without_the_ground_station_the_video_goes_first_and_then_the_failsafe_has_the_vehicle():
+    mission = fly("ground_station@40")
+    assert mission.end.outcome is Outcome.GIVEN_UP
+    assert mission.end.reason.index("enough_frames") < mission.end.reason.index("keep_sdk_authority")
+    assert ("hover", "RESOURCE_INVARIANT_VIOLATED", "keep_sdk_authority") in ends(mission)
+    assert on_ground(mission), "the failsafe's landing is waited for"
+
+
 def test_a_degraded_radio_ends_nothing():
     assert fly("radio:degraded@40").end.outcome is Outcome.ACCOMPLISHED
 
@@ -123,7 +141,7 @@ def test_without_a_ground_station_nobody_takes_off():
 def test_whatever_fails_whenever_it_comes_to_an_end():
     for seed in range(20):
         chance = random.Random(seed)  # noqa: S311 - no secret
-        names = chance.sample(["radio", "zed", "lidar"], chance.randint(1, 3))
+        names = chance.sample(["radio", "zed", "lidar", "encoder", "ground_station"], chance.randint(1, 3))
         mission = fly(*(f"{name}@{chance.uniform(0.0, 200.0):.2f}" for name in names), seed=seed, tick_period_s=1.0)
         assert on_ground(mission), (seed, names)
         assert not mission.open_executions, (seed, names)

@@ -1,4 +1,4 @@
-"""The three skillsets on a live ROS graph, with the functional layer faked."""
+"""The skillsets on a live ROS graph, with the functional layer faked."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import pytest
 pytest.importorskip("rclpy")
 
 from uav_skills_rig import Rig
+
+CRITERIA = {"min_fps": 8.0, "min_quality": 0.4, "patience": 3.0}
 
 
 @pytest.fixture(scope="module")
@@ -228,3 +230,26 @@ def test_mapping_that_registers_nothing_more_aborts(rig):
     rig.functional.mute.add("lidar_mapping")
     assert rig.ended(handle) == ("TERMINATED", "ABORTED")
     assert "no scan registered" in handle.message
+
+
+def test_a_stream_is_sent_until_it_is_interrupted(rig):
+    handle = rig.start("video", "stream", **CRITERIA)
+    rig.wait(lambda: handle.progress == 1.0)
+    handle.interrupt()
+    assert rig.ended(handle) == ("INTERRUPTED", "")
+    rig.wait(lambda: rig.functional.calls == [("stream", True), ("stream", False)])
+
+
+@pytest.mark.parametrize(("how", "why"), [("dead", "nothing was heard of the video encoder"), ("restarted", "was started again")])
+def test_an_encoder_that_dies_or_is_restarted_is_not_told_as_a_bad_picture(rig, how, why):
+    handle = rig.start("video", "stream", **CRITERIA)
+    rig.wait(lambda: handle.progress == 1.0)
+    since_s = rig.functional.now_s
+    if how == "dead":
+        rig.functional.mute.add("video_stream")
+    else:
+        rig.functional.enabled["video_stream"] = False
+    assert rig.ended(handle) == ("TERMINATED", "LOST")
+    assert why in handle.message
+    assert 0.9 <= rig.functional.now_s - since_s < 3.0
+    assert rig.clients["video"].resources["encoder"] == "IDLE"

@@ -18,8 +18,8 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from skillset_interfaces.srv import Transition
 from std_srvs.srv import SetBool, Trigger
-from uav_msgs.msg import GuidanceState, MappingState, Obstacle
-from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Takeoff
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
+from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
 STEP_S = 0.05  # of mission clock
 WALL_STEP_S = 0.01
@@ -90,6 +90,7 @@ class FakeFunctional:
         self._state = self.node.create_publisher(GuidanceState, "/uav_guidance/state", 10)
         self._obstacles = {name: self.node.create_publisher(Obstacle, f"/{name}/obstacle", 10) for name in ("zed_depth", "lidar_obstacles")}
         self._mapping = self.node.create_publisher(MappingState, "/lidar_mapping/state", 10)
+        self._video = self.node.create_publisher(VideoState, "/video_stream/state", 10)
         for name, kind, handler in (
             ("takeoff", Takeoff, self._takeoff),
             ("set_position", SetPositionReference, self._set_position),
@@ -100,9 +101,11 @@ class FakeFunctional:
             self.node.create_service(kind, f"/uav_guidance/{name}", self._served(name, handler), callback_group=group)
         for name in ("zed_depth", "lidar_obstacles", "lidar_mapping"):
             self.node.create_service(SetBool, f"/{name}/enable", self._enabler(name), callback_group=group)
+        self.node.create_service(Stream, "/video_stream/stream", self._stream, callback_group=group)
         self.node.create_service(Trigger, "/lidar_mapping/save", self._save, callback_group=group)
         self._transitions = {
-            name: self.node.create_client(Transition, f"/{name}/transition", callback_group=group) for name in ("navigation", "perception")
+            name: self.node.create_client(Transition, f"/{name}/transition", callback_group=group)
+            for name in ("navigation", "perception", "video")
         }
         self.node.create_timer(WALL_STEP_S, self._tick, callback_group=group, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.executor = MultiThreadedExecutor(num_threads=2, context=context)
@@ -180,6 +183,13 @@ class FakeFunctional:
 
         return enable
 
+    def _stream(self, request, response):
+        with self._lock:
+            self.calls.append(("stream", request.on))
+            self.enabled["video_stream"] = request.on
+        response.accepted = True
+        return response
+
     def _save(self, _request, response):
         with self._lock:
             self.calls.append(("save", None))
@@ -200,6 +210,7 @@ class FakeFunctional:
             watching = [name for name in self._obstacles if self.enabled.get(name) and name not in self.mute]
             mapping = self.enabled.get("lidar_mapping") and "lidar_mapping" not in self.mute
             self._scans += bool(mapping)
+            video = None if "video_stream" in self.mute else VideoState(streaming=self.enabled.get("video_stream", False), fps=20.0)
         self._clock.publish(ClockMessage(clock=stamp))
         if state is not None:
             self._state.publish(state)
@@ -207,6 +218,9 @@ class FakeFunctional:
             self._obstacles[name].publish(Obstacle(source=name, distance_m=math.inf))
         if mapping:
             self._mapping.publish(MappingState(running=True, scans=self._scans))
+        if video is not None:
+            video.header.stamp = stamp
+            self._video.publish(video)
 
     def _state_message(self, stamp) -> GuidanceState:
         vehicle = self.vehicle

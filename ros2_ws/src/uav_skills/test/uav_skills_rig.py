@@ -1,4 +1,4 @@
-"""The three skillsets served in this process, over the faked functional layer, with a client each."""
+"""The skillsets served in this process, over the faked functional layer, with a client each."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ import time
 
 from uav_skills_functional_fake import FakeFunctional
 
+SKILLSETS = ("navigation", "perception", "mapping", "video")
 READY = {
     ("navigation", "SDK_authority"): "AVAILABLE",
     ("navigation", "homepoint_status"): "VALID",
     ("navigation", "flight_status"): "ON_GROUND",
     ("perception", "zed_status"): "OK",
     ("perception", "lidar_status"): "OK",
+    ("video", "link"): "UP",
 }
 
 
@@ -32,7 +34,7 @@ class Rig:
         sim_time = [Parameter("use_sim_time", value=True)]
         self.nodes = []
         self._hooks: list[object] = []
-        for name in ("navigation", "perception", "mapping"):
+        for name in SKILLSETS:
             model = importlib.import_module(f"{name}_managers.model")
             interfaces = importlib.import_module(f"{name}_interfaces.action")
             make_hooks = self._kept(importlib.import_module(f"uav_skills.{name}").make_hooks)
@@ -43,7 +45,7 @@ class Rig:
         self.nodes.append(self.caller)
         for node in self.nodes:
             self.executor.add_node(node)
-        self.clients = {name: SkillsetClient(self.caller, name) for name in ("navigation", "perception", "mapping")}
+        self.clients = {name: SkillsetClient(self.caller, name) for name in SKILLSETS}
         self._thread = threading.Thread(target=self.executor.spin, daemon=True)
         self._thread.start()
         assert all(client.wait_ready(20.0) for client in self.clients.values())

@@ -53,6 +53,7 @@ class Thresholds:
     reference_lost_s: float = 3.0
     silence_s: float = 2.0
     mapping_silence_s: float = 3.0
+    encoder_silence_s: float = 1.0  # less than what the data `picture` takes to be stale and to break the video's criteria
 
 
 DEFAULT_THRESHOLDS = Thresholds()
@@ -121,6 +122,15 @@ def decide_watch(silent_s: float, source: str, limits: Thresholds = DEFAULT_THRE
     if silent_s <= limits.silence_s:
         return None
     return Verdict("LOST", f"no obstacle message of the {source} for {silent_s:.1f} s")
+
+
+def decide_stream(silent_s: float, *, told_idle: bool, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+    """End a stream whose encoder no longer says that it sends; ``told_idle``: it says that it doesn't, as one that was restarted."""
+    if silent_s <= limits.encoder_silence_s:
+        return None
+    if told_idle:
+        return Verdict("LOST", "the video encoder was started again and sends nothing")
+    return Verdict("LOST", f"nothing was heard of the video encoder for {silent_s:.1f} s")
 
 
 def decide_mapping(silent_s: float, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:

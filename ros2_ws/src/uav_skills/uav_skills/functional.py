@@ -171,6 +171,10 @@ class VideoApi(FunctionalPart):
         super().__init__(node)
         self.seen_s: float | None = None
         """When the telepilot was last known to see pictures."""
+        self.sending_s: float | None = None
+        """When the encoder last said that it sends."""
+        self.told_idle = False
+        """Whether it said last that it doesn't."""
         self._stream = self._client(Stream, "/video_stream/stream")
         self._subscribe(VideoState, "/video_stream/state", self._on_state)
 
@@ -184,5 +188,7 @@ class VideoApi(FunctionalPart):
         self._calls.submit(self._stream, Stream.Request(), reply)
 
     def _on_state(self, state: VideoState) -> None:
-        if state.streaming and state.fps > 0.0:
-            self.seen_s = self.now_s
+        self.told_idle = not state.streaming
+        if state.streaming:
+            self.sending_s = self.now_s
+            self.seen_s = self.now_s if state.fps > 0.0 else self.seen_s

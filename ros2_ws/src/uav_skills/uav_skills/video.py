@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from video_managers.hooks import AbstractStreamSkill
 
 from uav_skills.checks import check_stream
+from uav_skills.decisions import decide_stream
 from uav_skills.functional import VideoApi
 from uav_skills.serve import serve
 from uav_skills.watched import WatchedSkill
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # generated
     """Send the video until interrupted. The progress is 1 once the telepilot sees pictures.
 
-    That the criteria are missed is the model's to notice: its invariants watch the margins.
+    That the criteria are missed is the model's to notice: its invariants watch the margins. An encoder that died can tell nothing of them.
     """
 
     def __init__(self, video: VideoApi) -> None:
@@ -45,14 +46,17 @@ class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # genera
         """Stop sending."""
         self._video.stop()
 
-    def heard_s(self) -> float | None:
+    def shows_s(self) -> float | None:
         """When the telepilot was last known to see pictures."""
         return self._video.seen_s
 
+    def heard_s(self) -> float | None:
+        """When the encoder last said that it sends."""
+        return self._video.sending_s
+
     def decide(self, silent_s: float) -> Verdict | None:
-        """Never end by itself."""
-        del silent_s
-        return None
+        """End as LOST when it no longer says so."""
+        return decide_stream(silent_s, told_idle=self._video.told_idle)
 
 
 def make_hooks(node: Node) -> dict[str, SkillHooks]:

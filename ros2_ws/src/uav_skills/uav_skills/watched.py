@@ -42,6 +42,10 @@ class WatchedSkill(SkillHooks):
         """Return when the function was last heard of, None for never."""
         raise NotImplementedError
 
+    def shows_s(self) -> float | None:
+        """Return when it last did what it was switched on for; where nothing else is said, that is when it was heard of."""
+        return self.heard_s()
+
     def decide(self, silent_s: float) -> Verdict | None:
         """Say whether the execution ends after this silence."""
         raise NotImplementedError
@@ -55,9 +59,9 @@ class WatchedSkill(SkillHooks):
         self.switch_on(execution)
 
     def progress(self, execution: Execution) -> float:
-        """Return 1 when the function was heard of since the start, else 0."""
-        heard_s = self.heard_s()
-        return 1.0 if execution is self._execution and heard_s is not None and heard_s > self._since_s else 0.0
+        """Return 1 when the function has done its work since the start, else 0."""
+        shows_s = self.shows_s()
+        return 1.0 if execution is self._execution and shows_s is not None and shows_s > self._since_s else 0.0
 
     def on_interrupt(self, execution: Execution) -> None:
         """Switch the function off."""

@@ -94,13 +94,15 @@ class Happening:
 class Fault:
     """Something that a user can have fail: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``.
 
-    ``changes`` are what the robot does about it by itself, after it was noticed: a failsafe that lands, for instance.
+    ``changes`` are what the robot does about it by itself, after it was noticed: a failsafe that lands, for instance. ``ends``: the skills
+    whose running executions it ends, and with which result.
     """
 
     states: Mapping[Place, str]
     delay: Value = 0.0
     anchor: tuple[Place, str] | None = None
     changes: tuple[Change, ...] = ()
+    ends: Mapping[Place, str] = field(default_factory=dict)
     source: str = ""
 
 

@@ -156,6 +156,9 @@ class Play:
         self._before.setdefault(name, {place: self.stage.state(*place) for place in fault.states})
         self._held |= fault.states
         self.take(fault.states)
+        for skill in self._skills:
+            if skill.place in fault.ends:
+                skill.end(fault.ends[skill.place], f"the fault {name}")
         for change in fault.changes:
             self._do(self.number(change.after_s, {}), functools.partial(self.take, change.states))
 

@@ -153,11 +153,20 @@ class _Reader:
         return Happening(after, self._states(self._needed(part, said, "set")), anchor, part.place)
 
     def _fault(self, name: str, part: Located) -> Fault:
-        said = part.record(f"the fault {name}", ("since", "delay", "set", "then"))
+        said = part.record(f"the fault {name}", ("since", "delay", "set", "then", "ends"))
         anchor = self._anchor(said["since"]) if "since" in said else None
         delay = self._duration(said["delay"], self._memory) if "delay" in said else 0.0
         changes = tuple(self._change(change, self._memory) for change in said["then"].elements()) if "then" in said else ()
-        return Fault(self._states(self._needed(part, said, "set")), delay, anchor, changes, part.place)
+        ends = dict(self._ended(*entry) for entry in said["ends"].entries("`ends`").items()) if "ends" in said else {}
+        states = {} if ends and "set" not in said else self._states(self._needed(part, said, "set"))
+        return Fault(states, delay, anchor, changes, ends, part.place)
+
+    def _ended(self, name: str, part: Located) -> tuple[Place, str]:
+        skillset, member = self._member(name, part, "skill")
+        skill = self._one(member, {skill.name: skill for skill in skillset.skills}, part, f"skillset {skillset.name}", "skill")
+        result = part.text("a result")
+        self._one(result, {known.name: known for known in skill.results}, part, name, "result")
+        return (skillset.name, member), result
 
     def _anchor(self, part: Located) -> tuple[Place, str]:
         words = part.text("`since`").split()

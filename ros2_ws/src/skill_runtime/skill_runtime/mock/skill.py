@@ -58,7 +58,7 @@ class MockSkill(SkillHooks):
 
     def __init__(self, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
         self._play = play
-        self._name = f"{skillset}.{skill.name}"
+        self.place = skillset, skill.name
         self._inputs = [parameter.name for parameter in skill.inputs]
         self._rules = tuple(rules)
         self._default = default_script(skill)
@@ -117,6 +117,14 @@ class MockSkill(SkillHooks):
         for appointment in run.appointments if run is not None else ():
             appointment.cancel()
         return None
+
+    def end(self, result: str, message: str) -> None:
+        """End what runs before its time: what it moves stays where it is."""
+        with self._play.lock:
+            executions = [run.execution for run in self._runs.values()]
+        for execution in executions:
+            self.on_interrupt(execution)
+            execution.terminate(result, message)
 
     def move(self) -> None:
         """Bring the memory up to date; called with the play's lock held."""
@@ -190,7 +198,7 @@ class MockSkill(SkillHooks):
         return {name: getattr(inputs, name) for name in self._inputs if hasattr(inputs, name)}
 
     def __repr__(self) -> str:
-        return f"MockSkill({self._name})"
+        return f"MockSkill({'.'.join(self.place)})"
 
 
 def _part(elapsed_s: float, delay_s: float) -> float:
