@@ -10,6 +10,7 @@ from pathlib import Path
 from alula_common.faults import FaultError, parse_fault
 from alula_common.files import write_json
 from alula_common.scenarios import Scenario, ScenarioError, load_scenario
+from alula_flight.process_faults import ProcessFault
 from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.settings import FOLLOWED
@@ -113,10 +114,18 @@ class RunSpec:
         values = json.loads(path.read_text(encoding="utf-8"))
         return cls(**{**values, "faults": tuple(values["faults"]), "behaviour": tuple(values.get("behaviour", ()))})
 
+    @property
+    def process_faults(self) -> list[ProcessFault]:
+        """Return the faults of processes."""
+        nodes = dict(load_scenario(self.scenario).processes)
+        requests = map(parse_fault, self.faults)
+        return [ProcessFault(request, nodes[request.what]) for request in requests if request.what in nodes]
+
     def launch_arguments(self) -> list[str]:
         """Return the arguments of the scenario's launch file."""
         scenario = load_scenario(self.scenario)
         others = [fault for fault in self.faults if parse_fault(fault).what in dict(scenario.faults)]
+        radio = [fault for fault in others if parse_fault(fault).what not in dict(scenario.processes)]
         arguments = [
             f"out:={self.out_dir}",
             f"seed:={self.seed}",
@@ -131,7 +140,7 @@ class RunSpec:
         if self.imperfections != "off":
             arguments.append(f"imperfections:={self.imperfections}")
         if scenario.faults:
-            arguments += [f"radio_faults:={','.join(others)}", f"radio_port:={RADIO_PORT + RADIO_PORTS * self.domain}"]
+            arguments += [f"radio_faults:={','.join(radio)}", f"radio_port:={RADIO_PORT + RADIO_PORTS * self.domain}"]
         if self.autopilot is not None:
             vehicle = {"": "simulate:=false", "simulated": "vehicle:=ardupilot"}.get(self.sensors, f"vehicle:={self.sensors}")
             arguments += [vehicle, f"autopilot:={self.autopilot}"]

@@ -7,7 +7,9 @@ or when what died or a signal makes the run pointless. Exit code: the mission's,
 from __future__ import annotations
 
 import contextlib
+import functools
 import logging
+import math
 import os
 import signal
 import sys
@@ -20,6 +22,7 @@ from alula_common.processes import end_run
 from alula_common.scenarios import load_scenario
 from alula_common.signals import on_end_signal
 from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
+from alula_flight.process_faults import ProcessFaults, Started
 from alula_flight.spec import RunSpec
 
 GIVEN_UP = 1
@@ -59,7 +62,7 @@ class Watch:
         if name == "mission" and exit_code is not None and exit_code >= 0:
             self.mission_exit = exit_code
         else:
-            respawned = bool(getattr(process, "respawn", False))
+            respawned = bool(getattr(process, "respawn", False)) and math.isfinite(getattr(process, "respawn_delay", 0.0))
             self._record.add(Death(name=name, how=describe_exit(exit_code), when_s=self._clock.now_s, respawned=respawned))
             consequence = CONSEQUENCES.get(name, Consequence.GO_ON)
             order = list(Consequence)
@@ -112,6 +115,7 @@ class Supervisor:
         self._front = os.getppid()
         self._front_died = False
         self._last_heartbeat: Any = None
+        self._faults: ProcessFaults | None = None
 
     @property
     def front_died(self) -> bool:
@@ -125,6 +129,8 @@ class Supervisor:
             return self._until_over(launch)
         finally:
             self._watch.ending = True
+            if self._faults is not None:
+                self._faults.release()
             launch.shutdown()
 
     def _start(self) -> Any:
@@ -147,6 +153,8 @@ class Supervisor:
         on_end_signal(self._end_asked)
         rospy.init_node("alula_supervisor", disable_signals=True)
         self._clock.listen()
+        self._faults = ProcessFaults(self._spec.process_faults, functools.partial(process_of, launch.pm), Path(self._spec.out_dir))
+        self._faults.listen()
         return launch
 
     def _end_asked(self) -> None:
@@ -187,10 +195,10 @@ class Supervisor:
 
     def _abort_mission(self, launch: Any) -> None:
         """Tell the mission to stop what runs and land; it ends by itself when the vehicle is down."""
-        for name in launch.pm.get_active_names():
-            if name.rsplit("-", 1)[0] == "mission":
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(launch.pm.get_process(name).popen.pid, signal.SIGINT)
+        mission = process_of(launch.pm, "mission")
+        if mission is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(mission.popen.pid, signal.SIGINT)
 
     def _land(self) -> None:
         """Land through the guidance, because nobody decides any more; return when the vehicle is down or it takes too long.
@@ -235,6 +243,13 @@ class Supervisor:
         if self._spec.simulated and self._last_heartbeat is None:
             self._last_heartbeat = rospy.Publisher("/mission/heartbeat", Header, queue_size=1, latch=True)
             self._last_heartbeat.publish(Header(stamp=rospy.Time(FOR_EVER_S), frame_id="supervisor"))
+
+
+def process_of(monitor: Any, node: str) -> Started | None:
+    """Return the process of a node; roslaunch counts the processes and puts the number behind the name."""
+    name = next((name for name in monitor.get_active_names() if name.rsplit("-", 1)[0] == node), None)
+    process: Started | None = None if name is None else monitor.get_process(name)
+    return process
 
 
 def main(arguments: list[str]) -> int:

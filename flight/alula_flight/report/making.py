@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula_common.files import write_aside, write_json
@@ -16,7 +16,7 @@ from alula_flight.report.map_quality import Floats, MapQuality, judge_map, load_
 from alula_flight.report.mocked import MockSummary, read_mock
 from alula_flight.report.page import page_entries
 from alula_flight.report.phases import Phases, find_phases
-from alula_flight.report.recording import Recording, read_recording
+from alula_flight.report.recording import Recording, read_process_faults, read_recording
 from alula_flight.report.recovery import Recovery, find_recovery, injected
 from alula_flight.report.summary import Summary, summarise
 from alula_flight.report.timeline import make_timeline
@@ -95,6 +95,7 @@ def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account
     else:
         with problems.survive("functional.bag"):
             recording = read_recording(folder, problems)
+        recording = replace(recording, processes=read_process_faults(folder))
     phases = find_phases(history, recording)
     if "video" in scenario.report and not facts.mock:
         with problems.survive("video"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -12,6 +13,7 @@ import numpy as np
 import rosbag
 from numpy.typing import NDArray
 
+from alula_flight.process_faults import FILE as PROCESS_FAULTS
 from alula_flight.report.bag_rescue import usable_bag
 from alula_flight.report.files import Problems, finite, mapping, sequence
 
@@ -106,6 +108,8 @@ class Recording:
     guidance: tuple[GuidanceAccount, ...] = ()
     map_points: int | None = None
     health: tuple[HealthChange, ...] = ()
+    processes: tuple[Fault, ...] = ()
+    """What the supervisor did to processes."""
 
     @property
     def path(self) -> Track | None:
@@ -197,6 +201,15 @@ def _simulator_account(texts: list[str], problems: Problems) -> SimulatorAccount
             faults=tuple(_faults(state.get("faults"))),
         )
     return None
+
+
+def read_process_faults(folder: Path) -> tuple[Fault, ...]:
+    """Read what the supervisor did to processes, as far as it is whole; nothing where it did nothing."""
+    path, lines = folder / PROCESS_FAULTS, []
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        with contextlib.suppress(ValueError):
+            lines.append(json.loads(line))
+    return tuple(_faults(lines))
 
 
 def _faults(value: object) -> Iterator[Fault]:

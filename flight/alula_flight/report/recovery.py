@@ -12,6 +12,7 @@ from alula_flight.report.phases import Phases
 from alula_flight.report.recording import Fault, Recording, Track
 
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
+LOST = "LOST"  # how the skills end whose function is not heard of any more
 BROKEN = "BROKEN"
 MENDED = "ok"
 MOVING_M_S = 0.2
@@ -30,9 +31,9 @@ class Recovery:
 
 
 def injected(recording: Recording) -> tuple[Fault, ...]:
-    """Return what the simulator broke, in the order of time."""
+    """Return what the simulator and the supervisor broke, in the order of time."""
     faults = recording.simulator.faults if recording.simulator is not None else ()
-    return tuple(sorted((fault for fault in faults if fault.mode != MENDED), key=lambda fault: fault.t_s))
+    return tuple(sorted((fault for fault in (*faults, *recording.processes) if fault.mode != MENDED), key=lambda fault: fault.t_s))
 
 
 def find_recovery(
@@ -49,7 +50,7 @@ def find_recovery(
         return None
     failure_s = radio_lost_s if radio_lost_s is not None else faults[0].t_s if faults else None
     since_s = -np.inf if failure_s is None else failure_s - STAMP_TOLERANCE_S
-    violated = [execution.end_s for execution in history.executions if execution.outcome == VIOLATED and execution.end_s is not None]
+    violated = [e.end_s for e in history.executions if (e.outcome == VIOLATED or e.result == LOST) and e.end_s is not None]
     detected_s = _first([*broken, *violated], since_s)
     fallback_s = _fallback(scenario.fallback, history.executions, since_s if detected_s is None else detected_s)
     motion_s = None if fallback_s is None else _first(_running_stamps(history, scenario.motion), fallback_s)

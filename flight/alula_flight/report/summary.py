@@ -165,7 +165,8 @@ def note_doubts(facts: RunFacts, recording: Recording, phases: Phases, problems:
     if not phases.lifted_off:
         problems.note(f"no lift-off is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(recording)}
-    others = dict(load_scenario(facts.scenario).faults)  # not the simulator's: its state knows nothing of them
+    scenario = load_scenario(facts.scenario)
+    others = dict(scenario.faults).keys() - dict(scenario.processes).keys()  # the radio's: nothing of them is in the bag
     for fault in facts.faults:
         what = parse_fault(fault).what
         if recording.simulator is not None and what not in others and what not in broken:

@@ -7,6 +7,7 @@ import random
 import socket
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import av
@@ -18,6 +19,7 @@ from radio_link.loop import LARGEST_DATAGRAM, udp_socket
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
+from uav_msgs.msg import VideoState
 from uav_msgs.srv import Stream
 from video_stream.wire import NS, Seal, VideoPacket
 
@@ -89,6 +91,7 @@ class Flight:
     def __init__(self, done: dict[str, int]) -> None:
         self.now_ns = 10 * NS
         self.filmed = 0
+        self.alive = set(NODES)
         self._done = done
         self._scenery = scenery()
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
@@ -113,7 +116,21 @@ class Flight:
             self._camera.publish(image)
             self.filmed += 1
         self._pass()
-        wait_until(lambda: min(self._done.values()) >= self.now_ns, timeout_s=PATIENCE_S, what="the nodes follow the clock")
+        followed = lambda: all(self._done.get(name, 0) >= self.now_ns for name in self.alive)  # noqa: E731
+        wait_until(followed, timeout_s=PATIENCE_S, what="the nodes follow the clock")
+
+    def until(self, condition: Callable[[], object], limit_s: float) -> float:
+        """Let time pass until the condition holds; return how long that took, in seconds of mission clock."""
+        begun_ns = self.now_ns
+        while not condition():
+            assert self.now_ns - begun_ns < limit_s * NS, f"not within {limit_s} s of mission clock"
+            self.tick()
+        return (self.now_ns - begun_ns) / NS
+
+    def back(self, name: str) -> None:
+        """Wait for a node that was started again."""
+        wait_until(lambda: self._pass() or self._done.get(name, 0) > self.now_ns - NS, timeout_s=PATIENCE_S, what=f"{name} is back")
+        self.alive.add(name)
 
 
 class Player(threading.Thread):
@@ -157,7 +174,15 @@ def stage(ros_master, start_node, tmp_path):
     nodes = {name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *words]) for name, words in parameters.items()}
     flight = Flight(done)
     wait_until(flight.connected, timeout_s=PATIENCE_S, what="the nodes are up")
-    yield flight, nodes, video
+
+    def kill(name: str) -> Callable[[], None]:
+        """Kill a node; return what starts it again."""
+        flight.alive.remove(name)
+        nodes[name].kill()
+        nodes[name].wait()
+        return lambda: nodes.update({name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *parameters[name]])})
+
+    yield flight, nodes, video, kill
     for subscriber in subscribers:
         subscriber.unregister()
     for tamperer in (video, report):
@@ -166,7 +191,7 @@ def stage(ros_master, start_node, tmp_path):
 
 
 def test_garbage_replays_and_disorder_in_every_port_show_no_wrong_picture_and_a_foreign_player_watches(stage, tmp_path):
-    flight, nodes, video = stage
+    flight, nodes, video, _ = stage
     player = Player(tmp_path / "stream.sdp")
     player.start()
     rospy.wait_for_service("/video_stream/stream", PATIENCE_S)
@@ -184,3 +209,69 @@ def test_garbage_replays_and_disorder_in_every_port_show_no_wrong_picture_and_a_
     assert {line["id"] for line in shown} <= sent
     assert (player.error, len(player.pictures)) == ("", PLAYED)
     assert {picture.shape for picture in player.pictures} == {(HEIGHT, WIDTH, 3)}
+
+
+class Telepilot:
+    """What the drone knows of what the telepilot sees, and the service that begins the stream."""
+
+    def __init__(self) -> None:
+        self.state = VideoState()
+        self._subscriber = rospy.Subscriber("/video_stream/state", VideoState, self._on_state)
+
+    def _on_state(self, message: VideoState) -> None:
+        self.state = message
+
+    def begin(self) -> None:
+        rospy.wait_for_service("/video_stream/stream", PATIENCE_S)
+        assert rospy.ServiceProxy("/video_stream/stream", Stream)(True, 5.0, 0.3, 2.0).accepted
+
+    def sees(self) -> bool:
+        return self.state.streaming and self.state.fps >= 5.0
+
+    def close(self) -> None:
+        self._subscriber.unregister()
+
+
+@pytest.fixture
+def telepilot(stage):
+    made = Telepilot()
+    yield made
+    made.close()
+
+
+def test_an_encoder_that_was_killed_says_so_when_it_is_back_and_shows_pictures_again_once_told_to(stage, telepilot, tmp_path):
+    flight, nodes, _, kill = stage
+    telepilot.begin()
+    flight.until(telepilot.sees, 10.0)
+    start_again = kill(STREAM)
+    died_ns = flight.now_ns
+    for _tick in range(50):
+        flight.tick()
+    assert telepilot.state.header.stamp.to_nsec() <= died_ns + TICK_NS, "nothing tells of the picture: the skill watches that"
+    assert nodes[GROUND].poll() is None
+    assert nodes[RADIO].poll() is None
+    start_again()
+    flight.back(STREAM)
+    flight.until(lambda: telepilot.state.header.stamp.to_nsec() > died_ns + NS, 5.0)
+    assert not telepilot.state.streaming, "it was told nothing yet"
+    shown = len((tmp_path / "shown.jsonl").read_text().splitlines())
+    telepilot.begin()
+    assert flight.until(telepilot.sees, 10.0) < 5.0
+    lines = [json.loads(line) for line in (tmp_path / "shown.jsonl").read_text().splitlines()]
+    assert lines[shown]["id"] < lines[shown - 1]["id"], "its frames count from 0 again, and are shown all the same"
+
+
+def test_a_ground_station_that_was_killed_leaves_the_drone_with_no_picture_and_the_next_one_sees_again(stage, telepilot):
+    flight, nodes, _, kill = stage
+    telepilot.begin()
+    flight.until(telepilot.sees, 10.0)
+    start_again = kill(GROUND)
+    assert flight.until(lambda: telepilot.state.fps == 0.0, 3.0) >= 1.0, "a report that is late is not a ground station that is dead"
+    took_s = flight.until(lambda: telepilot.state.fps_margin < 0.0, 8.0)
+    assert telepilot.state.exhausted
+    assert took_s > 0.5, "adaptation first"
+    assert nodes[STREAM].poll() is None
+    start_again()
+    flight.back(GROUND)
+    assert flight.until(telepilot.sees, 15.0) < 10.0
+    assert telepilot.state.fps_margin >= 0.0

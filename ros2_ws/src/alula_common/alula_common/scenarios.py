@@ -9,7 +9,7 @@ from pathlib import Path
 from alula_common.located_yaml import Located, choices, read_yaml
 from alula_common.suggestions import nearest
 
-KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "fallback", "motion")
+KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion")
 PARTS = ("map", "video")
 """What a report can have besides what every flight has."""
 
@@ -31,6 +31,7 @@ class Scenario:
         launch: launch file of uav_bringup.
         report: parts of the report.
         faults: what can fail besides the sensors, each with the ways in which it can.
+        processes: which of those faults are of a process, and its node in the launch file.
         fallback: the skill whose running means that the vehicle is safe again after a failure.
         motion: the skills that take it on then.
     """
@@ -43,6 +44,7 @@ class Scenario:
     launch: str
     report: tuple[str, ...] = ()
     faults: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    processes: tuple[tuple[str, str], ...] = ()
     fallback: str = ""
     motion: tuple[str, ...] = ()
 
@@ -78,6 +80,10 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
         if part not in PARTS:
             raise said["report"].wrong(f"there is no part `{part}` of a report; there are {choices(part, PARTS)}")
     faults = said["faults"].entries("`faults`") if "faults" in said else {}
+    processes = said["processes"].entries("`processes`") if "processes" in said else {}
+    for what, node in processes.items():
+        if what not in faults:
+            raise node.wrong(f"`faults` does not say in which ways {what} can fail")
     return Scenario(
         name=name,
         about=said["about"].text("`about`"),
@@ -87,6 +93,7 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
         launch=said["launch"].text("`launch`"),
         report=report,
         faults=tuple((what, tuple(way.text("a way to fail") for way in ways.elements())) for what, ways in faults.items()),
+        processes=tuple((what, node.text("the node of a process")) for what, node in processes.items()),
         fallback=said["fallback"].text("`fallback`") if "fallback" in said else "",
         motion=_words(said, "motion"),
     )

@@ -1,0 +1,133 @@
+"""Processes that are made to die or to hang, as ``--fail encoder@40`` asks: by the supervisor, whose roslaunch started them."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import signal
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from alula_common.faults import FaultRequest
+
+FILE = "process_faults.jsonl"
+KILLED, HUNG = "killed", "hung"
+WAYS = (KILLED, HUNG)
+MENDED = "ok"
+
+
+class Started(Protocol):
+    """A process that roslaunch started; ``respawn_delay`` in seconds of wall clock, read whenever it may be started again."""
+
+    popen: Any
+    respawn_delay: float
+
+    def is_alive(self) -> bool:
+        """Tell whether it runs."""
+
+
+@dataclass(frozen=True)
+class ProcessFault:
+    """A fault of the command line, and the node whose process it is about."""
+
+    request: FaultRequest
+    node: str
+
+    @property
+    def mode(self) -> str:
+        """Return in which way it fails."""
+        return self.request.how or WAYS[0]
+
+    def active(self, since_lift_off_s: float | None) -> bool:
+        """Tell whether it lasts now; ``since_lift_off_s`` None: not lifted off yet."""
+        begin_s, end_s = self.request.begin_s, self.request.end_s
+        if begin_s is None:
+            return True
+        return since_lift_off_s is not None and begin_s <= since_lift_off_s < (math.inf if end_s is None else end_s)
+
+
+@dataclass(frozen=True)
+class Applied:
+    """A line of the file, as the simulator tells its own faults; ``t_s``: absolute mission clock."""
+
+    sensor: str
+    mode: str
+    t_s: float
+
+
+class ProcessFaults:
+    """Applies faults and ends them; ``find`` returns the process of a node, None where there is none.
+
+    A process that was killed is not started again before its fault ends.
+    """
+
+    def __init__(self, faults: Sequence[ProcessFault], find: Callable[[str], Started | None], out: Path) -> None:
+        self._faults = tuple(faults)
+        self._find = find
+        self._path = out / FILE
+        self._active: dict[ProcessFault, float] = {}
+        self._lift_off_s: float | None = None
+
+    def listen(self) -> None:
+        """Follow the mission clock and the simulator's lift-off; rospy's node must be there."""
+        if not self._faults:
+            return
+        import rospy
+        from rosgraph_msgs.msg import Clock
+        from std_msgs.msg import String
+
+        rospy.Subscriber("/sim/state", String, lambda message: self.lifted_off(json.loads(message.data).get("lift_off_s")), queue_size=5)
+        rospy.Subscriber("/clock", Clock, lambda message: self.look(message.clock.to_sec()), queue_size=1)
+
+    def lifted_off(self, lift_off_s: float | None) -> None:
+        """Take note of the moment from which the faults' times count."""
+        self._lift_off_s = lift_off_s
+
+    def look(self, now_s: float) -> None:
+        """Begin and end what is due."""
+        since_s = None if self._lift_off_s is None else now_s - self._lift_off_s
+        for fault in self._faults:
+            if fault.active(since_s):
+                self._break(fault, now_s)
+            elif fault in self._active:
+                self._mend(fault, now_s)
+
+    def release(self) -> None:
+        """Let hung processes go on, so that they can be told to end."""
+        for fault in [fault for fault in self._active if fault.mode == HUNG]:
+            self._send(fault, signal.SIGCONT)
+
+    def _break(self, fault: ProcessFault, now_s: float) -> None:
+        process = self._find(fault.node)
+        if process is None:
+            return
+        begins = fault not in self._active
+        if begins:
+            self._active[fault] = process.respawn_delay
+            self._note(Applied(fault.request.what, fault.mode, now_s))
+        if fault.mode == KILLED:
+            process.respawn_delay = math.inf  # before it dies: then it is not started again
+            self._send(fault, signal.SIGKILL)
+        elif begins:
+            self._send(fault, signal.SIGSTOP)
+
+    def _mend(self, fault: ProcessFault, now_s: float) -> None:
+        respawn_delay_s = self._active.pop(fault)
+        self._note(Applied(fault.request.what, MENDED, now_s))
+        if fault.mode == HUNG:
+            self._send(fault, signal.SIGCONT)
+        elif (process := self._find(fault.node)) is not None:
+            process.respawn_delay = respawn_delay_s
+
+    def _send(self, fault: ProcessFault, number: int) -> None:
+        process = self._find(fault.node)
+        if process is not None and process.popen is not None and process.is_alive():
+            process.popen.send_signal(number)
+
+    def _note(self, applied: Applied) -> None:
+        # A folder that has gone must not end the run.
+        with contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(applied)) + "\n")
