@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skill_runtime.local import Timer, VirtualClock
 from skill_runtime.plain import to_plain
 
-if TYPE_CHECKING:
-    from mission_replay.functional import RecordedFunctions
+Subscribers = dict[str, list[Callable[[Any], None]]]
 
 
 class RecordedFuture:
@@ -35,12 +34,16 @@ class RecordedFuture:
             callback(self)
 
 
+Answer = Callable[[str, Mapping[str, Any]], RecordedFuture]
+"""What is called with a service's name and a request."""
+
+
 class RecordedService:
     """A client of a service whose answers are recorded."""
 
-    def __init__(self, answers: RecordedFunctions, name: str) -> None:
+    def __init__(self, name: str, answer: Answer) -> None:
         self.srv_name = name
-        self._answers = answers
+        self._answer = answer
 
     def service_is_ready(self) -> bool:
         """Tell that it is there."""
@@ -48,18 +51,27 @@ class RecordedService:
 
     def call_async(self, request: Any) -> RecordedFuture:
         """Call it."""
-        return self._answers.called(self.srv_name, to_plain(request))
+        return self._answer(self.srv_name, to_plain(request))
 
     def remove_pending_request(self, future: RecordedFuture) -> None:
         """Nothing waits here."""
 
 
 class BagNode:
-    """What the drone's hooks use of an rclpy node, in virtual time, over a bag."""
+    """What the drone's hooks use of an rclpy node, in virtual time, over a bag.
 
-    def __init__(self, functions: RecordedFunctions) -> None:
-        self._functions = functions
-        self._clock: VirtualClock = functions.world.clock
+    Args:
+        clock: the mission clock.
+        answer: what answers calls of services.
+        subscribers: the callbacks by topic, to which this node's are added.
+        is_silent: whether the functional layer says nothing more, so that timers end.
+    """
+
+    def __init__(self, clock: VirtualClock, answer: Answer, subscribers: Subscribers, is_silent: Callable[[], bool]) -> None:
+        self._clock = clock
+        self._answer = answer
+        self._subscribers = subscribers
+        self._is_silent = is_silent
 
     def get_clock(self) -> BagNode:
         """Return what tells the time."""
@@ -73,7 +85,7 @@ class BagNode:
         """Have a callback called again and again."""
 
         def again() -> None:
-            if not self._functions.silent:
+            if not self._is_silent():
                 self._clock.after(period_s, again)
                 callback()
 
@@ -81,11 +93,11 @@ class BagNode:
 
     def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
         """Connect to a service."""
-        return RecordedService(self._functions, name)
+        return RecordedService(name, self._answer)
 
     def create_subscription(self, _kind: object, topic: str, callback: Callable[[Any], None], *_: object, **__: object) -> None:
         """Follow a topic."""
-        self._functions.subscribers.setdefault(topic, []).append(callback)
+        self._subscribers.setdefault(topic, []).append(callback)
 
     def declare_parameter(self, _name: str, value: object) -> SimpleNamespace:
         """Return the parameter's default."""

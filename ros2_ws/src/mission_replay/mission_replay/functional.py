@@ -13,7 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from alula_common.record import Entry
-from mission_replay.bag_node import BagNode, RecordedFuture
+from mission_replay.bag_node import BagNode, RecordedFuture, Subscribers
 from mission_replay.comparison import alike
 from mission_replay.functional_bag import CALLS, MESSAGE, Call, read_calls
 from mission_replay.recorded import Decision
@@ -134,8 +134,8 @@ class RecordedFunctions(Vehicle):
 
     def __init__(self, skillsets: Sequence[Skillset], bag: Path, behaviour: Behaviour, *, start_s: float) -> None:
         super().__init__(behaviour, start_s=start_s)
-        self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
-        self.silent = False
+        self._subscribers: Subscribers = {}
+        self._silent = False
         """What the bag tells is not, or no more, what happens: the real hooks look at it no longer."""
         self._diverged = False
         self._skills: list[SwitchedSkill] = []
@@ -153,11 +153,12 @@ class RecordedFunctions(Vehicle):
     @property
     def topics(self) -> set[str]:
         """What of the bag is to be read."""
-        return {CALLS, *self.subscribers}
+        return {CALLS, *self._subscribers}
 
     def _serve(self, skillset: Skillset) -> None:
         name = skillset.name
-        real = importlib.import_module(f"uav_skills.{name}").make_hooks(BagNode(self))
+        node = BagNode(self.world.clock, self._called, self._subscribers, lambda: self._silent)
+        real = importlib.import_module(f"uav_skills.{name}").make_hooks(node)
         actions = importlib.import_module(f"{name}_interfaces.action")
         mocks = self.play.hooks_of(skillset, ShadowSkill)
         hooks = {
@@ -170,7 +171,7 @@ class RecordedFunctions(Vehicle):
         managers.on_step(functools.partial(_tell_ends, hooks))
         managers.on_step(functools.partial(follow, self.play, name))
         for data, (topic, _) in importlib.import_module(f"{name}_managers.model").DATA_TOPICS.items():
-            self.subscribers.setdefault(topic, []).append(functools.partial(self._on_data, managers, data))
+            self._subscribers.setdefault(topic, []).append(functools.partial(self._on_data, managers, data))
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
@@ -185,7 +186,7 @@ class RecordedFunctions(Vehicle):
         waiting = self._recorded_next.get(name)
         return bool(waiting) and waiting.popleft() if waiting is not None else False
 
-    def called(self, service: str, request: Mapping[str, Any]) -> RecordedFuture:
+    def _called(self, service: str, request: Mapping[str, Any]) -> RecordedFuture:
         """Answer a call as it was answered then, not earlier; what was not called then is a difference."""
         future, waiting, clock = RecordedFuture(), self._calls.get(service), self.world.clock
         call = waiting[0] if waiting else None
@@ -204,20 +205,20 @@ class RecordedFunctions(Vehicle):
     def over(self) -> None:
         """Take note that the bag has no more to say."""
         super().over()
-        self.silent = True
+        self._silent = True
 
     # --- what the bag tells ------------------------------------------------------------------------------------------
 
     def take(self, entry: Entry, *, diverged: bool) -> None:
         """Have the functional layer say what it said."""
         if diverged and not self._diverged:
-            self._diverged = self.silent = True
+            self._diverged = self._silent = True
             for skill in self._skills:
                 skill.hand_over()
         message = entry.value[MESSAGE]
         if entry.topic == CALLS:
             self._take_transition(json.loads(message.data))
-        for callback in self.subscribers.get(entry.topic, ()) if not self.silent else ():
+        for callback in self._subscribers.get(entry.topic, ()) if not self._silent else ():
             callback(message)
 
     def _take_transition(self, call: Mapping[str, Any]) -> None:

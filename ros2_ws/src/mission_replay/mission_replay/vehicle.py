@@ -31,7 +31,7 @@ class ReplayedSkill(MockSkill):
     def choose(self, inputs: object) -> Choice:
         """Let the record end the call, where it does; the rules still say what the call moves."""
         choice = super().choose(inputs)
-        answer = self._vehicle.next_answer(self._name)
+        answer = self._vehicle.next_answer(".".join(self.place))
         if answer is None:
             return choice
         by_itself = answer.state is ExecutionState.TERMINATED

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rospy
 from actionlib import ActionServer, ServerGoalHandle
@@ -18,11 +18,9 @@ from std_msgs.msg import Header
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.middleware import Ending, Goal, GoalListener, OnError, OnValue
+from skillset_ros1.base import RospyBase
 from skillset_ros1.convert import fields_of, fill, values_of
 from skillset_ros1.names import QUEUE, ActionTypes
-
-if TYPE_CHECKING:
-    from skillset_ros1.middleware import RospyMiddleware
 
 OnGoal = Callable[[ServerGoalHandle], None]
 RECALLED_EARLY = "interrupted before it arrived"
@@ -102,15 +100,15 @@ class RospyServer:
     """A skill's action at its manager."""
 
     def __init__(
-        self, middleware: RospyMiddleware, types: ActionTypes, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]
+        self, base: RospyBase, types: ActionTypes, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]
     ) -> None:
         self.types = types
-        self._middleware = middleware
+        self._base = base
         self._skill = skill
         # On the loop: actionlib's threads hold its lock, and a cancellation comes after its goal.
-        took: OnGoal = lambda handle: middleware.submit(lambda: on_goal(RospyGoal(self, handle)))  # noqa: E731
-        cancelled: OnGoal = lambda handle: middleware.submit(lambda: on_cancel(handle.get_goal_id().id))  # noqa: E731
-        self.server = _Server(middleware.name(f"skill/{skill}"), types.spec, took, cancelled)
+        took: OnGoal = lambda handle: base.submit(lambda: on_goal(RospyGoal(self, handle)))  # noqa: E731
+        cancelled: OnGoal = lambda handle: base.submit(lambda: on_cancel(handle.get_goal_id().id))  # noqa: E731
+        self.server = _Server(base.name(f"skill/{skill}"), types.spec, took, cancelled)
         self.server.start()
 
     def inputs_of(self, plain: Mapping[str, object]) -> dict[str, object]:
@@ -122,7 +120,7 @@ class RospyServer:
         try:
             fill(message, outputs, f"outputs of {self._skill}")
         except ValueError as error:
-            self._middleware.log(str(error))
+            self._base.log(str(error))
             return str(error)
         return ""
 
@@ -137,23 +135,23 @@ class RospyLink:
     Not actionlib's client: that invents the goals' ids, and logs an error for every status that overtakes another.
     """
 
-    def __init__(self, middleware: RospyMiddleware, types: ActionTypes, skill: str, listener: GoalListener) -> None:
+    def __init__(self, base: RospyBase, types: ActionTypes, skill: str, listener: GoalListener) -> None:
         self._types = types
-        self._middleware = middleware
+        self._base = base
         self._skill = skill
         self._listener = listener
-        place = middleware.name(f"skill/{skill}")
+        place = base.name(f"skill/{skill}")
         self._goals = rospy.Publisher(f"{place}/goal", types.action_goal, queue_size=QUEUE)
         self._cancels = rospy.Publisher(f"{place}/cancel", GoalID, queue_size=QUEUE)
         self._listening = [
-            middleware.listen(f"{place}/feedback", types.action_feedback, self._on_feedback),
-            middleware.listen(f"{place}/result", types.action_result, self._on_result),
+            base.listen(f"{place}/feedback", types.action_feedback, self._on_feedback),
+            base.listen(f"{place}/result", types.action_result, self._on_result),
         ]
 
     @property
     def connected(self) -> bool:
         """Tell whether there are connections in both directions to the managers' node."""
-        server = self._middleware.server
+        server = self._base.server
         sending = all(publisher.impl.has_connection(server) for publisher in (self._goals, self._cancels) if publisher.impl)
         return sending and all(is_connected(subscriber, server) for subscriber in self._listening)
 
@@ -183,7 +181,7 @@ class RospyLink:
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:  # noqa: ARG002 - nothing is answered
         """Cancel all goals: that is what an id and a stamp of nothing mean. ROS 1 tells nobody how many there were."""
         self._cancels.publish(GoalID())
-        self._middleware.submit(lambda: on_count(None))
+        self._base.submit(lambda: on_count(None))
 
     def ask_ending(self, goal_id: str) -> None:
         """Ask nothing: results are sent to everybody, and arrive over their connections."""

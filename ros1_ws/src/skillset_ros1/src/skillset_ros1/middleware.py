@@ -1,4 +1,4 @@
-"""The middleware port over rospy: this process's node, and a thread of its own that is the loop."""
+"""The middleware port over rospy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import importlib
 import queue
 import threading
 import time
-import uuid
 from collections import deque
 from collections.abc import Callable, Mapping
 from types import ModuleType
@@ -21,11 +20,9 @@ from skill_runtime.codecs import SERVICES, TOPICS, set_stamp, stamp_ns_of
 from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnSign, OnValue, Serve, Topic
 from skill_runtime.plain import message_class
 from skill_runtime.views import Sample
-from skill_runtime.waiting import Host
-from skill_runtime.workers import Workers
 from skillset_ros1.actions import RospyLink, RospyServer, is_connected
+from skillset_ros1.base import RospyBase
 from skillset_ros1.calls import call
-from skillset_ros1.loop import Alarm, Loop
 from skillset_ros1.names import QUEUE, action_types, now_ns
 
 ALIVE_PERIOD_S = 0.5
@@ -34,19 +31,16 @@ LEASE_S = 2.0
 """Without a sign of life for so long (wall clock), managers are doubted, as in the ROS 2 world."""
 BROKEN_LEASE_S = 1.5 * ALIVE_PERIOD_S
 """The same where also the connection over which the signs come is broken."""
-LOOK_S = 0.02
-"""How often (wall clock) connections are looked at while they are being made."""
 WATCH_S = 0.25
 ANSWER_S = 60.0
 """An answer to a service that has not come for so long will not come; the managers themselves give their hooks less."""
 SOURCE_QUEUE = 10
 FLUSH_STEP_S = 0.02
 QUIET_S = 0.1
-ID_DIGITS = 12
 
 
-class RospyMiddleware:
-    """One side of one skillset's interface.
+class RospyMiddleware(RospyBase):
+    """The middleware port over rospy.
 
     Args:
         skillset: its name.
@@ -55,62 +49,10 @@ class RospyMiddleware:
     """
 
     def __init__(self, skillset: str, place: str, interfaces: ModuleType | None = None) -> None:
-        self.loop = Loop(f"the client of {skillset}" if interfaces is None else f"the managers of {skillset}", self._raised)
-        self.host: Host = self.loop
-        self.server = ""
-        """The node of the managers, as a client has heard of it."""
-        self._skillset = skillset
-        self._place = place
+        super().__init__(skillset, place, f"the client of {skillset}" if interfaces is None else f"the managers of {skillset}")
         self._interfaces = interfaces
-        self._workers = Workers(f"{skillset}_hooks", self.log)
-        self._over = threading.Event()
-        self._parts: list[Callable[[], object]] = []
-
-    # --- the loop ----------------------------------------------------------------------------------------------------
-
-    def now_ns(self) -> int:
-        """Return the mission clock."""
-        return now_ns()
-
-    def at(self, when_ns: int, job: Job) -> Alarm:
-        """Have a job done at a moment of the mission clock."""
-        return self.loop.at(when_ns, job)
-
-    def later(self, delay_s: float, job: Job) -> Alarm:
-        """Have a job done after a delay of wall clock."""
-        return self.loop.after(delay_s, job)
-
-    def submit(self, job: Job) -> None:
-        """Have a job done on the loop."""
-        self.loop.submit(job)
-
-    def defer(self, job: Job) -> None:
-        """Have a job done on a thread of its own."""
-        self._workers.submit(job)
-
-    def when(self, condition: Callable[[], bool], job: Job) -> None:
-        """Have a job done once a condition holds."""
-        if condition():
-            self.submit(job)
-        else:
-            self.later(LOOK_S, lambda: self.when(condition, job))
-
-    def log(self, error: str) -> None:
-        """Log an error."""
-        rospy.logerr("%s", error)
-
-    def new_id(self) -> str:
-        """Return a random id."""
-        return uuid.uuid4().hex[:ID_DIGITS]
-
-    def _raised(self, error: Exception) -> None:
-        self.log(f"{self._skillset}: {type(error).__name__}: {error}")
 
     # --- topics ------------------------------------------------------------------------------------------------------
-
-    def name(self, relative: str) -> str:
-        """Return a name of the skillset's."""
-        return f"{self._place}/{relative}"
 
     def advertise(self, topic: Topic) -> RospyPublisher:
         """Open a topic for publishing."""
@@ -136,13 +78,6 @@ class RospyMiddleware:
         else:
             self.listen(self.name(topic.name), rospy.AnyMsg, lambda raw: self._take_raw(topic, raw, callback))
         return lambda: True
-
-    def listen(self, name: str, kind: Any, callback: OnValue, *, queue_size: int | None = None) -> Any:
-        """Subscribe; the callback comes on the loop."""
-        hand_over = lambda message: self.submit(lambda: callback(message))  # noqa: E731
-        subscriber = rospy.Subscriber(name, kind, hand_over, queue_size=queue_size, tcp_nodelay=True)
-        self._parts.append(subscriber.unregister)
-        return subscriber
 
     def _take_raw(self, topic: Topic, raw: Any, callback: OnValue) -> None:
         type_name = raw._connection_header["type"]  # noqa: SLF001 - rospy's way to tell
@@ -245,17 +180,6 @@ class RospyMiddleware:
             self.later(WATCH_S, look)
 
         self.later(WATCH_S, look)
-
-    def close_hooks(self, timeout_s: float) -> bool:
-        """Wait for all deferred jobs."""
-        return self._workers.close(timeout_s)
-
-    def close(self) -> None:
-        """Take all topics and services away, and end the loop."""
-        self._over.set()
-        self.loop.close()
-        for unregister in self._parts:
-            unregister()
 
 
 class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy has no types

@@ -21,14 +21,13 @@ from unique_identifier_msgs.msg import UUID
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnValue
+from skill_runtime.ros2.base import ID_DIGITS, RclpyBase
 from skill_runtime.ros2.convert import fields_of, fill, ros_types, values_of
 from skill_runtime.ros2.names import SERVICE
 
 if TYPE_CHECKING:
     from skill_runtime.ros2.calls import Calls, Withdraw
-    from skill_runtime.ros2.middleware import RclpyMiddleware
 
-ID_DIGITS = 12
 UUID_BYTES = 16
 GOAL_S = 60.0
 """How long a goal is offered to managers that don't answer; who has offered it gives up before."""
@@ -64,22 +63,20 @@ class RclpyGoal:
 class RclpyServer:
     """A skill's action at its manager. Every goal is accepted: how its execution ends is its result."""
 
-    def __init__(
-        self, middleware: RclpyMiddleware, action: Any, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]
-    ) -> None:
+    def __init__(self, base: RclpyBase, action: Any, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> None:
         self.action = action
-        self._middleware = middleware
+        self._base = base
         self._skill = skill
         self._on_goal = on_goal
         self._on_cancel = on_cancel
         self._server = ActionServer(
-            middleware.node,
+            base.node,
             action,
-            middleware.name(f"skill/{skill}"),
+            base.name(f"skill/{skill}"),
             execute_callback=_unexpected,
             goal_callback=lambda _: GoalResponse.ACCEPT,
-            handle_accepted_callback=middleware.on_loop(self._accepted),
-            cancel_callback=middleware.on_loop(self._cancel),
+            handle_accepted_callback=base.on_loop(self._accepted),
+            cancel_callback=base.on_loop(self._cancel),
             callback_group=MutuallyExclusiveCallbackGroup(),
             goal_service_qos_profile=SERVICE,
             result_service_qos_profile=SERVICE,
@@ -95,7 +92,7 @@ class RclpyServer:
         try:
             fill(message, outputs, f"outputs of {self._skill}")
         except ValueError as error:
-            self._middleware.log(str(error))
+            self._base.log(str(error))
             return str(error)
         return ""
 
@@ -126,15 +123,15 @@ class RclpyServer:
             else:
                 handle.abort()
         except RCLError as error:
-            self._middleware.log(f"goal {event.id} of {self._skill}: {error}")
+            self._base.log(f"goal {event.id} of {self._skill}: {error}")
         return result
 
 
 class RclpyLink:
     """A skill's action at a client; the executor waits for it only while something is awaited of it."""
 
-    def __init__(self, middleware: RclpyMiddleware, action: Any, skill: str, listener: GoalListener) -> None:
-        self._middleware = middleware
+    def __init__(self, base: RclpyBase, action: Any, skill: str, listener: GoalListener) -> None:
+        self._base = base
         self._action = action
         self._skill = skill
         self._listener = listener
@@ -142,16 +139,16 @@ class RclpyLink:
         self._goals: dict[str, Any] = {}
         self._offers: dict[str, Withdraw] = {}
         place = f"skill/{skill}/_action"
-        self._send = middleware.calls(f"{place}/send_goal", action.Impl.SendGoalService)
-        self._follow = middleware.resting_subscription(f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback)
+        self._send = base.calls(f"{place}/send_goal", action.Impl.SendGoalService)
+        self._follow = base.resting_subscription(f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback)
 
     @functools.cached_property
     def _cancels(self) -> Calls:
-        return self._middleware.calls(f"skill/{self._skill}/_action/cancel_goal", CancelGoal)
+        return self._base.calls(f"skill/{self._skill}/_action/cancel_goal", CancelGoal)
 
     @functools.cached_property
     def _results(self) -> Calls:
-        return self._middleware.calls(f"skill/{self._skill}/_action/get_result", self._action.Impl.GetResultService)
+        return self._base.calls(f"skill/{self._skill}/_action/get_result", self._action.Impl.GetResultService)
 
     @property
     def connected(self) -> bool:
