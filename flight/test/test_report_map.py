@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from alula_flight.report.files import Problems, ReportError
 from alula_flight.report.map_picture import FROM_ABOVE, FROM_SOUTH, topmost
 from alula_flight.report.map_quality import covered_by, error_m, judge_map, load_map, load_route, patches_in_reach, viewpoints
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import mesh_of, write_map, write_world
@@ -23,8 +23,8 @@ GROUND = ([-30, -30], [30, 30])
 ROUTE = np.array([[-10.0, 0.0, 3.0], [10.0, 0.0, 3.0]])
 
 
-def plain() -> World:
-    return World(*mesh_of([], GROUND))
+def plain() -> TrueSurfaces:
+    return TrueSurfaces(*mesh_of([], GROUND))
 
 
 def grid(x, y, z=0.0, step=0.2):
@@ -59,7 +59,7 @@ def test_reach_is_a_band_beside_the_route():
 
 def test_what_is_hidden_is_not_in_reach():
     wall = ((-30, 5.0, 0), (30, 5.2, 6))
-    patches = patches_in_reach(World(*mesh_of([wall], GROUND)), ROUTE)
+    patches = patches_in_reach(TrueSurfaces(*mesh_of([wall], GROUND)), ROUTE)
     assert (patches[:, 1] < 5.02).all(), "neither the wall's back nor the ground behind it"
     assert (np.abs(patches[patches[:, 2] > 0.1][:, 1] - 5.0) < 0.02).all(), "of the wall its front; the top is above the route"
     assert patches[:, 2].max() > 5.9
@@ -114,9 +114,9 @@ def test_files_are_read_or_refused(tmp_path):
         with pytest.raises(ReportError, match=name):
             load_map(tmp_path / name)
         with pytest.raises(ReportError, match=name):
-            World.load(tmp_path / name)
+            TrueSurfaces.load(tmp_path / name)
     with pytest.raises(ReportError, match=r"nothing.ply is missing"):
-        World.load(tmp_path / "nothing.ply")
+        TrueSurfaces.load(tmp_path / "nothing.ply")
     for text in ("[]", "{}", "[[1, 2]]", '[[1, 2, "x"]]', "[[1, 2, NaN]]", "[[1, 2,"):
         (tmp_path / "route.json").write_text(text)
         with pytest.raises(ReportError, match=r"route.json"):
@@ -129,7 +129,7 @@ def test_files_are_read_or_refused(tmp_path):
 
 def test_the_outline_of_a_box_is_its_twelve_edges(tmp_path):
     write_world(tmp_path / "world.ply", [((0, 0, 0), (2, 3, 4))], None)
-    outline = World.load(tmp_path / "world.ply").outline()
+    outline = TrueSurfaces.load(tmp_path / "world.ply").outline()
     assert len(outline) == 12
     assert np.linalg.norm(np.diff(outline, axis=1), axis=2).sum() == pytest.approx(4 * (2 + 3 + 4), abs=1e-5)
 
@@ -146,7 +146,7 @@ def test_the_picture_shows_what_hides_the_rest():
 def test_a_yard_of_60_by_40_m_takes_seconds():
     random = np.random.default_rng(3)
     corners = random.uniform([-30, -20, 0], [28, 18, 0], (60, 3))
-    world = World(*mesh_of([(low, low + np.array([2.0, 2.0, 5.0])) for low in corners], ([-30, -20], [30, 20])))
+    world = TrueSurfaces(*mesh_of([(low, low + np.array([2.0, 2.0, 5.0])) for low in corners], ([-30, -20], [30, 20])))
     route = np.array([[-28.0, -15, 4], [28, -15, 4], [28, 0, 4], [-28, 0, 4], [-28, 15, 4], [28, 15, 4]])
     began = time.process_time()
     judge_map(random.uniform([-30, -20, 0], [30, 20, 5], (300_000, 3)), route, world, Problems())

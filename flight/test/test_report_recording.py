@@ -11,7 +11,7 @@ import pytest
 
 from alula_flight.report.files import Problems
 from alula_flight.report.page import page_entries
-from alula_flight.report.recording import Fault, read_recording
+from alula_flight.report.recording import FaultChange, read_recording
 from mission_console.entries import FAULT, HEALTH, PATH
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -32,7 +32,7 @@ def test_a_whole_bag(tmp_path):
     np.testing.assert_allclose(recording.truth.position_enu_m, STRAIGHT[1])
     assert recording.truth.length_m() == pytest.approx(20.0)
     np.testing.assert_allclose(recording.truth.horizontal_speed_m_s(), 2.0, atol=1e-6)
-    assert recording.simulator.faults == (Fault("zed", "dead", LIFT_OFF_S + 5.0),)
+    assert recording.simulator.faults == (FaultChange("zed", "dead", LIFT_OFF_S + 5.0),)
     assert (recording.simulator.min_clearance_m, recording.simulator.collisions) == (1.25, 0)
     assert recording.guidance[0].landing
     assert recording.map_points == 77

@@ -14,7 +14,7 @@ from alula_flight.report.phases import Phases, find_phases
 from alula_flight.report.recording import GuidanceAccount, Recording, SimulatorAccount, Track
 from alula_flight.report.recovery import moving_again
 from alula_flight.report.truth import VEHICLE_RADIUS_M, Encounter, disagreements, encounter, rests, worse
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, mesh_of, path_through
@@ -23,7 +23,7 @@ GROUND = ([-20, -20], [40, 20])
 STAND_M = 0.3  # the centre's height on the ground
 
 
-def flight(*places, wall_y_m=4.0, boxes=()) -> tuple[Track, World, Phases]:
+def flight(*places, wall_y_m=4.0, boxes=()) -> tuple[Track, TrueSurfaces, Phases]:
     """Take off at the origin to 3 m in 3 s, fly through the places at 2 m/s, land in 3 s; a wall stands at y = wall_y_m."""
     up = path_through([(0, 0, STAND_M), (0, 0, 3)], speed_m_s=0.9, start_s=LIFT_OFF_S)
     on = path_through([(0, 0, 3), *places], speed_m_s=2.0, start_s=up[0][-1])
@@ -33,7 +33,7 @@ def flight(*places, wall_y_m=4.0, boxes=()) -> tuple[Track, World, Phases]:
     parts = [(LIFT_OFF_S - still[0][::-1], still[1] + up[1][0]), up, on, down, (down[0][-1] + still[0], still[1] + down[1][-1])]
     t_s, first = np.unique(np.concatenate([part[0] for part in parts]), return_index=True)
     track = Track(t_s, np.concatenate([part[1] for part in parts])[first])
-    world = World(*mesh_of([((-20, wall_y_m, 0), (40, wall_y_m + 0.3, 8)), *boxes], GROUND))
+    world = TrueSurfaces(*mesh_of([((-20, wall_y_m, 0), (40, wall_y_m + 0.3, 8)), *boxes], GROUND))
     phases = Phases(LIFT_OFF_S, "simulator", cruise_s=up[0][-1], landing_s=on[0][-1], touch_down_s=down[0][-1])
     return track, world, phases
 
@@ -73,7 +73,7 @@ def test_without_phases_told_the_heights_decide():
 
 def test_heights_count_from_the_place_of_take_off():
     track, world, phases = flight((10, 0, 3), wall_y_m=4.0)
-    raised = World(world.vertices + np.array([0, 0, 50]), world.triangles)
+    raised = TrueSurfaces(world.vertices + np.array([0, 0, 50]), world.triangles)
     lifted = Track(track.t_s, track.position_enu_m + np.array([0, 0, 50]))
     assert encounter(lifted, raised, phases).min_clearance_m == pytest.approx(encounter(track, world, phases).min_clearance_m, abs=1e-4)
 

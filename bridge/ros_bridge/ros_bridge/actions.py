@@ -19,7 +19,7 @@ from ros_bridge.action_ends_ros1 import ActionlibClientsEnd, ActionlibServerEnd
 from ros_bridge.action_ends_ros2 import Ros2ClientsEnd, Ros2ServerEnd, empty_result, result_cdr, stamp_ns
 from ros_bridge.action_states import Ros2Status
 from ros_bridge.action_types import ActionType, action_type
-from ros_bridge.config import ActionRoute, World
+from ros_bridge.config import ActionRoute, RosVersion
 from ros_bridge.conversion import ament_prefixes
 from ros_bridge.goals_to_ros1 import GoalsToRos1
 from ros_bridge.goals_to_ros2 import GoalsToRos2
@@ -247,7 +247,7 @@ class ServerInRos2(_ActionBridge[GoalsToRos2]):
         self._goals.on_result(goal, Ros2Status(response.status), payload, "", time.monotonic())
 
 
-KINDS: dict[World, type[ServerInRos1 | ServerInRos2]] = {World.ROS1: ServerInRos1, World.ROS2: ServerInRos2}
+KINDS: dict[RosVersion, type[ServerInRos1 | ServerInRos2]] = {RosVersion.ROS1: ServerInRos1, RosVersion.ROS2: ServerInRos2}
 
 
 def make(spec: ActionRoute, context: Context) -> Route:

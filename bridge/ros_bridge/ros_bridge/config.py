@@ -17,7 +17,7 @@ class Direction(Enum):
     ROS2_TO_ROS1 = "ros2_to_ros1"
 
 
-class World(Enum):
+class RosVersion(Enum):
     """One of the two worlds; of a service, the one that its server lives in."""
 
     ROS1 = "ros1"
@@ -66,7 +66,7 @@ class _ServedRoute:
 
     ros1_name: str
     ros2_name: str
-    server: World
+    server: RosVersion
     type_name: str
     timeout_s: float = 5.0
     ros2_type: str = ""
@@ -79,7 +79,7 @@ class _ServedRoute:
     @property
     def target_name(self) -> str:
         """The name in the world that the callers are in."""
-        return self.ros2_name if self.server is World.ROS1 else self.ros1_name
+        return self.ros2_name if self.server is RosVersion.ROS1 else self.ros1_name
 
 
 @dataclass(frozen=True)

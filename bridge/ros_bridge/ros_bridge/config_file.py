@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from alula_common.located_yaml import Located, read_yaml
-from ros_bridge.config import ActionRoute, BridgeConfig, Direction, Reliability, ServiceRoute, TopicRoute, World
+from ros_bridge.config import ActionRoute, BridgeConfig, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.errors import ConfigError
 from ros_bridge.mapping import TypeRule, TypeRules
 from ros_bridge.selection import Selection
@@ -104,7 +104,7 @@ TOPIC_KEYS: Mapping[str, Reader] = {
     "depth": _depth,
     "reliability": _choice(Reliability),
 }
-SERVICE_KEYS: Mapping[str, Reader] = {**NAMES, "server": _choice(World), "type": _type, "ros2_type": _type, "timeout_s": _timeout}
+SERVICE_KEYS: Mapping[str, Reader] = {**NAMES, "server": _choice(RosVersion), "type": _type, "ros2_type": _type, "timeout_s": _timeout}
 RULE_KEYS: Mapping[str, Reader] = {"ros1": _type, "ros2": _type, "fields": _mapping(_field, _field)}
 DISCOVER_KEYS: Mapping[str, Reader] = {
     "all": _flag,
@@ -235,9 +235,9 @@ def _require_apart(config: BridgeConfig) -> None:
         if target in targets:
             raise ConfigError(f"{route.target_name}: two routes lead there ({way.value}); keep one, or rename one")
         targets.add(target)
-    graph: dict[tuple[World, str], set[tuple[World, str]]] = {}
+    graph: dict[tuple[RosVersion, str], set[tuple[RosVersion, str]]] = {}
     for topic in config.topics:
-        ends = [(World.ROS1, topic.ros1_name), (World.ROS2, topic.ros2_name)]
+        ends = [(RosVersion.ROS1, topic.ros1_name), (RosVersion.ROS2, topic.ros2_name)]
         source, target_end = ends if topic.direction is Direction.ROS1_TO_ROS2 else reversed(ends)
         graph.setdefault(target_end, set()).add(source)
     try:

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from ros_bridge.config import ActionRoute, Direction, Reliability, ServiceRoute, Spec, TopicRoute, World
+from ros_bridge.config import ActionRoute, Direction, Reliability, RosVersion, ServiceRoute, Spec, TopicRoute
 from ros_bridge.errors import BridgeError
 from ros_bridge.graph import ACTION_PARTS, Graphs, Ros2Endpoint
 from ros_bridge.selection import Selection
@@ -140,11 +140,11 @@ def _service(graphs: Graphs, types: TypeLookup, ros1_name: str, ros2_name: str) 
         pair = types.check_service(graphs.ros1.service_types.get(ros1_name), graphs.ros2.services.get(ros2_name))
     except BridgeError as error:
         return Refused("service", ros1_name, ros2_name, str(error))
-    return RouteDecision(ServiceRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, pair[0], ros2_type=pair[1]))
+    return RouteDecision(ServiceRoute(ros1_name, ros2_name, RosVersion.ROS1 if in1 else RosVersion.ROS2, pair[0], ros2_type=pair[1]))
 
 
 def _action(graphs: Graphs, ros1_name: str, ros2_name: str) -> Decision:
     in1, in2 = graphs.ros1.action_servers().get(ros1_name), graphs.ros2.actions.get(ros2_name)
     if in1 and in2:
         return Refused("action", ros1_name, ros2_name, "both worlds have a server")
-    return RouteDecision(ActionRoute(ros1_name, ros2_name, World.ROS1 if in1 else World.ROS2, in1 or in2 or ""))
+    return RouteDecision(ActionRoute(ros1_name, ros2_name, RosVersion.ROS1 if in1 else RosVersion.ROS2, in1 or in2 or ""))

@@ -64,7 +64,7 @@ class Ros2Clients(Protocol):
 
 
 @dataclass
-class Goal:
+class GoalToRos1:
     """One goal. ``status`` is UNKNOWN until it is accepted."""
 
     uuid: bytes
@@ -101,7 +101,7 @@ class GoalsToRos1:
         self._label = label
         self._timeout_s = timeout_s
         self.lock = threading.RLock()
-        self._goals: dict[bytes, Goal] = {}
+        self._goals: dict[bytes, GoalToRos1] = {}
 
     def connect(self, server: ActionlibServer, clients: Ros2Clients) -> None:
         """Take both ends; whoever opens them holds the lock meanwhile, so that what they bring waits."""
@@ -120,10 +120,10 @@ class GoalsToRos1:
             if goal_uuid in self._goals or sum(goal.open for goal in self._goals.values()) >= MOST_GOALS:
                 self._clients.reply_goal(caller, accepted=False, stamp_ns=0)
                 return
-            goal = self._goals[goal_uuid] = Goal(goal_uuid, payload, caller, now_s + self._timeout_s)
+            goal = self._goals[goal_uuid] = GoalToRos1(goal_uuid, payload, caller, now_s + self._timeout_s)
             self._send_if_possible(goal, now_s)
 
-    def _send_if_possible(self, goal: Goal, now_s: float) -> None:
+    def _send_if_possible(self, goal: GoalToRos1, now_s: float) -> None:
         if self._server.present():
             goal.sent_s = now_s
             self._server.send_goal(goal.name, goal.payload)
@@ -143,7 +143,7 @@ class GoalsToRos1:
                 self._cancel(goal, now_s)
             self._publish_status()
 
-    def _cancel(self, goal: Goal, now_s: float) -> None:
+    def _cancel(self, goal: GoalToRos1, now_s: float) -> None:
         goal.cancel_seen = True
         if goal.sent_s is None:
             self._reject(goal, "cancelled before a server was there", now_s)
@@ -174,7 +174,7 @@ class GoalsToRos1:
                 elif goal.listed_s is not None and goal.ended_in_ros1 is None:
                     self._give_up(goal, "the server in ROS 1 has forgotten the goal: it was restarted", now_s)
 
-    def _on_goal_status(self, goal: Goal, status: GoalStatus, now_s: float) -> None:
+    def _on_goal_status(self, goal: GoalToRos1, status: GoalStatus, now_s: float) -> None:
         if goal.listed_s is None:
             goal.listed_s, goal.payload = now_s, b""
         goal.stamp_ns = goal.stamp_ns or status.goal_id.stamp_ns
@@ -212,7 +212,7 @@ class GoalsToRos1:
             goal.stamp_ns = goal.stamp_ns or status.goal_id.stamp_ns
             self._end_as_in_ros1(goal, status.status, payload, status.text, now_s)
 
-    def _end_as_in_ros1(self, goal: Goal, status: Ros1Status, payload: bytes | None, reason: str, now_s: float) -> None:
+    def _end_as_in_ros1(self, goal: GoalToRos1, status: Ros1Status, payload: bytes | None, reason: str, now_s: float) -> None:
         if goal.status is Ros2Status.UNKNOWN and status in (Ros1Status.REJECTED, Ros1Status.RECALLED):
             self._reject(goal, reason, now_s)
             return
@@ -235,7 +235,7 @@ class GoalsToRos1:
             for goal_uuid in ended[: max(0, len(ended) - KEEP_RESULTS)]:
                 del self._goals[goal_uuid]
 
-    def _tick_open(self, goal: Goal, now_s: float, *, gone: bool) -> None:
+    def _tick_open(self, goal: GoalToRos1, now_s: float, *, gone: bool) -> None:
         unanswered = goal.status is Ros2Status.UNKNOWN
         if goal.ended_in_ros1 is not None and now_s - goal.ended_in_ros1[1] > RESULT_WITHIN_S:
             self._end_as_in_ros1(goal, goal.ended_in_ros1[0], None, "the server in ROS 1 has sent no result", now_s)
@@ -259,40 +259,40 @@ class GoalsToRos1:
                     self._server.send_cancel(goal.name)
                 self._give_up(goal, reason, now_s)
 
-    def _find(self, status: GoalStatus) -> Goal | None:
+    def _find(self, status: GoalStatus) -> GoalToRos1 | None:
         try:
             goal = self._goals.get(uuid.UUID(status.goal_id.name).bytes)
         except ValueError:
             return None  # a goal of a client in ROS 1
         return None if goal is None or (goal.open and goal.sent_s is None) else goal
 
-    def _accept(self, goal: Goal) -> None:
+    def _accept(self, goal: GoalToRos1) -> None:
         if goal.status is Ros2Status.UNKNOWN:
             goal.status = Ros2Status.CANCELING if goal.cancel_seen else Ros2Status.ACCEPTED
             self._clients.reply_goal(goal.caller, accepted=True, stamp_ns=goal.stamp_ns)
             goal.caller = None
             self._publish_status()
 
-    def _move(self, goal: Goal, status: Ros2Status) -> None:
+    def _move(self, goal: GoalToRos1, status: Ros2Status) -> None:
         """Go on to a state, never back."""
         if status > goal.status:
             goal.status = status
             self._publish_status()
 
-    def _give_up(self, goal: Goal, reason: str, now_s: float) -> None:
+    def _give_up(self, goal: GoalToRos1, reason: str, now_s: float) -> None:
         if goal.status is Ros2Status.UNKNOWN:
             self._reject(goal, reason, now_s)
         else:
             logger.warning("%s: goal %s aborted: %s", self._label, goal.name, reason)
             self._end(goal, Ros2Status.ABORTED, None, reason, now_s)
 
-    def _reject(self, goal: Goal, reason: str, now_s: float) -> None:
+    def _reject(self, goal: GoalToRos1, reason: str, now_s: float) -> None:
         logger.warning("%s: goal %s rejected: %s", self._label, goal.name, reason or "by the server in ROS 1")
         goal.ended_s = now_s
         self._clients.reply_goal(goal.caller, accepted=False, stamp_ns=0)
         goal.caller = None
 
-    def _end(self, goal: Goal, status: Ros2Status, payload: bytes | None, reason: str, now_s: float) -> None:
+    def _end(self, goal: GoalToRos1, status: Ros2Status, payload: bytes | None, reason: str, now_s: float) -> None:
         goal.status, goal.payload_of_result, goal.reason, goal.ended_s = status, payload, reason, now_s
         for caller in goal.waiting:
             self._clients.reply_result(caller, status, payload, reason)
@@ -304,7 +304,7 @@ class GoalsToRos1:
         self._clients.publish_status([(goal.uuid, goal.stamp_ns, goal.status) for goal in accepted])
 
 
-def _is_meant(goal: Goal, goal_uuid: bytes, stamp_ns: int) -> bool:
+def _is_meant(goal: GoalToRos1, goal_uuid: bytes, stamp_ns: int) -> bool:
     if goal.uuid == goal_uuid or (goal_uuid == ANY_GOAL and not stamp_ns):
         return True
     return bool(stamp_ns) and 0 < goal.stamp_ns <= stamp_ns

@@ -66,7 +66,7 @@ class Ros1Clients(Protocol):
 
 
 @dataclass
-class Goal:
+class GoalToRos2:
     """One goal."""
 
     name: str
@@ -102,8 +102,8 @@ class GoalsToRos2:
         self._label = label
         self._timeout_s = timeout_s
         self.lock = threading.RLock()
-        self._goals: dict[str, Goal] = {}
-        self._by_uuid: dict[bytes, Goal] = {}
+        self._goals: dict[str, GoalToRos2] = {}
+        self._by_uuid: dict[bytes, GoalToRos2] = {}
         self._last_cancel_ns = 0
         self._next_status_s = 0.0
 
@@ -134,14 +134,14 @@ class GoalsToRos2:
             else:
                 self._send_if_possible(goal, now_s)
 
-    def _new(self, goal_id: GoalId, payload: bytes, now_s: float) -> Goal:
+    def _new(self, goal_id: GoalId, payload: bytes, now_s: float) -> GoalToRos2:
         goal_uuid = uuid.uuid4()
         name = goal_id.name or f"ros_bridge-{goal_uuid}"
-        goal = Goal(name, goal_id.stamp_ns, payload, now_s + self._timeout_s, goal_uuid.bytes)
+        goal = GoalToRos2(name, goal_id.stamp_ns, payload, now_s + self._timeout_s, goal_uuid.bytes)
         self._goals[name] = self._by_uuid[goal.uuid] = goal
         return goal
 
-    def _send_if_possible(self, goal: Goal, now_s: float) -> None:
+    def _send_if_possible(self, goal: GoalToRos2, now_s: float) -> None:
         if self._server.present():
             goal.sent_s = now_s
             goal.asked = False
@@ -157,7 +157,7 @@ class GoalsToRos2:
                 early = self._new(GoalId(request.name, request.stamp_ns), b"", now_s)
                 early.status, early.ended_s = Ros1Status.RECALLING, now_s
 
-    def _cancel(self, goal: Goal, now_s: float) -> None:
+    def _cancel(self, goal: GoalToRos2, now_s: float) -> None:
         goal.cancel_asked = True
         if goal.sent_s is None:
             self._end(goal, Ros1Status.RECALLED, None, "cancelled before a server was there", now_s)
@@ -179,7 +179,7 @@ class GoalsToRos2:
             elif not goal.accepted:
                 self._end(goal, Ros1Status.REJECTED, None, reason, now_s)
 
-    def _accept(self, goal: Goal) -> None:
+    def _accept(self, goal: GoalToRos2) -> None:
         if goal.accepted:
             return
         goal.accepted, goal.payload = True, b""
@@ -239,7 +239,7 @@ class GoalsToRos2:
                 self._publish_status()
                 self._next_status_s = now_s + STATUS_PERIOD_S
 
-    def _tick_open(self, goal: Goal, now_s: float, *, present: bool, come: bool) -> None:
+    def _tick_open(self, goal: GoalToRos2, now_s: float, *, present: bool, come: bool) -> None:
         if goal.sent_s is not None and not present:
             self._give_up(goal, "the server in ROS 2 is gone", now_s)
         elif not goal.accepted and now_s > goal.answer_by_s:
@@ -269,18 +269,18 @@ class GoalsToRos2:
                     self._server.send_cancel(goal.uuid)
                 self._give_up(goal, reason, now_s)
 
-    def _give_up(self, goal: Goal, reason: str, now_s: float) -> None:
+    def _give_up(self, goal: GoalToRos2, reason: str, now_s: float) -> None:
         final = Ros1Status.ABORTED if goal.accepted else Ros1Status.REJECTED
         logger.warning("%s: goal %s %s: %s", self._label, goal.name, final.name.lower(), reason)
         self._end(goal, final, None, reason, now_s)
 
-    def _move(self, goal: Goal, status: Ros1Status) -> None:
+    def _move(self, goal: GoalToRos2, status: Ros1Status) -> None:
         """Go on from PENDING to ACTIVE to PREEMPTING, never back."""
         if status is not goal.status and goal.status is not Ros1Status.PREEMPTING:
             goal.status = status
             self._publish_status()
 
-    def _end(self, goal: Goal, status: Ros1Status, payload: bytes | None, text: str, now_s: float) -> None:
+    def _end(self, goal: GoalToRos2, status: Ros1Status, payload: bytes | None, text: str, now_s: float) -> None:
         goal.status, goal.text, goal.ended_s, goal.payload = status, text, now_s, b""
         self._clients.publish_result(goal.goal_status, payload)
         self._publish_status()
@@ -289,7 +289,7 @@ class GoalsToRos2:
         self._clients.publish_status([goal.goal_status for goal in self._goals.values()])
 
 
-def _is_meant(goal: Goal, request: GoalId) -> bool:
+def _is_meant(goal: GoalToRos2, request: GoalId) -> bool:
     if not request.name and not request.stamp_ns:
         return True
     return goal.name == request.name or 0 < goal.stamp_ns <= request.stamp_ns

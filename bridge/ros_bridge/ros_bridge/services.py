@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.serialization import serialize_message
 
 from ros_bridge import native
-from ros_bridge.config import ServiceRoute, World
+from ros_bridge.config import RosVersion, ServiceRoute
 from ros_bridge.native import MessageKind
 from ros_bridge.native_route import NativeRoute
 from ros_bridge.ros1_node import Kind
@@ -47,7 +47,7 @@ class NativeService(NativeRoute):
         """Offer the service; calls cross from here on. Raises BridgeError."""
         super().__init__(context.plane, spec.label)
         self._spec = spec
-        self._in_ros1 = spec.server is World.ROS1
+        self._in_ros1 = spec.server is RosVersion.ROS1
         request, response = service.request, service.response
         same_layout = request.same_layout and response.same_layout
         if not same_layout:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ros_bridge.config import ActionRoute, Direction, ServiceRoute, Spec, TopicRoute, World
+from ros_bridge.config import ActionRoute, Direction, RosVersion, ServiceRoute, Spec, TopicRoute
 from ros_bridge.decisions import Decision, Refused
 from ros_bridge.routes import Key, key_of
 from ros_bridge.stats import Figures
@@ -33,7 +33,7 @@ class Rates:
 
 def to_ros2(spec: Spec) -> bool:
     """Tell whether messages go, or calls are answered, from ROS 1 towards ROS 2."""
-    return spec.direction is Direction.ROS1_TO_ROS2 if isinstance(spec, TopicRoute) else spec.server is World.ROS1
+    return spec.direction is Direction.ROS1_TO_ROS2 if isinstance(spec, TopicRoute) else spec.server is RosVersion.ROS1
 
 
 def summary(figures: Mapping[Spec, Figures], rates: Mapping[Spec, float]) -> dict[str, dict[str, dict[str, object]]]:

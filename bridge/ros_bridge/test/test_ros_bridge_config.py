@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ros_bridge.config import Direction, Reliability, ServiceRoute, TopicRoute, World
+from ros_bridge.config import Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.config_file import load_config, read_config
 from ros_bridge.errors import ConfigError
 from ros_bridge.selection import Selection
@@ -45,7 +45,7 @@ def test_reads_all_keys_and_defaults(parsed):
         TopicRoute("/clock", "/clock", Direction.ROS1_TO_ROS2, "rosgraph_msgs/Clock", latched=False, depth=10),
         TopicRoute("/old", "/new", Direction.ROS2_TO_ROS1, "std_msgs/String", latched=True, depth=1, reliability=Reliability.BEST_EFFORT),
     )
-    assert config.services == (ServiceRoute("/uav_guidance/takeoff", "/uav_guidance/takeoff", World.ROS1, "uav_msgs/Takeoff", 2.0),)
+    assert config.services == (ServiceRoute("/uav_guidance/takeoff", "/uav_guidance/takeoff", RosVersion.ROS1, "uav_msgs/Takeoff", 2.0),)
 
 
 DISCOVERED = """

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_bridge.config import ActionRoute, Direction, Reliability, ServiceRoute, TopicRoute, World
+from ros_bridge.config import ActionRoute, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.decisions import BULKY_DEPTH, DEPTH, Refused, RouteDecision, decide
 from ros_bridge.errors import BridgeError, TypeUnknownError
 from ros_bridge.graph import Graphs, Ros1Graph, Ros2Endpoint, Ros2Graph, is_bridge
@@ -120,9 +120,9 @@ def test_services_and_actions_go_from_the_world_that_has_the_server():
     assert decided(one, two) == [
         Refused("service", "/both", "/both", "both worlds have a server"),
         Refused("service", "/mute", "/mute", "its node does not say its type"),
-        RouteDecision(ServiceRoute("/one", "/one", World.ROS1, "a/B", ros2_type="a/B")),
-        RouteDecision(ServiceRoute("/two", "/two", World.ROS2, "c/D", ros2_type="c/D")),
-        RouteDecision(ActionRoute("/go", "/go", World.ROS2, "e/Go")),
+        RouteDecision(ServiceRoute("/one", "/one", RosVersion.ROS1, "a/B", ros2_type="a/B")),
+        RouteDecision(ServiceRoute("/two", "/two", RosVersion.ROS2, "c/D", ros2_type="c/D")),
+        RouteDecision(ActionRoute("/go", "/go", RosVersion.ROS2, "e/Go")),
     ]
 
 
@@ -132,7 +132,7 @@ def test_an_action_of_ros1_is_known_by_its_topics_which_are_no_topics_then():
     to_server = {"/go/goal": server, "/go/cancel": server}
     types = {"/go/goal": "e/GoActionGoal", "/go/status": "actionlib_msgs/GoalStatusArray"}
     graph = Ros1Graph({**from_server, "/go/goal": client}, {**to_server, "/go/status": client}, types=types)
-    assert decided(graph, ros2()) == [RouteDecision(ActionRoute("/go", "/go", World.ROS1, "e/Go"))]
+    assert decided(graph, ros2()) == [RouteDecision(ActionRoute("/go", "/go", RosVersion.ROS1, "e/Go"))]
     assert Ros1Graph({"/go/goal": client}, {"/go/status": client}, types=types).action_servers() == {}
 
 

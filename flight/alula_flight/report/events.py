@@ -17,7 +17,7 @@ from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 
 
 @dataclass(frozen=True)
-class Execution:
+class PastExecution:
     """A skill's execution from request to end; ``outcome`` is the last state seen, so RUNNING or REQUESTED if no end was."""
 
     skillset: str
@@ -36,12 +36,12 @@ class Execution:
 class History:
     """Everything that happened in the skillsets, in the order of time."""
 
-    executions: tuple[Execution, ...] = ()
+    executions: tuple[PastExecution, ...] = ()
     transitions: tuple[TransitionEvent, ...] = ()
     first_s: float | None = None
     last_s: float | None = None
 
-    def of_skill(self, skill: str) -> list[Execution]:
+    def of_skill(self, skill: str) -> list[PastExecution]:
         """Return the executions of a skill, whatever skillset it belongs to."""
         return [execution for execution in self.executions if execution.skill == skill]
 
@@ -100,7 +100,7 @@ def gaps(events: Sequence[EngineEvent]) -> Iterator[str]:
 
 def fold(events: Iterable[EngineEvent], problems: Problems) -> History:
     """Put the events of each execution together. The first terminal state counts; another one is noted as a problem."""
-    executions: dict[tuple[str, str, str], Execution] = {}
+    executions: dict[tuple[str, str, str], PastExecution] = {}
     transitions: list[TransitionEvent] = []
     stamps: list[float] = []
     for event in events:
@@ -122,11 +122,11 @@ def fold(events: Iterable[EngineEvent], problems: Problems) -> History:
     )
 
 
-def _begin(event: ExecutionEvent) -> Execution:
-    return Execution(event.skillset, event.skill, event.id, mapping(event.inputs), event.stamp_s, None, None, event.state.value, "", "")
+def _begin(event: ExecutionEvent) -> PastExecution:
+    return PastExecution(event.skillset, event.skill, event.id, mapping(event.inputs), event.stamp_s, None, None, event.state.value, "", "")
 
 
-def _advance(execution: Execution, event: ExecutionEvent) -> Execution:
+def _advance(execution: PastExecution, event: ExecutionEvent) -> PastExecution:
     return replace(
         execution,
         inputs=execution.inputs or mapping(event.inputs),

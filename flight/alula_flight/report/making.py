@@ -24,7 +24,7 @@ from alula_flight.report.timeline_picture import draw_timeline
 from alula_flight.report.truth import Encounter, disagreements, encounter, rests
 from alula_flight.report.video import Video, radio_lost_s, read_video
 from alula_flight.report.video_picture import draw_video
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 from mission_console.page import write_report
 
 
@@ -32,7 +32,7 @@ from mission_console.page import write_report
 class Truth:
     """The flight and its map against the simulator's true surfaces, as far as they are known."""
 
-    world: World | None = None
+    world: TrueSurfaces | None = None
     recomputed: Encounter = field(default_factory=Encounter)
     resting: bool | None = None
     points: Floats | None = None
@@ -144,9 +144,9 @@ def _write_summary(folder: Path, summary: Summary) -> None:
 def _compare(folder: Path, account: Account, problems: Problems, *, mapped: bool) -> Truth:
     """Compare with the true world, where there is one: the path first, then the map."""
     recording, phases = account.recording, account.phases
-    world: World | None = None
+    world: TrueSurfaces | None = None
     with problems.survive("world.ply"):
-        world = World.load(folder / "world.ply")
+        world = TrueSurfaces.load(folder / "world.ply")
     recomputed, resting = Encounter(), None
     with problems.survive("the clearance to the true surfaces"):
         recomputed = encounter(recording.truth, world, phases)

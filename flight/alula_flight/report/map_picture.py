@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 
 from alula_flight.report.map_quality import Floats
 from alula_flight.report.recording import Track
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 
 DPI = 160
 PLAN_WIDTH_IN, PLAN_HEIGHT_IN = 9.2, 8.0  # at most
@@ -34,7 +34,7 @@ class MapScene:
 
     points: Floats | None
     missed: Floats | None
-    world: World | None
+    world: TrueSurfaces | None
     route: Floats | None
     path: Track | None
     failure_s: float | None

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from alula_flight.report.files import Problems, ReportError, finite, read_json, sequence
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 
 PATCH_M = 0.25  # one sample for each square of this side
 SEED = 1
@@ -74,7 +74,7 @@ def load_route(path: Path) -> Floats:
     return np.asarray(waypoints, dtype=np.float64)
 
 
-def judge_map(points: Floats | None, route: Floats | None, world: World | None, problems: Problems) -> MapQuality:
+def judge_map(points: Floats | None, route: Floats | None, world: TrueSurfaces | None, problems: Problems) -> MapQuality:
     """Judge the map as far as map, route and world are there."""
     if points is None:
         return MapQuality()
@@ -91,7 +91,7 @@ def judge_map(points: Floats | None, route: Floats | None, world: World | None, 
     return MapQuality(len(points), rmse_m, float(covered.mean()), len(patches), patches[~covered])
 
 
-def error_m(points: Floats, world: World) -> float:
+def error_m(points: Floats, world: TrueSurfaces) -> float:
     """Return the root of the mean squared distance of the map's points to the true surfaces."""
     step = max(1, -(-len(points) // ERROR_SAMPLE))
     return float(np.sqrt(np.mean(world.distance_m(points[::step]) ** 2)))
@@ -118,7 +118,7 @@ def viewpoints(route: Floats) -> tuple[Floats, Floats]:
     return np.concatenate(places[only_legs]), np.concatenate(directions[only_legs])
 
 
-def patches_in_reach(world: World, route: Floats) -> Floats:
+def patches_in_reach(world: TrueSurfaces, route: Floats) -> Floats:
     """Return the centres of the surface patches that a perfect survey of the route sees, (N, 3)."""
     patches, normals = world.sample(PATCH_M, SEED)
     seen = np.zeros(len(patches), dtype=bool)
@@ -130,7 +130,7 @@ def patches_in_reach(world: World, route: Floats) -> Floats:
     return np.asarray(patches[seen], dtype=np.float64)
 
 
-def _visible(world: World, viewpoint: Floats, along: Floats, patches: Floats, normals: Floats) -> NDArray[np.bool_]:
+def _visible(world: TrueSurfaces, viewpoint: Floats, along: Floats, patches: Floats, normals: Floats) -> NDArray[np.bool_]:
     """Tell which patches are in the LiDAR's range, beside the leg, not edge-on, and hidden by nothing."""
     sight = patches - viewpoint
     distance = np.linalg.norm(sight, axis=1)

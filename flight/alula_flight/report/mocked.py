@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypedDict
 
 from alula_flight.report.files import Problems, finite, mapping, read_json, sequence
-from alula_flight.report.recording import Fault, Recording, SimulatorAccount
+from alula_flight.report.recording import FaultChange, Recording, SimulatorAccount
 
 
 class MockSummary(TypedDict):
@@ -29,7 +29,7 @@ def read_mock(folder: Path, problems: Problems) -> tuple[Recording, MockSummary]
         min_clearance_m=None,
         distance_m=None,
         faults=tuple(
-            Fault(str(fault.get("sensor", "")), str(fault.get("mode", "")), t_s)
+            FaultChange(str(fault.get("sensor", "")), str(fault.get("mode", "")), t_s)
             for fault in faults
             if (t_s := finite(fault.get("t_s"))) is not None
         ),

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from alula_flight.report.recording import Recording, Track
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 from mission_console.entries import FAULT, HEALTH, PATH, WORLD, Wire
 
 PATH_PERIOD_S = 0.2
 
 
-def page_entries(recording: Recording, world: World | None) -> Iterator[Wire]:
+def page_entries(recording: Recording, world: TrueSurfaces | None) -> Iterator[Wire]:
     """Yield entries for the page besides those of the run's folder."""
     if world is not None:
         yield WORLD, None, [[round(float(value), 2) for value in edge.reshape(-1)] for edge in world.outline()]

@@ -53,7 +53,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultChange:
     """A sensor's mode was changed at ``t_s``, absolute seconds of mission clock; mode ``ok`` mends it."""
 
     sensor: str
@@ -69,7 +69,7 @@ class SimulatorAccount:
     collisions: int | None
     min_clearance_m: float | None
     distance_m: float | None
-    faults: tuple[Fault, ...]
+    faults: tuple[FaultChange, ...]
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Recording:
     guidance: tuple[GuidanceAccount, ...] = ()
     map_points: int | None = None
     health: tuple[HealthChange, ...] = ()
-    processes: tuple[Fault, ...] = ()
+    processes: tuple[FaultChange, ...] = ()
     """What the supervisor did to processes."""
 
     @property
@@ -203,7 +203,7 @@ def _simulator_account(texts: list[str], problems: Problems) -> SimulatorAccount
     return None
 
 
-def read_process_faults(folder: Path) -> tuple[Fault, ...]:
+def read_process_faults(folder: Path) -> tuple[FaultChange, ...]:
     """Read what the supervisor did to processes, as far as it is whole; nothing where it did nothing."""
     path, lines = folder / PROCESS_FAULTS, []
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
@@ -212,9 +212,9 @@ def read_process_faults(folder: Path) -> tuple[Fault, ...]:
     return tuple(_faults(lines))
 
 
-def _faults(value: object) -> Iterator[Fault]:
+def _faults(value: object) -> Iterator[FaultChange]:
     for entry in sequence(value):
         values = mapping(entry)
         t_s = finite(values.get("t_s"))
         if t_s is not None:
-            yield Fault(str(values.get("sensor", "")), str(values.get("mode", "")), t_s)
+            yield FaultChange(str(values.get("sensor", "")), str(values.get("mode", "")), t_s)

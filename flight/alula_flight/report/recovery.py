@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alula_common.scenarios import Scenario
-from alula_flight.report.events import Execution, History
+from alula_flight.report.events import History, PastExecution
 from alula_flight.report.phases import Phases
-from alula_flight.report.recording import Fault, Recording, Track
+from alula_flight.report.recording import FaultChange, Recording, Track
 
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 LOST = "LOST"  # how the skills end whose function is not heard of any more
@@ -30,7 +30,7 @@ class Recovery:
     moving_again_s: float | None
 
 
-def injected(recording: Recording) -> tuple[Fault, ...]:
+def injected(recording: Recording) -> tuple[FaultChange, ...]:
     """Return what the simulator and the supervisor broke, in the order of time."""
     faults = recording.simulator.faults if recording.simulator is not None else ()
     return tuple(sorted((fault for fault in (*faults, *recording.processes) if fault.mode != MENDED), key=lambda fault: fault.t_s))
@@ -66,7 +66,7 @@ def _first(stamps: list[float], since_s: float) -> float | None:
     return min((stamp for stamp in stamps if stamp >= since_s), default=None)
 
 
-def _fallback(skill: str, executions: tuple[Execution, ...], since_s: float) -> float | None:
+def _fallback(skill: str, executions: tuple[PastExecution, ...], since_s: float) -> float | None:
     """Return when the fallback skill came to run; one that was running before the failure needs no mention."""
     return _first([e.running_s for e in executions if e.skill == skill and e.running_s is not None], since_s)
 

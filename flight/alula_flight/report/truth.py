@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from alula_flight.report.phases import Phases
 from alula_flight.report.recording import Recording, SimulatorAccount, Track
-from alula_flight.report.world import World
+from alula_flight.report.world import TrueSurfaces
 
 VEHICLE_RADIUS_M = 0.85  # with propellers
 LOW_M = 1.5  # height of the vehicle's centre above the place of take-off
@@ -36,7 +36,7 @@ class Encounter:
     distance_m: float | None = None
 
 
-def encounter(track: Track | None, world: World | None, phases: Phases) -> Encounter:
+def encounter(track: Track | None, world: TrueSurfaces | None, phases: Phases) -> Encounter:
     """Compute it from the true track (None: unknown)."""
     if track is None:
         return Encounter()
@@ -51,7 +51,7 @@ def encounter(track: Track | None, world: World | None, phases: Phases) -> Encou
     return Encounter(entries_below_zero(clearance, counts), float(clearance[counts].min()), distance_m)
 
 
-def clearances(track: Track, world: World, phases: Phases) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def clearances(track: Track, world: TrueSurfaces, phases: Phases) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return the clearance in metres at each sample of the track, (N,), and which of the samples count, (N,)."""
     nearest = world.nearest(track.position_enu_m) - track.position_enu_m
     distance = np.linalg.norm(nearest, axis=1)
@@ -69,7 +69,7 @@ def entries_below_zero(clearance: NDArray[np.float64], counts: NDArray[np.bool_]
     return int((touching[1:] & ~touching[:-1]).sum())
 
 
-def _ground_height(track: Track, world: World, phases: Phases) -> float:
+def _ground_height(track: Track, world: TrueSurfaces, phases: Phases) -> float:
     """Return z of the surface on which the vehicle stood before lift-off (or over which the path begins)."""
     before = track.t_s <= phases.zero_s
     place = track.position_enu_m[before][-1] if before.any() else track.position_enu_m[0]
@@ -91,7 +91,7 @@ def _landing_begins(track: Track, height: NDArray[np.float64], phases: Phases) -
     return np.inf if phases.touch_down_s is None or not len(high) else float(high[-1])
 
 
-def rests(track: Track | None, world: World | None, phases: Phases) -> bool | None:
+def rests(track: Track | None, world: TrueSurfaces | None, phases: Phases) -> bool | None:
     """Tell whether the vehicle stands still on a surface at the end as it did before lift-off; None if that can't be known."""
     if track is None or world is None or track.t_s[0] > phases.zero_s:
         return None
@@ -103,7 +103,7 @@ def rests(track: Track | None, world: World | None, phases: Phases) -> bool | No
     return bool(still and heights[0] - heights[1] < REST_HEIGHT_M)
 
 
-def _height_above_surface(world: World, place: NDArray[np.float64]) -> float:
+def _height_above_surface(world: TrueSurfaces, place: NDArray[np.float64]) -> float:
     return float(world.first_hit_m(place, np.array([[0.0, 0.0, -1.0]]))[0])
 
 

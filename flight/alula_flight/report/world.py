@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 SHARP_EDGE_DEG = 25.0
 
 
-class World:
+class TrueSurfaces:
     """``vertices`` (V, 3) float64 and ``triangles`` (T, 3) int64."""
 
     def __init__(self, vertices: Floats, triangles: NDArray[np.int64]) -> None:
@@ -24,7 +24,7 @@ class World:
         self._scene.add_triangles(_tensor(vertices), o3d.core.Tensor(triangles.astype(np.uint32)))
 
     @classmethod
-    def load(cls, path: Path) -> World:
+    def load(cls, path: Path) -> TrueSurfaces:
         """Read a mesh; raise ReportError when it is missing, cut off or without triangles."""
         if not path.exists():
             raise ReportError(f"{path.name} is missing: distances to the true surfaces can't be computed")

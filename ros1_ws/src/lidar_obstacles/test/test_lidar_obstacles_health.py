@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lidar_obstacles import CloudJudge, LidarSettings
-from perception_core import NS, Fault, Sweep, Verdict
+from perception_core import NS, FaultKind, Sweep, Verdict
 
 ROOT = Path(__file__).resolve().parents[4]
 DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
@@ -46,15 +46,15 @@ def frozen(points, _before) -> np.ndarray:
 
 
 BREAKS = {
-    "dead beams": (lambda points, _: points[:0], Fault.RETURNS, "0 returns"),
-    "nothing but itself": (lambda points, _: points / 100, Fault.RETURNS, "0 returns"),
-    "not finite": (lambda points, _: points * np.nan, Fault.RETURNS, "0 returns"),
-    "one point in 500": (lambda points, _: points[::500], Fault.RETURNS, "only 60 returns"),
-    "one point in 50": (lambda points, _: points[::50], Fault.RETURNS, "returns fell from 30000 to 600"),
-    "front half blind": (lambda points, _: blind(points, -90, 90), Fault.SECTOR, "no returns any more from -90 to 90 degrees"),
-    "60 degrees blind": (lambda points, _: blind(points, 120, 181), Fault.SECTOR, "no returns any more from 120 to 180 degrees"),
-    "millimetres": (lambda points, _: points * 1000, Fault.RANGE, "are the coordinates in millimetres?"),
-    "frozen but for a value": (frozen, Fault.FROZEN, "the sweep is the same as the one before"),
+    "dead beams": (lambda points, _: points[:0], FaultKind.RETURNS, "0 returns"),
+    "nothing but itself": (lambda points, _: points / 100, FaultKind.RETURNS, "0 returns"),
+    "not finite": (lambda points, _: points * np.nan, FaultKind.RETURNS, "0 returns"),
+    "one point in 500": (lambda points, _: points[::500], FaultKind.RETURNS, "only 60 returns"),
+    "one point in 50": (lambda points, _: points[::50], FaultKind.RETURNS, "returns fell from 30000 to 600"),
+    "front half blind": (lambda points, _: blind(points, -90, 90), FaultKind.SECTOR, "no returns any more from -90 to 90 degrees"),
+    "60 degrees blind": (lambda points, _: blind(points, 120, 181), FaultKind.SECTOR, "no returns any more from 120 to 180 degrees"),
+    "millimetres": (lambda points, _: points * 1000, FaultKind.RANGE, "are the coordinates in millimetres?"),
+    "frozen but for a value": (frozen, FaultKind.FROZEN, "the sweep is the same as the one before"),
 }
 
 
@@ -104,13 +104,13 @@ def test_a_landing_hides_the_ground_and_is_no_fault() -> None:
 def test_what_is_lost_during_a_landing_is_broken_all_the_same() -> None:
     sweeps = landing(SINKING_M, walls_m=8.0)
     lost = judge_all([*sweeps[:55], *(points[points[:, 0] < 0.0] for points in sweeps[55:])])
-    assert {(finding.verdict, finding.fault) for finding in lost[55:]} == {(Verdict.BROKEN, Fault.SECTOR)}
+    assert {(finding.verdict, finding.fault) for finding in lost[55:]} == {(Verdict.BROKEN, FaultKind.SECTOR)}
 
 
 def test_a_sensor_that_saw_near_things_only_can_not_be_judged_when_they_are_gone() -> None:
     near = landing(np.full(5, 1.2))
     findings = judge_all([*(points[np.linalg.norm(points, axis=1) < 1.4] for points in near), near[0][:0]])
-    assert (findings[-1].verdict, findings[-1].fault) == (Verdict.UNKNOWN, Fault.RETURNS)
+    assert (findings[-1].verdict, findings[-1].fault) == (Verdict.UNKNOWN, FaultKind.RETURNS)
     assert findings[-1].reason == "0 returns: what was around came nearer than 1.5 m"
 
 

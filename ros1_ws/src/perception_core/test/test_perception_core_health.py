@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception_core import FINE, NS, Fault, HealthLimits, HealthWatch, StampJudge, StampLimits, Verdict, broken, unsure
+from perception_core import FINE, NS, FaultKind, HealthLimits, HealthWatch, StampJudge, StampLimits, Verdict, broken, unsure
 
 TICK = NS // 50
 
@@ -26,7 +26,7 @@ class Run:
                 said = self.source((self.now - self.start) / NS)
                 if said is not None:
                     judge = unsure if said is not True and said.endswith("?") else broken
-                    self.watch.take(FINE if said is True else judge(Fault.VIEW, said), self.now)
+                    self.watch.take(FINE if said is True else judge(FaultKind.VIEW, said), self.now)
             before = self.watch.verdict
             if self.watch.tick(self.now) is not before:
                 self.changes.append(((self.now - self.start) / NS, self.watch.verdict))
@@ -47,7 +47,7 @@ def test_without_a_driver_it_is_named_for_as_long_as_it_takes_and_five_seconds_b
     watch = HealthWatch(HealthLimits())
     for k in range(1000):
         assert watch.tick(k * TICK, missing="no images on /left") is Verdict.UNKNOWN
-    assert (watch.fault, watch.reason) == (Fault.SILENT, "no images on /left")
+    assert (watch.fault, watch.reason) == (FaultKind.SILENT, "no images on /left")
     verdicts = [watch.tick(k * TICK) for k in range(1000, 1300)]
     assert verdicts.index(Verdict.BROKEN) == pytest.approx(250, abs=2)
     assert watch.reason == "nothing received yet"
@@ -110,14 +110,14 @@ def test_reasons_rate_and_age() -> None:
     assert run.watch.reason == ""
     assert run.watch.rate_hz(run.now) == pytest.approx(10.0, abs=0.1)
     run.go(1.0)
-    assert (run.watch.reason, run.watch.fault) == ("cloud is empty: 0 returns", Fault.VIEW)
+    assert (run.watch.reason, run.watch.fault) == ("cloud is empty: 0 returns", FaultKind.VIEW)
     assert run.watch.age_s(run.now) == pytest.approx(1.0, abs=0.05)
 
 
 def test_what_can_not_be_judged_is_unknown_and_silence_after_it_is_broken() -> None:
     run = Run(lambda t: True if t < 1 else "no texture?" if t < 3 else None).go(5)
     assert [verdict for _, verdict in run.changes] == [Verdict.OK, Verdict.UNKNOWN, Verdict.BROKEN]
-    assert (run.watch.fault, run.watch.reason) == (Fault.SILENT, "no measurement for 0.35 s")
+    assert (run.watch.fault, run.watch.reason) == (FaultKind.SILENT, "no measurement for 0.35 s")
     again = Run(lambda t: True if t < 1 or t > 4 else "no texture?").go(6)
     assert [verdict for _, verdict in again.changes] == [Verdict.OK, Verdict.UNKNOWN, Verdict.OK]
     assert 5.0 <= again.changes[2][0] <= 5.2
@@ -143,7 +143,7 @@ def test_from_the_start_not_to_be_judged_stays_unknown() -> None:
 def test_stamps_against_their_arrival(delay_s, limits, sentence) -> None:
     now = 2_000_000_000 * NS
     finding = StampJudge(limits).finding(now - round(delay_s * NS), now)
-    assert (finding.reason, finding.fault) == (sentence, Fault.STAMP if sentence else Fault.NONE)
+    assert (finding.reason, finding.fault) == (sentence, FaultKind.STAMP if sentence else FaultKind.NONE)
 
 
 def test_a_stamp_that_does_not_advance() -> None:

@@ -17,7 +17,7 @@ from uav_simulator.vehicle.quaternion import from_yaw
 from uav_simulator.vehicle.rigid_body import RigidBody
 from uav_simulator.world.config import find_world, load_world
 from uav_simulator.world.parts import build_parts
-from uav_simulator.world.scene import World
+from uav_simulator.world.scene import Scene
 
 TICK_S = 0.02
 
@@ -70,7 +70,7 @@ def test_without_imperfections_the_estimate_is_the_one_of_before():
 
 @pytest.fixture(scope="module")
 def world():
-    return World(build_parts(load_world(find_world("yard")), 0))
+    return Scene(build_parts(load_world(find_world("yard")), 0))
 
 
 def test_images_and_ranges_are_noisier_and_the_light_wanders(world):

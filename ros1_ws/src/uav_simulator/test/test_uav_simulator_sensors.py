@@ -19,7 +19,7 @@ from uav_simulator.sensors.stereo import StereoPair
 from uav_simulator.vehicle.quaternion import from_yaw, multiply
 from uav_simulator.world.config import find_world, load_world
 from uav_simulator.world.parts import build_parts
-from uav_simulator.world.scene import World
+from uav_simulator.world.scene import Scene
 
 CONFIG = load_world(find_world("yard"))
 TILTED = multiply(from_yaw(0.3), (0.998, 0.04, -0.05, 0.0))
@@ -27,7 +27,7 @@ TILTED = multiply(from_yaw(0.3), (0.998, 0.04, -0.05, 0.0))
 
 @pytest.fixture(scope="module")
 def world():
-    return World(build_parts(CONFIG, 0))
+    return Scene(build_parts(CONFIG, 0))
 
 
 def pose(x, y, z, attitude, stamp_s=0.0):

@@ -19,7 +19,7 @@ from uav_simulator.world.config import find_world, load_world, world_names
 from uav_simulator.world.parts import build_parts, distances_to_mesh
 from uav_simulator.world.ply import write_mesh
 from uav_simulator.world.radio import RadioQuality, radio_zone_at
-from uav_simulator.world.scene import World
+from uav_simulator.world.scene import Scene
 
 YARD = find_world("yard")
 CONFIG = load_world(YARD)
@@ -36,7 +36,7 @@ def along_route(config, step_m=0.2):
 @pytest.mark.parametrize(("config", "seed"), SEEDS, ids=SEED_NAMES)
 def test_the_route_has_room_on_all_sides_and_ahead_of_each_leg(config, seed):
     """Whoever watches ahead must not stop before a corner: 4.5 m beyond each level leg a corridor of 2.6 x 2 m is free."""
-    world = World(build_parts(config, seed))
+    world = Scene(build_parts(config, seed))
     distance, _ = distances_to_mesh(shapes.Mesh(world.vertices, world.triangles), along_route(config))
     assert distance.min() >= config.keep_clear_m - 0.1
     for a, b in pairwise(config.route):
@@ -62,7 +62,7 @@ def test_the_route_is_within_the_fence_and_turns_by_right_angles(config):
 
 
 def test_a_lateral_scan_sees_something_on_both_sides():
-    world = World(build_parts(CONFIG, 0))
+    world = Scene(build_parts(CONFIG, 0))
     for a, b in pairwise(CONFIG.route):
         direction = (np.array(b) - np.array(a)) / math.dist(a, b)
         left = np.array([-direction[1], direction[0], 0.0])
@@ -73,7 +73,7 @@ def test_a_lateral_scan_sees_something_on_both_sides():
 
 
 def test_the_seed_changes_details_and_nothing_else():
-    first, again, other = (World(build_parts(CONFIG, seed)) for seed in (4, 4, 5))
+    first, again, other = (Scene(build_parts(CONFIG, seed)) for seed in (4, 4, 5))
     assert np.array_equal(first.vertices, again.vertices)
     assert first.vertices.shape != other.vertices.shape or not np.allclose(first.vertices, other.vertices)
     assert np.allclose(build_parts(CONFIG, 4)[1].mesh.vertices, build_parts(CONFIG, 5)[1].mesh.vertices)
@@ -102,7 +102,7 @@ def test_normals_point_outward(shape):
 
 
 def test_the_written_surfaces_are_read_by_others(tmp_path):
-    world = World(build_parts(CONFIG, 0))
+    world = Scene(build_parts(CONFIG, 0))
     path = tmp_path / "run" / "world.ply"
     write_mesh(path, world.vertices, world.triangles)
     mesh = o3d.io.read_triangle_mesh(str(path))
@@ -155,7 +155,7 @@ def test_a_wrong_file_is_refused_with_its_line(more, said, tmp_path):
 def test_a_world_of_nothing_but_ground_can_be_flown_in(tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text(SMALL)
-    world = World(build_parts(load_world(path), 0))
+    world = Scene(build_parts(load_world(path), 0))
     assert world.nearest_obstacle((0.0, 0.0, 3.0)).distance_m == math.inf
     assert world.nearest((0.0, 0.0, 3.0)).distance_m == pytest.approx(3.0)
     path.write_text("")
@@ -195,7 +195,7 @@ def body_at(x, y, z):
 
 
 def test_contacts_are_counted_once_each_and_clearance_from_the_radius():
-    monitor = ContactMonitor(World(build_parts(CONFIG, 0)), 0.85)
+    monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.85)
     monitor.step(body_at(4.0, -1.0, 1.0), LandedState.TAKING_OFF)
     assert monitor.min_clearance_m == math.inf, "the ground's nearness counts only after the take-off"
     monitor.step(body_at(4.9, -2.3, 3.0), LandedState.IN_AIR)
@@ -211,7 +211,7 @@ def test_contacts_are_counted_once_each_and_clearance_from_the_radius():
 
 
 def test_landing_is_no_contact_and_flying_into_the_ground_is():
-    monitor = ContactMonitor(World(build_parts(CONFIG, 0)), 0.85)
+    monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.85)
     monitor.step(body_at(0.0, 0.0, 3.0), LandedState.IN_AIR)
     monitor.step(body_at(0.0, 0.0, 0.3), LandedState.LANDING)
     assert monitor.collisions == 0

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from perception_core import NS, Fault, Verdict
+from perception_core import NS, FaultKind, Verdict
 from perception_core.testing import wall_pair
 from zed_depth import StereoPair, StereoRig, ZedSettings
 
@@ -50,26 +50,31 @@ def flickering(image, seed) -> np.ndarray:
 BROKEN, UNKNOWN = Verdict.BROKEN, Verdict.UNKNOWN
 # name: (what becomes of the pair, with a seed for each; verdict; fault; words of the sentence)
 BREAKS = {
-    "shifted 3 px": (lambda a, b, s: (noisy(a, s), noisy(shifted(b, 3), s + 1)), BROKEN, Fault.CALIBRATION, "px off the left one's rows"),
+    "shifted 3 px": (
+        lambda a, b, s: (noisy(a, s), noisy(shifted(b, 3), s + 1)),
+        BROKEN,
+        FaultKind.CALIBRATION,
+        "px off the left one's rows",
+    ),
     "turned 1 degree": (
         lambda a, b, s: (noisy(a, s), noisy(turned(b, 1.0), s + 1)),
         BROKEN,
-        Fault.CALIBRATION,
+        FaultKind.CALIBRATION,
         "turned against each other",
     ),
-    "zoomed 3 %": (lambda a, b, s: (noisy(a, s), noisy(zoomed(b), s + 1)), BROKEN, Fault.CALIBRATION, "differ in scale by"),
-    "swapped": (lambda a, b, s: (noisy(b, s), noisy(a, s + 1)), BROKEN, Fault.CALIBRATION, "left and right are swapped"),
-    "doubled": (lambda a, b, s: (noisy(a, s), noisy(a, s)), BROKEN, Fault.VIEW, "both cameras deliver the same image"),
-    "doubled, with noise": (lambda a, b, s: (noisy(a, s), noisy(a, s + 1)), UNKNOWN, Fault.VIEW, "no parallax"),
-    "unrelated": (lambda a, b, s: (noisy(a, s), noisy(b[:, ::-1], s + 1)), BROKEN, Fault.VIEW, "do not see the same scene"),
-    "one blurred": (lambda a, b, s: (noisy(a, s), noisy(blurred(b), s + 1)), BROKEN, Fault.BLUR, "right image is blurred"),
-    "both blurred": (lambda a, b, s: (noisy(blurred(a), s), noisy(blurred(b), s + 1)), BROKEN, Fault.BLUR, "left image is blurred"),
-    "dark, with noise": (lambda a, b, s: (noisy(a * 0.02, s, 5), noisy(b * 0.02, s + 1, 5)), BROKEN, Fault.EXPOSURE, "is dark"),
-    "black": (lambda a, b, s: (a * 0, b * 0), BROKEN, Fault.EXPOSURE, "left image is dark"),
-    "blank": (lambda a, b, s: (noisy(a, s), noisy(b * 0 + 128, s + 1)), BROKEN, Fault.EXPOSURE, "right image is blank"),
-    "overexposed": (lambda a, b, s: (noisy(a * 8.0, s), noisy(b * 8.0, s + 1)), BROKEN, Fault.EXPOSURE, "overexposed"),
-    "frozen": (lambda a, b, s: (a, b), BROKEN, Fault.FROZEN, "left image is frozen"),
-    "frozen but for a pixel": (lambda a, b, s: (noisy(a, s), flickering(b, s)), BROKEN, Fault.FROZEN, "right image is frozen"),
+    "zoomed 3 %": (lambda a, b, s: (noisy(a, s), noisy(zoomed(b), s + 1)), BROKEN, FaultKind.CALIBRATION, "differ in scale by"),
+    "swapped": (lambda a, b, s: (noisy(b, s), noisy(a, s + 1)), BROKEN, FaultKind.CALIBRATION, "left and right are swapped"),
+    "doubled": (lambda a, b, s: (noisy(a, s), noisy(a, s)), BROKEN, FaultKind.VIEW, "both cameras deliver the same image"),
+    "doubled, with noise": (lambda a, b, s: (noisy(a, s), noisy(a, s + 1)), UNKNOWN, FaultKind.VIEW, "no parallax"),
+    "unrelated": (lambda a, b, s: (noisy(a, s), noisy(b[:, ::-1], s + 1)), BROKEN, FaultKind.VIEW, "do not see the same scene"),
+    "one blurred": (lambda a, b, s: (noisy(a, s), noisy(blurred(b), s + 1)), BROKEN, FaultKind.BLUR, "right image is blurred"),
+    "both blurred": (lambda a, b, s: (noisy(blurred(a), s), noisy(blurred(b), s + 1)), BROKEN, FaultKind.BLUR, "left image is blurred"),
+    "dark, with noise": (lambda a, b, s: (noisy(a * 0.02, s, 5), noisy(b * 0.02, s + 1, 5)), BROKEN, FaultKind.EXPOSURE, "is dark"),
+    "black": (lambda a, b, s: (a * 0, b * 0), BROKEN, FaultKind.EXPOSURE, "left image is dark"),
+    "blank": (lambda a, b, s: (noisy(a, s), noisy(b * 0 + 128, s + 1)), BROKEN, FaultKind.EXPOSURE, "right image is blank"),
+    "overexposed": (lambda a, b, s: (noisy(a * 8.0, s), noisy(b * 8.0, s + 1)), BROKEN, FaultKind.EXPOSURE, "overexposed"),
+    "frozen": (lambda a, b, s: (a, b), BROKEN, FaultKind.FROZEN, "left image is frozen"),
+    "frozen but for a pixel": (lambda a, b, s: (noisy(a, s), flickering(b, s)), BROKEN, FaultKind.FROZEN, "right image is frozen"),
 }
 
 
@@ -124,11 +129,11 @@ def test_without_camera_info_nothing_is_known_and_wrong_info_is_told() -> None:
     left, right = wall_pair(9.5, seed=1)
     rig = StereoRig(ZedSettings())
     unknown = rig.finding(StereoPair(0, left, right))
-    assert (unknown.verdict, unknown.fault, unknown.reason) == (UNKNOWN, Fault.INFO, "no camera_info of both sides yet")
+    assert (unknown.verdict, unknown.fault, unknown.reason) == (UNKNOWN, FaultKind.INFO, "no camera_info of both sides yet")
     for side in ("left", "right"):
         rig.take_info(side, info(right=side == "right", width=960, height=540, fx=480, cx=480, cy=270))
     finding = rig.finding(StereoPair(NS, noisy(left, 1), noisy(right, 2)))
-    assert (finding.verdict, finding.fault) == (BROKEN, Fault.INFO)
+    assert (finding.verdict, finding.fault) == (BROKEN, FaultKind.INFO)
     assert finding.reason == "camera_info is for 960x540 images, the left image is 480x270"
     for side in ("left", "right"):
         rig.take_info(side, info(right=side == "right", P=[0.0] * 12))

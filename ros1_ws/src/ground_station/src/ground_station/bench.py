@@ -41,9 +41,9 @@ def simulated_camera(world: str) -> Camera:
     from uav_simulator.sensors.pose_track import Pose
     from uav_simulator.world.config import find_world, load_world
     from uav_simulator.world.parts import build_parts
-    from uav_simulator.world.scene import World
+    from uav_simulator.world.scene import Scene
 
-    camera = ColourCamera(World(build_parts(load_world(find_world(world)), 0)), 0)
+    camera = ColourCamera(Scene(build_parts(load_world(find_world(world)), 0)), 0)
     turned = (float(np.cos(np.pi / 4)), 0.0, 0.0, float(np.sin(np.pi / 4)))  # nose to the north: quaternion, w first
     pictures: dict[int, Rgb] = {}
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from perception_core import FINE, Fault, Finding, Sweep, broken, unsure
+from perception_core import FINE, FaultKind, Finding, Sweep, broken, unsure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,9 +65,9 @@ class CloudJudge:
             return self._too_few(count, before, self_m)
         far = self._far(ranges[outside])
         if far:
-            return broken(Fault.RANGE, far)
+            return broken(FaultKind.RANGE, far)
         if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
-            return broken(Fault.FROZEN, "the sweep is the same as the one before")
+            return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
         return self._against_the_past(sectors, before, stride)
 
     def _expected(self) -> Floats:
@@ -80,8 +80,8 @@ class CloudJudge:
     def _too_few(self, count: int, before: Floats, self_m: float) -> Finding:
         told = f"{'only ' if count else ''}{count} returns"
         if self._recent and before.sum() < self._limits.min_returns:
-            return unsure(Fault.RETURNS, f"{told}: what was around came nearer than {NEAR * self_m:g} m")
-        return broken(Fault.RETURNS, told)
+            return unsure(FaultKind.RETURNS, f"{told}: what was around came nearer than {NEAR * self_m:g} m")
+        return broken(FaultKind.RETURNS, told)
 
     def _far(self, ranges: NDArray[np.float32]) -> str:
         share = float(np.mean(ranges > self._limits.max_range_m))
@@ -94,11 +94,11 @@ class CloudJudge:
     def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int) -> Finding:
         counts = sectors.counts
         if counts.sum() < self._limits.thin_share * before.sum():
-            return broken(Fault.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
+            return broken(FaultKind.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
         gone = (before >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * before)
         self._lost = (self._lost & gone) | (gone & (np.roll(gone, 1) | np.roll(gone, -1)))
         if self._lost.any():
-            return broken(Fault.SECTOR, f"no returns any more from {_angles(self._lost)} around the sensor's z axis")
+            return broken(FaultKind.SECTOR, f"no returns any more from {_angles(self._lost)} around the sensor's z axis")
         self._recent.append(sectors)
         return FINE
 

@@ -1,7 +1,7 @@
 """What the perception nodes share: poses at a time, straightened sweeps, the corridor ahead, health watches. ROS only in ``ros``."""
 
 from perception_core.corridor import Corridor, Motion, Nearest, Support, corridor_coordinates, direction_of_motion, nearest_obstacle
-from perception_core.health import FINE, Fault, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
+from perception_core.health import FINE, FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
 from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
 from perception_core.stamps import StampJudge, StampLimits
 from perception_core.sweep import Sweep, deskew, straighten
@@ -11,7 +11,7 @@ __all__ = [
     "FINE",
     "NS",
     "Corridor",
-    "Fault",
+    "FaultKind",
     "Finding",
     "HealthLimits",
     "HealthWatch",

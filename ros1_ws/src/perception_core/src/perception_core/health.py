@@ -20,7 +20,7 @@ class Verdict(Enum):
     BROKEN = "BROKEN"
 
 
-class Fault(Enum):
+class FaultKind(Enum):
     """What kind of trouble a sensor has; the values are those of ``SensorHealth.fault``."""
 
     NONE = ""
@@ -43,7 +43,7 @@ class Finding:
     """What one measurement tells of its sensor: OK, BROKEN or can't be judged (UNKNOWN), with a sentence where it is not OK."""
 
     verdict: Verdict = Verdict.OK
-    fault: Fault = Fault.NONE
+    fault: FaultKind = FaultKind.NONE
     reason: str = ""
 
     @property
@@ -55,12 +55,12 @@ class Finding:
 FINE = Finding()
 
 
-def broken(fault: Fault, reason: str) -> Finding:
+def broken(fault: FaultKind, reason: str) -> Finding:
     """Return the finding of a broken sensor."""
     return Finding(Verdict.BROKEN, fault, reason)
 
 
-def unsure(fault: Fault, reason: str) -> Finding:
+def unsure(fault: FaultKind, reason: str) -> Finding:
     """Return the finding of a sensor that can't be judged by this measurement."""
     return Finding(Verdict.UNKNOWN, fault, reason)
 
@@ -97,7 +97,7 @@ class HealthWatch:
 
     def _restart(self) -> None:
         self.verdict = Verdict.UNKNOWN
-        self.fault = Fault.SILENT
+        self.fault = FaultKind.SILENT
         self.reason = "nothing received yet"
         self._missing = ""
         self._judged = False  # whether there was another verdict than UNKNOWN
@@ -180,14 +180,14 @@ class HealthWatch:
         since = self._good_since_ns
         return since is not None and self._last_good_ns - since >= self.limits.recover_s * NS
 
-    def _explain(self, now_ns: int) -> tuple[Fault, str]:
+    def _explain(self, now_ns: int) -> tuple[FaultKind, str]:
         if self.verdict is Verdict.OK:
-            return Fault.NONE, ""
+            return FaultKind.NONE, ""
         trouble = self._fresh_trouble(now_ns)
         if trouble is not None:
             return trouble.fault, trouble.reason
         if self._last_good_ns is None:
-            return Fault.SILENT, self._missing or "nothing received yet"
+            return FaultKind.SILENT, self._missing or "nothing received yet"
         if self._overdue(now_ns):
-            return Fault.SILENT, f"no measurement for {self.limits.timeout_s:g} s"
+            return FaultKind.SILENT, f"no measurement for {self.limits.timeout_s:g} s"
         return self.fault, "recovering"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from perception_core.health import FINE, Fault, Finding, broken
+from perception_core.health import FINE, FaultKind, Finding, broken
 from perception_core.poses import NS
 
 
@@ -39,10 +39,10 @@ class StampJudge:
         share = MEND_SHARE if self._late else 1.0
         self._late = delay_s > share * self.limits.max_delay_s
         if delay_s < -self.limits.future_s - self.limits.latency_s:
-            return broken(Fault.STAMP, f"the stamp is {-delay_s - self.limits.latency_s:.2f} s in the future")
+            return broken(FaultKind.STAMP, f"the stamp is {-delay_s - self.limits.latency_s:.2f} s in the future")
         if self._late:
             told = f", {self.limits.latency_s:g} s of which are its known latency" if self.limits.latency_s else ""
-            return broken(Fault.STAMP, f"the measurement is {delay_s + self.limits.latency_s:.2f} s old when it arrives{told}")
+            return broken(FaultKind.STAMP, f"the measurement is {delay_s + self.limits.latency_s:.2f} s old when it arrives{told}")
         if stamp_ns == previous_ns:
-            return broken(Fault.STAMP, "the stamp does not advance")
+            return broken(FaultKind.STAMP, "the stamp does not advance")
         return FINE

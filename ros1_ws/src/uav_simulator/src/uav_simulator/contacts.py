@@ -6,7 +6,7 @@ import math
 
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.vehicle.rigid_body import RigidBody
-from uav_simulator.world.scene import Nearest, World
+from uav_simulator.world.scene import Nearest, Scene
 
 CRUISE_HEIGHT_M = 2.0  # clearance counts once the take-off has ended or this height is reached
 RELEASE_M = 0.05  # a contact ends at this distance, so that scraping along a wall is one contact
@@ -19,7 +19,7 @@ class ContactMonitor:
     the end of the take-off and the beginning of the landing. Clearance counts in that same stretch of the flight, the ground included.
     """
 
-    def __init__(self, world: World, radius_m: float) -> None:
+    def __init__(self, world: Scene, radius_m: float) -> None:
         self._world, self._radius_m = world, radius_m
         self.collisions = 0
         self.min_clearance_m = math.inf

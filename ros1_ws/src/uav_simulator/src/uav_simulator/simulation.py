@@ -23,7 +23,7 @@ from uav_simulator.sensors.pose_track import Pose, PoseTrack
 from uav_simulator.sensors.stereo import StereoPair
 from uav_simulator.world.config import WorldConfig
 from uav_simulator.world.parts import build_parts
-from uav_simulator.world.scene import World
+from uav_simulator.world.scene import Scene
 
 TICK_NS = 20_000_000
 TICK_S = TICK_NS * 1e-9
@@ -57,7 +57,7 @@ class Simulation:
         self.seed = seed
         self.now_ns = 0
         self.flown = flown
-        self.world = World(build_parts(config, seed))
+        self.world = Scene(build_parts(config, seed))
         self.imperfections = imperfections
         self.stereo = StereoPair(self.world, seed, noise=imperfections.pixel_noise, exposure=imperfections.exposure)
         self.lidar = Lidar(self.world, seed, noise_m=imperfections.range_noise_m)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from perception_core import FINE, Fault, Finding, broken
+from perception_core import FINE, FaultKind, Finding, broken
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,9 +58,9 @@ class ImageJudge:
         saturated = float(np.mean(sample >= SATURATED))
         told = f"mean {mean:.0f}, contrast {contrast:.1f} of 255"
         if saturated > limits.max_saturated:
-            return broken(Fault.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
+            return broken(FaultKind.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
         if contrast < limits.min_contrast or (mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast):
-            return broken(Fault.EXPOSURE, f"{side} image is {'dark' if mean < limits.dark_mean else 'blank'} ({told})")
+            return broken(FaultKind.EXPOSURE, f"{side} image is {'dark' if mean < limits.dark_mean else 'blank'} ({told})")
         if previous is not None and previous.shape == sample.shape and np.mean(previous != sample) < limits.min_changed:
-            return broken(Fault.FROZEN, f"{side} image is frozen")
+            return broken(FaultKind.FROZEN, f"{side} image is frozen")
         return FINE

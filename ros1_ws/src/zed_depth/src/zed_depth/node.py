@@ -12,7 +12,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 from uav_msgs.msg import Obstacle
 
-from perception_core import NS, Fault, Finding, broken, first_trouble
+from perception_core import NS, FaultKind, Finding, broken, first_trouble
 from perception_core.images import GrayConverter
 from perception_core.ros import (
     DoneReporter,
@@ -81,7 +81,7 @@ class ZedDepthNode:
         return f"{', '.join(absent)}: no driver publishes there" if absent else ""
 
     def _garbage_of(self, side: str) -> Callable[[str], None]:
-        return lambda reason: self._trouble(broken(Fault.FORMAT, f"{side}: {reason}"), rospy.Time.now().to_nsec())
+        return lambda reason: self._trouble(broken(FaultKind.FORMAT, f"{side}: {reason}"), rospy.Time.now().to_nsec())
 
     def _tune(self, settings: ZedSettings) -> None:
         self._health.tune(settings.health, settings.stamps)
@@ -101,7 +101,7 @@ class ZedDepthNode:
         try:
             image = self._gray[side].gray(message)
         except ValueError as error:
-            self._trouble(broken(Fault.FORMAT, f"{side} image: {error}"), stamp_ns)
+            self._trouble(broken(FaultKind.FORMAT, f"{side} image: {error}"), stamp_ns)
             self._done.done(stamp_ns)
             return
         with self._lock:
@@ -111,7 +111,7 @@ class ZedDepthNode:
             finding = self._judged(pair) if pair is not None else None
         if pair is None or finding is None:
             if apart_s > self._settings.sync_tolerance_s:
-                self._trouble(broken(Fault.STAMP, f"left and right images are {apart_s:.2f} s apart"), stamp_ns)
+                self._trouble(broken(FaultKind.STAMP, f"left and right images are {apart_s:.2f} s apart"), stamp_ns)
         elif not finding.ok:
             self._trouble(finding, pair.stamp_ns)
             self._done.done(pair.stamp_ns)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from perception_core import FINE, NS, Fault, Finding, broken, first_trouble, unsure
+from perception_core import FINE, NS, FaultKind, Finding, broken, first_trouble, unsure
 from zed_depth.calibration import CalibrationError, InfoLike, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
 from zed_depth.image_health import ImageJudge
@@ -45,7 +45,7 @@ class StereoRig:
         self._infos: dict[str, InfoLike] = {}
         self._lock = Lock()
         self._calibration: StereoCalibration | None = None
-        self._info_finding = unsure(Fault.INFO, "no camera_info of both sides yet")
+        self._info_finding = unsure(FaultKind.INFO, "no camera_info of both sides yet")
         self._matcher: tuple[StereoGeometry, StereoMatcher] | None = None
         self._view = FINE
         self._view_ns: int | None = None
@@ -69,7 +69,7 @@ class StereoRig:
                 max_width_px=self._settings.max_width_px,
             )
         except CalibrationError as error:
-            finding = broken(Fault.INFO, str(error))
+            finding = broken(FaultKind.INFO, str(error))
         with self._lock:
             self._calibration, self._info_finding, self._view_ns, self._valid = calibration, finding, None, FINE
 
@@ -86,7 +86,7 @@ class StereoRig:
             try:
                 prepared = calibration.prepared(pair.left, pair.right)
             except CalibrationError as error:
-                return broken(Fault.INFO, str(error))
+                return broken(FaultKind.INFO, str(error))
             self._view = view_finding(*prepared, offset_px=calibration.geometry.offset_px, limits=self._settings.view)
             self._view_ns = pair.stamp_ns
         return first_trouble(self._view, valid)
@@ -101,7 +101,7 @@ class StereoRig:
         images = calibration.prepared(pair.left, pair.right)
         disparity = matcher.disparity(*images)
         share = float(np.mean(np.isfinite(disparity)))
-        finding = FINE if share >= self._settings.min_valid else unsure(Fault.VIEW, f"only {share:.1%} of the image has a depth")
+        finding = FINE if share >= self._settings.min_valid else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
         with self._lock:
             self._valid = finding
         return Depth(depth_of(disparity, calibration.geometry), calibration.geometry, disparity, images)

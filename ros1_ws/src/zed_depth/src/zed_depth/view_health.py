@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from perception_core import FINE, Fault, Finding, broken, unsure
+from perception_core import FINE, FaultKind, Finding, broken, unsure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,20 +61,20 @@ def view_finding(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimit
     for side, image in (("left", left), ("right", right)):
         width_px = edge_width_px(image)
         if width_px > limits.max_edge_px:
-            return broken(Fault.BLUR, f"{side} image is blurred: its sharpest edges are {width_px:.1f} px wide")
+            return broken(FaultKind.BLUR, f"{side} image is blurred: its sharpest edges are {width_px:.1f} px wide")
     if np.array_equal(left, right):
-        return broken(Fault.VIEW, "both cameras deliver the same image")
+        return broken(FaultKind.VIEW, "both cameras deliver the same image")
     matches = match(left, right)
     fewest = min(matches.count_left, matches.count_right)
     if fewest < FEW_FEATURES:
-        return unsure(Fault.VIEW, f"too little texture to judge the cameras: {fewest} features")
+        return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {fewest} features")
     fit = fit_rows(matches, FIRST_GUESS_SHARE * left.shape[0])
     agreeing = int(np.count_nonzero(fit.agree))
     if agreeing < max(ENOUGH_MATCHES, limits.min_agreeing * len(matches.vertical_px)):
         told = f"{agreeing} of {len(matches.vertical_px)} features agree"
         if fewest < ENOUGH_FEATURES:
-            return unsure(Fault.VIEW, f"too little texture to judge the cameras: {told}")
-        return broken(Fault.VIEW, f"the cameras do not see the same scene: {told}")
+            return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {told}")
+        return broken(FaultKind.VIEW, f"the cameras do not see the same scene: {told}")
     return _rows_finding(fit, left.shape, limits) or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
 
 
@@ -157,15 +157,15 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
         f"the images differ in scale by at least {abs(fit.per_row):.1%}": abs(fit.per_row) * height / 4.0,
     }
     told = max(troubles, key=lambda trouble: troubles[trouble])
-    return broken(Fault.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
+    return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
 
 
 def _disparity_finding(disparity_px: Floats, limits: ViewLimits) -> Finding:
     negative = float(np.mean(disparity_px < -1.0))
     if negative > limits.max_negative:
-        return broken(Fault.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
+        return broken(FaultKind.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
     if float(np.percentile(np.abs(disparity_px), 95.0)) < limits.min_parallax_px:
-        return unsure(Fault.VIEW, "no parallax: everything is far away, or both cameras show the same")
+        return unsure(FaultKind.VIEW, "no parallax: everything is far away, or both cameras show the same")
     return FINE
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import rospy
 from uav_msgs.msg import SensorHealth
 
-from perception_core.health import Fault, Finding, HealthLimits, HealthWatch, Verdict, broken
+from perception_core.health import FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken
 from perception_core.poses import NS
 from perception_core.stamps import StampJudge, StampLimits
 from resource_reporter import ResourceReporter
@@ -57,7 +57,7 @@ class HealthReporter:
 
     def garbage(self, reason: str) -> None:
         """Tell of something that is no measurement at all."""
-        self.take(broken(Fault.FORMAT, reason))
+        self.take(broken(FaultKind.FORMAT, reason))
 
     @property
     def ok(self) -> bool:

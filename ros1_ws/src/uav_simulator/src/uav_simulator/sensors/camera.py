@@ -14,7 +14,7 @@ from uav_simulator.sensors.mounts import CAMERA, rotation_matrix
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.stereo import Pinhole
 from uav_simulator.sensors.texture import Floats32, Grain, layer, noise_tiles, surface_table
-from uav_simulator.world.scene import NO_HIT, World
+from uav_simulator.world.scene import NO_HIT, Scene
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -36,7 +36,7 @@ WINDOWED_M2 = 12.0  # walls of less have none
 class ColourCamera:
     """Renders what the camera sees from a pose."""
 
-    def __init__(self, world: World, seed: int, camera: Pinhole = INTRINSICS) -> None:
+    def __init__(self, world: Scene, seed: int, camera: Pinhole = INTRINSICS) -> None:
         self.camera = camera
         self._world = world
         self._table = surface_table(world, seed)
@@ -90,7 +90,7 @@ class ColourCamera:
         return np.where(sky, np.float32(0.0), u), np.where(sky, np.float32(0.0), v)
 
 
-def _colours(world: World, grey: Floats, seed: int) -> Floats32:
+def _colours(world: Scene, grey: Floats, seed: int) -> Floats32:
     """Return the mean colour of each triangle and, last, of the sky, (M + 1, 3): one tint for a plane and all that is parallel to it."""
     rng = np.random.default_rng([seed, 8])
     tints = TINTS_RGB[rng.permutation(len(TINTS_RGB))]
@@ -100,7 +100,7 @@ def _colours(world: World, grey: Floats, seed: int) -> Floats32:
     return np.concatenate([tinted, [SKY_RGB]]).astype(np.float32)
 
 
-def _windowed(world: World) -> NDArray[np.bool_]:
+def _windowed(world: Scene) -> NDArray[np.bool_]:
     """Tell of each triangle, and of the sky, whether it is part of a wall large enough for windows, (M + 1,)."""
     corners = world.vertices[world.triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)  # of both halves of a wall

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from uav_simulator.sensors.mounts import GEAR_M, LIDAR
 from uav_simulator.sensors.pose_track import PoseTrack
-from uav_simulator.world.scene import NO_HIT, World
+from uav_simulator.world.scene import NO_HIT, Scene
 
 Floats = NDArray[np.float64]
 POINT_DTYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("time", "<f4")])
@@ -32,7 +32,7 @@ class LidarSpec:
 class Lidar:
     """Scans a world along a track of poses."""
 
-    def __init__(self, world: World, seed: int, spec: LidarSpec | None = None, *, noise_m: float = 0.0) -> None:
+    def __init__(self, world: Scene, seed: int, spec: LidarSpec | None = None, *, noise_m: float = 0.0) -> None:
         """``noise_m``: standard deviation of the ranges on top of the specification's."""
         self.spec = spec or LidarSpec()
         self._noise_m = math.hypot(self.spec.noise_m, noise_m)

@@ -16,7 +16,7 @@ from uav_simulator.sensors.mounts import GEAR_M, STEREO_BASELINE_M, ZED_LEFT, ZE
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.texture import GRAINS, layer, noise_tiles, surface_table
 from uav_simulator.vehicle.noise import SlowNoise
-from uav_simulator.world.scene import NO_HIT, World
+from uav_simulator.world.scene import NO_HIT, Scene
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -51,7 +51,7 @@ class Pinhole:
 class StereoPair:
     """Renders what both eyes see from a pose."""
 
-    def __init__(self, world: World, seed: int, camera: Pinhole | None = None, *, noise: float = 0.0, exposure: float = 0.0) -> None:
+    def __init__(self, world: Scene, seed: int, camera: Pinhole | None = None, *, noise: float = 0.0, exposure: float = 0.0) -> None:
         """``noise``: standard deviation of grey values on top of 2; ``exposure``: part by which the brightness wanders."""
         self._exposure = SlowNoise(sigma=exposure / 2.0, tau_s=4.0, limit=exposure, seed=f"exposure {seed}")
         self.camera = camera or Pinhole()

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from uav_simulator.world.scene import World
+from uav_simulator.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -42,7 +42,7 @@ class SurfaceTable:
     grey: Floats
 
 
-def surface_table(world: World, seed: int) -> SurfaceTable:
+def surface_table(world: Scene, seed: int) -> SurfaceTable:
     """Return texture planes and shades of a world's triangles."""
     n = world.normals
     upright = np.abs(n[:, 2]) < 0.9

@@ -34,7 +34,7 @@ class Nearest:
     point: Vec3
 
 
-class World:
+class Scene:
     """Triangles of one world in map (ENU, metres); the ground's come first."""
 
     def __init__(self, parts: list[Part]) -> None:
