@@ -15,7 +15,7 @@ from mission_console.following import RunFollower
 
 REPORT = "report.html"
 PARTS = Path(__file__).parent / "page"
-PROGRAM = ("dom", "fold", "story", "tree", "timeline", "map", "figures", "operator", "main")
+PROGRAM = ("dom", "fold", "story", "tree", "timeline", "map", "figures", "operator", "hands", "main")
 """Files of the program, in the order in which they need each other."""
 
 

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import json
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
@@ -21,9 +21,9 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from alula_common.runs import NoRunError, load_run, runs_folder
+from alula_common.runs import NoRunError, runs_folder
 from alula_common.scenarios import scenario_names
-from mission_console import acts, journal
+from mission_console import acts, commands, journal
 from mission_console.admission import Admission
 from mission_console.feed import Feed, place_of
 from mission_console.page import REPORT, make_page
@@ -49,6 +49,8 @@ class Viewer:
     key: str
     name: str
     run: str = ""
+    hands: bool = False
+    """Whether skills by hand are looked at."""
     commands: list[float] = field(default_factory=list)
 
 
@@ -58,7 +60,7 @@ class Console:
     def __init__(self, admission: Admission, *, fixed: Path | None = None) -> None:
         self._admission = admission
         self._fixed = fixed
-        self._scenarios = scenario_names()
+        self._offers = {"scenarios": scenario_names(), "worlds": acts.world_names(), "vehicles": acts.VEHICLES}
         self._page = make_page(title="Alula", entries=None).encode()
         self._feeds: dict[Path, tuple[Feed, asyncio.Task[None]]] = {}
         self._viewers: set[Viewer] = set()
@@ -66,17 +68,14 @@ class Console:
         self._runs: list[Path] = []
         self._live: set[Path] = set()
         self._starting = asyncio.Lock()
-        self._acts: Mapping[str, Callable[[Mapping[str, Any], Path | None], tuple[Path | None, str]]] = {
-            "start": self._start,
-            "abort": self._abort,
-            "off": self._off,
-        }
+        self._commands = commands.Commands()
+        self._by_hand: dict[Path, str] = {}
 
     @contextlib.asynccontextmanager
     async def open(self) -> Any:
         """Serve as long as the context lasts."""
         server: Server
-        look = asyncio.create_task(self._look_for_runs())
+        looking = [asyncio.create_task(job) for job in (self._look_for_runs(), self._look_at_skills())]
         async with serve(
             self._serve_viewer,
             self._admission.host,
@@ -92,9 +91,9 @@ class Console:
             try:
                 yield server
             finally:
-                look.cancel()
-                for _, task in self._feeds.values():
+                for task in [*looking, *(task for _, task in self._feeds.values())]:
                     task.cancel()
+                await asyncio.to_thread(self._commands.hands_off, set())
 
     # --- pages ---------------------------------------------------------------------------------------------------------
 
@@ -138,9 +137,24 @@ class Console:
 
     async def _look_for_runs(self) -> None:
         while True:
-            self._runs = await asyncio.to_thread(runs_in, runs_folder(), self._fixed)
-            self._live = await asyncio.to_thread(lambda: {run for run in self._runs[:SHOWN_RUNS] if is_live(run)})
+            self._runs = await asyncio.to_thread(commands.runs_in, runs_folder(), self._fixed)
+            self._live = await asyncio.to_thread(lambda: {run for run in self._runs[:SHOWN_RUNS] if commands.is_live(run)})
             await asyncio.sleep(LOOK_S)
+
+    async def _look_at_skills(self) -> None:
+        """Keep an eye on the skillsets of the runs whose viewers look at them, and on no others: listening costs."""
+        while True:
+            watched = {run for viewer in self._viewers if viewer.hands and (run := self._run_of(viewer)) in self._live}
+            self._by_hand = {run: await asyncio.to_thread(self._seen_by_hand, run) for run in watched}
+            await asyncio.to_thread(self._commands.hands_off, watched)
+            await asyncio.sleep(STATUS_S)
+
+    def _seen_by_hand(self, run: Path) -> str:
+        try:
+            shown = self._commands.hands_on(run).describe()
+        except Exception as error:  # noqa: BLE001 - whatever a skillset says, the next look may be better
+            shown = {"problems": [f"{type(error).__name__}: {error}"], "skillsets": []}
+        return json.dumps({"hands": {"run": run.name, **shown}})
 
     def _run_of(self, viewer: Viewer) -> Path | None:
         """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
@@ -159,7 +173,7 @@ class Console:
         with contextlib.suppress(ConnectionClosed, TimeoutError, ValueError):
             hello = _object(await asyncio.wait_for(connection.recv(), HELLO_S))
             viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "somebody")[:40])
-            viewer.run = str(hello.get("run") or "")
+            viewer.run, viewer.hands = str(hello.get("run") or ""), hello.get("hands") is True
             self._viewers.add(viewer)
             self._commander = self._commander or viewer.key
             sending = asyncio.create_task(self._send(viewer, hello))
@@ -186,6 +200,8 @@ class Console:
                     if clock() >= due:
                         due = clock() + STATUS_S
                         await asyncio.wait_for(viewer.connection.send(json.dumps({"status": self._status(viewer, run, feed)})), STUCK_S)
+                        if viewer.hands and run in self._by_hand:
+                            await asyncio.wait_for(viewer.connection.send(self._by_hand[run]), STUCK_S)
                 except TimeoutError:
                     viewer.connection.transport.abort()
                     return
@@ -200,7 +216,7 @@ class Console:
             "live": run in self._live,
             "report": run is not None and (run / REPORT).is_file(),
             "runs": [folder.name for folder in self._runs[:SHOWN_RUNS]],
-            "scenarios": self._scenarios,
+            **self._offers,
             "commands": viewer.key == self._commander,
             "commander": commander,
             "viewers": len(self._viewers),
@@ -217,8 +233,12 @@ class Console:
             return
         if "watch" in asked:
             viewer.run = str(asked["watch"])[:200]
-            return
-        command = str(asked.get("command"))
+        elif "hands" in asked:
+            viewer.hands = asked["hands"] is True
+        else:
+            await self._answer_command(viewer, str(asked.get("command")), asked)
+
+    async def _answer_command(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> None:
         try:
             answer = await self._do(viewer, command, asked)
         except (acts.ActError, NoRunError, OSError, KeyError) as error:
@@ -234,26 +254,13 @@ class Console:
             return "you command now"
         if viewer.key != self._commander:
             raise acts.ActError("you watch; take over first")
-        if command not in self._acts:
-            raise acts.ActError(f"there is no command {command}")
         async with self._starting if command == "start" else contextlib.nullcontext():
-            done_to, answer = await asyncio.to_thread(self._acts[command], asked, run)
-        if command == "start" and done_to is not None:
-            viewer.run = done_to.name
-        self._note(done_to, viewer, command, answer)
-        return answer
-
-    def _start(self, asked: Mapping[str, Any], _run: Path | None) -> tuple[Path | None, str]:
-        folder = acts.start(acts.read_flight(asked))
-        return folder, f"{folder.name} is started"
-
-    def _abort(self, asked: Mapping[str, Any], run: Path | None) -> tuple[Path | None, str]:
-        folder = _confirmed(asked, run)
-        return folder, acts.abort(folder)
-
-    def _off(self, asked: Mapping[str, Any], run: Path | None) -> tuple[Path | None, str]:
-        folder = _confirmed(asked, run)
-        return folder, acts.everything_off(folder)
+            done = await asyncio.to_thread(self._commands.do, command, asked, run)
+        if command == "start":
+            viewer.run = done.run.name
+        if done.noted:
+            self._note(done.run, viewer, done.what, done.answer)
+        return done.answer
 
     def _note(self, run: Path | None, viewer: Viewer, command: str, answer: str) -> None:
         if run is None or not run.is_dir():
@@ -261,33 +268,6 @@ class Console:
         stamp_s = self._feed(run).last_s
         with contextlib.suppress(OSError):  # a disk that is full ends the record, not the command
             journal.note(run, stamp_s, {"command": command, "by": viewer.name, "answer": answer})
-
-
-def _confirmed(asked: Mapping[str, Any], run: Path | None) -> Path:
-    """Return the run that a command means; raise ActError unless the request names the very run that is shown."""
-    if run is None or asked.get("run") != run.name:
-        raise acts.ActError("the run that is shown is another one by now; look again")
-    if not is_live(run):
-        raise acts.ActError("this run is over")
-    return run
-
-
-def is_live(folder: Path) -> bool:
-    """Tell whether a run is under way."""
-    try:
-        return load_run(folder).live and not (folder / "summary.json").exists()
-    except NoRunError:
-        return False
-
-
-def runs_in(folder: Path, fixed: Path | None) -> list[Path]:
-    """Return the folders of runs, the newest first; ``fixed`` is one, wherever it lies."""
-    found = {path.parent for path in folder.glob("*/run.json")} | ({fixed} if fixed is not None else set())
-    stamped = []
-    for path in found:
-        with contextlib.suppress(OSError):
-            stamped.append(((path / "run.json").stat().st_mtime, path))
-    return [path for _, path in sorted(stamped, reverse=True)]
 
 
 def _object(message: str | bytes) -> dict[str, Any]:

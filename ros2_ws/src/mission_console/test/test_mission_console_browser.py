@@ -7,6 +7,7 @@ import contextlib
 import json
 import shutil
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -265,12 +266,12 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
     browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, done = make_run("live"), []
-    monkeypatch.setattr("mission_console.server.is_live", lambda _run: True)
+    monkeypatch.setattr("mission_console.commands.is_live", lambda _run: True)
     for act in ("abort", "everything_off"):
         monkeypatch.setattr(f"mission_console.acts.{act}", lambda run, act=act: done.append((act, run.name)) or f"{act} is done")
     with served(folder) as console:
         page = Page(browser, f"http://127.0.0.1:{console.port}/")
-        abort, off = (f"[...document.querySelectorAll('#operator .danger')][{index}]" for index in (0, 1))
+        abort, off = (f"[...document.querySelectorAll('#operator .danger')][{index}]" for index in (1, 2))
         page.wait(f"{abort} !== undefined && !{abort}.disabled")
         page.run(f"{abort}.click()")
         assert page.run(f"{abort}.textContent") == "press again: stop and land"
@@ -284,6 +285,102 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
         page.wait("document.querySelector('#lines').textContent.includes('The operator: off')")
         assert page.complaints() == []
     assert done == [("abort", "live"), ("everything_off", "live")]
+
+
+BY_HAND = {
+    "problems": [],
+    "skillsets": [
+        {
+            "root": "/navigation",
+            "alive": True,
+            "skills": [
+                {
+                    "name": "takeoff", "status": "not ready", "unmet": [f"on_ground: flight_status is {HOSTILE}"], "running": [],
+                    "last": {"state": "TERMINATED", "result": "AT_ALTITUDE", "message": HOSTILE, "t_s": 15.0, "inputs": {}, "outputs": {}},
+                    "inputs": [{"name": "height", "kind": "float64", "said": "< h_geo_fence", "text": "0.0"}],
+                },
+                {
+                    "name": "hover", "status": "RUNNING", "unmet": [], "last": None,
+                    "running": [{"id": "abcdef012", "state": "RUNNING", "progress": 0.5}],
+                    "inputs": [{"name": "duration", "kind": "float64", "said": "> 0", "text": "0.0"}],
+                },
+            ],
+            "resources": [{"name": "flight_status", "state": "IN_AIR", "targets": ["ON_GROUND"], "every_target": ["IN_AIR", "ON_GROUND"]}],
+            "data": [{"name": "guidance_state", "value": HOSTILE, "age_s": 0.2, "stale": False}],
+        }
+    ],
+}  # fmt: skip
+
+
+class Listened:
+    """Stands for the skillsets of a run."""
+
+    def __init__(self, _domain: int) -> None:
+        self.asked: list[dict[str, Any]] = []
+        LISTENED.append(self)
+
+    def describe(self) -> dict[str, Any]:
+        return BY_HAND
+
+    def do(self, asked: dict[str, Any]) -> tuple[str, str]:
+        self.asked.append({name: asked[name] for name in asked if name not in {"command", "run"}})
+        return f"{asked['act']} it", f"done {HOSTILE}"
+
+    def close(self) -> None:
+        self.asked.append({"act": "close"})
+
+
+LISTENED: list[Listened] = []
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_skills_are_driven_by_hand(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
+    folder = make_run("live")
+    monkeypatch.setattr("mission_console.commands.is_live", lambda _run: True)
+    monkeypatch.setattr("mission_console.commands.Hands", Listened)
+    LISTENED.clear()
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/", size)
+        page.wait("document.querySelector('#hands') !== null && !document.querySelector('#hands').hidden && alula.live.state === 'live'")
+        assert LISTENED == []
+        page.run("document.querySelector('#hands summary').click()")
+        page.wait("document.querySelectorAll('.skills li').length === 2")
+        assert "could not start now:" in page.text(".needs")
+        assert HOSTILE in page.text(".needs")
+        assert page.text(".skill label b + .hint") == " float64, < h_geo_fence"
+        height = page.browser.find_element("css selector", ".skill input")
+        height.clear()
+        height.send_keys("4.5")
+        start = "document.querySelector('.skill .go')"
+        page.run(f"{start}.click()")
+        assert page.run(f"{start}.textContent") == "press again: start takeoff"
+        assert LISTENED[0].asked == []
+        page.run(f"{start}.click()")
+        page.wait("document.querySelector('#hands output').textContent.includes('done')")
+        page.run("[...document.querySelectorAll('.pick')][1].click()")
+        assert page.run("document.querySelector('.skills progress:not([style*=hidden])').value") == 0.5
+        interrupt = "document.querySelector('.skill .danger')"
+        page.run(f"{interrupt}.click(), {interrupt}.click()")
+        assert page.text(".resources button:not([hidden])") == "→ ON_GROUND"
+        change = "document.querySelector('.resources button:not([hidden])')"
+        page.run(f"{change}.click(), {change}.click()")
+        page.wait("document.querySelector('#lines').textContent.includes('transition it')")
+        assert LISTENED[0].asked == [
+            {"act": "start", "root": "/navigation", "skill": "takeoff", "texts": {"height": "4.5"}},
+            {"act": "interrupt", "root": "/navigation", "skill": "hover"},
+            {"act": "transition", "root": "/navigation", "resource": "flight_status", "to": "ON_GROUND"},
+        ]
+        assert page.run("document.documentElement.scrollWidth") <= size[0]
+        assert page.run("document.title") == "Alula"
+        page.run("document.querySelector('#hands summary').click()")
+        page.wait("document.querySelector('#hands').open === false")
+        end = time.monotonic() + WAIT_S
+        while LISTENED[0].asked[-1] != {"act": "close"}:
+            assert time.monotonic() < end
+            page.run("new Promise((done) => setTimeout(done, 50))")
+        assert page.complaints() == []
 
 
 def test_a_tree_of_another_shape_replaces_the_first(browser: Any, tmp_path: Path) -> None:

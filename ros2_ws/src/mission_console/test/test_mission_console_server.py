@@ -7,72 +7,22 @@ import json
 import os
 import urllib.error
 import urllib.request
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mission_console_records import failing_story, write_record
+from mission_console_serving import Bench, answer_to, heard, serve
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from alula_common.network import free_port
 from alula_common.record import EVENTS
-from mission_console import acts, server
+from mission_console import acts, commands, server
 from mission_console.__main__ import main
 from mission_console.acts import ActError, Flight, read_flight
-from mission_console.admission import Admission, is_loopback
-from mission_console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES, Console
-
-WAIT_S = 20.0
-
-
-class Bench:
-    """A console that is served, and its address."""
-
-    def __init__(self, port: int, token: str = "") -> None:
-        self.base = f"127.0.0.1:{port}"
-        self.token = token
-
-    async def viewer(self, key: str, **hello: object) -> ClientConnection:
-        connection = await connect(f"ws://{self.base}{FEED}?token={self.token}", origin=f"http://{self.base}", max_size=None)  # type: ignore[arg-type]
-        await connection.send(json.dumps({"key": key, "name": key, **hello}))
-        return connection
-
-    async def get(self, path: str, **headers: str) -> tuple[int, str]:
-        return await asyncio.to_thread(self._get, path, headers)
-
-    def _get(self, path: str, headers: dict[str, str]) -> tuple[int, str]:
-        try:
-            with urllib.request.urlopen(urllib.request.Request(f"http://{self.base}{path}", headers=headers), timeout=WAIT_S) as answer:
-                return answer.status, answer.read().decode()
-        except urllib.error.HTTPError as error:
-            return error.code, error.read().decode()
-
-
-def serve(play: Callable[[Bench], Awaitable[None]], *, token: str = "", fixed: Path | None = None) -> None:
-    """Serve a console, and play a story against it."""
-
-    async def story() -> None:
-        bench = Bench(free_port(), token)
-        async with Console(Admission("127.0.0.1", int(bench.base.rpartition(":")[2]), token), fixed=fixed).open():
-            await asyncio.wait_for(play(bench), 3 * WAIT_S)
-
-    asyncio.run(story())
-
-
-async def heard(viewer: ClientConnection, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the first message that is as wanted."""
-    async with asyncio.timeout(WAIT_S):
-        while True:
-            message = json.loads(await viewer.recv())
-            if wanted(message):
-                return dict(message)
-
-
-async def answer_to(viewer: ClientConnection, **asked: object) -> str:
-    await viewer.send(json.dumps(asked))
-    return str((await heard(viewer, lambda message: "answer" in message))["answer"])
+from mission_console.admission import is_loopback
+from mission_console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES
 
 
 def events_in(message: dict[str, Any]) -> int:
@@ -131,7 +81,7 @@ def test_several_runs_can_be_watched_at_once(make_run: Callable[..., Path]) -> N
 def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     folder = make_run()
     done: list[str] = []
-    monkeypatch.setattr(server, "is_live", lambda _run: True)
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
     monkeypatch.setattr(acts, "abort", lambda run: done.append(run.name) or "the robot stops where it is")
 
     async def play(bench: Bench) -> None:
@@ -185,6 +135,13 @@ def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Pa
         ({"scenario": "mapping", "faults": ["zed@30"] * 9}, "faults are a list of at most 8"),
         ({"scenario": "mapping", "faults": ["--world=/etc/passwd"]}, "is no fault"),
         ({"scenario": "mapping", "faults": ["zed@soon"]}, "zed@soon"),
+        ({"scenario": "mapping", "world": "--help"}, "is no world"),
+        ({"scenario": "mapping", "world": "yard\n"}, "is no world"),
+        ({"scenario": "mapping", "world": 3}, "is no world"),
+        ({"scenario": "mapping", "vehicle": "balloon"}, "there is no vehicle 'balloon'; there are simulator, mocks, vehicle"),
+        ({"scenario": "mapping", "vehicle": "vehicle"}, "needs the MAVLink connection"),
+        ({"scenario": "mapping", "autopilot": "tcp:127.0.0.1:5760"}, "a vehicle, and only that"),
+        ({"scenario": "mapping", "vehicle": "vehicle", "autopilot": "-o x"}, "is no MAVLink connection"),
     ],
 )
 def test_a_flight_that_can_not_be_is_refused(asked: dict[str, object], why: str) -> None:
@@ -193,10 +150,14 @@ def test_a_flight_that_can_not_be_is_refused(asked: dict[str, object], why: str)
 
 
 def test_a_flight_is_the_command_line_that_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    flight = read_flight({"scenario": "mapping", "seed": 3, "faults": ["zed@30"], "mock": True})
+    asked = {"scenario": "mapping", "seed": 3, "faults": ["zed@30"]}
+    mocked, elsewhere = read_flight({**asked, "vehicle": "mocks"}), read_flight({**asked, "world": "forest"})
+    real = read_flight({"scenario": "mapping", "vehicle": "vehicle", "autopilot": "/dev/ttyACM0"})
     monkeypatch.setenv("ALULA_ROOT", "/alula")
-    assert flight == Flight("mapping", 3, ("zed@30",), mock=True)
-    assert flight.words(Path("/out")) == [*["/alula/alula", "fly", "mapping", "--seed", "3", "--out", "/out", "--fail", "zed@30", "--mock"]]
+    words = ["/alula/alula", "fly", "mapping", "--seed", "3", "--out", "/out", "--fail", "zed@30"]
+    assert mocked.words(Path("/out")) == [*words, "--mock"]
+    assert elsewhere.words(Path("/out")) == [*words, "--world=forest"]
+    assert real.words(Path("/out")) == ["/alula/alula", "fly", "mapping", "--seed", "0", "--out", "/out", "--autopilot=/dev/ttyACM0"]
 
 
 def test_a_flight_that_does_not_start_says_why(make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,7 +166,7 @@ def test_a_flight_that_does_not_start_says_why(make_run: Callable[..., Path], tm
     script.chmod(0o755)
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
     with pytest.raises(ActError, match="alula fly: all DDS domains are taken"):
-        acts.start(Flight("mapping", 0, (), mock=True))
+        acts.start(Flight("mapping", 0, vehicle="mocks"))
 
 
 # --- who is let in -----------------------------------------------------------------------------------------------------------

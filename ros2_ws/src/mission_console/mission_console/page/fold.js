@@ -42,7 +42,8 @@ function newRun() {
     count: 0,
     facts: {}, // topic -> value, of the whole run
     mission: newTrack(),
-    unmet: newTrack(), // what keeps the mission from starting
+    start: newTrack(), // {unmet, met}: what the mission needs to start, in its words
+    held: newTrack(), // what a pause of the mission holds, in words; null: it is not paused
     trees: [], // {t, nodes: [{index, depth, parent, children, kind, name, skill, track}]}
     executions: new Map(), // skillset/skill/id -> {skillset, skill, id, inputs, outputs, changes}
     resources: new Map(), // skillset.resource -> track of {state, from, cause}
@@ -66,7 +67,7 @@ const FOLDERS = {
     if (value.lift_off_s != null) run.departure = value.lift_off_s;
     if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.reason ? `: ${value.reason}` : ""}`);
   },
-  "/ticks": (run, t, { unmet }) => push(run.unmet, t, Array.isArray(unmet) ? unmet.map(String) : []),
+  "/ticks": (run, t, { unmet, met }) => push(run.start, t, { unmet: sentences(unmet), met: sentences(met) }),
   "/events": (run, t, value) => (value.kind === "TRANSITION" ? foldTransition(run, t, value) : foldExecution(run, t, value)),
   "/tree": (run, t, shape) => foldTree(run, t, shape),
   "/nodes": (run, t, changes) => {
@@ -96,6 +97,7 @@ const FOLDERS = {
   },
   "/decisions": (run, t, value) => run.decisions.push({ t, ...value }),
   "/operator": (run, t, value) => {
+    if (value.by === "mission" && ["pause", "resume", "abort"].includes(value.command)) push(run.held, t, value.command === "pause" ? String(value.reason ?? "") : null);
     run.operator.push({ t, ...value });
     moment(run, t, "operator", `operator ${value.by ?? ""}: ${value.command}${value.answer || value.reason ? ` (${value.answer || value.reason})` : ""}`);
   },
@@ -219,5 +221,7 @@ function nodeAt(node, t) {
   const index = indexAt(node.track.t, t);
   return index < 0 ? { status: "INVALID", message: "", since: null } : { ...node.track.v[index], since: node.track.t[index] };
 }
+
+const sentences = (list) => (Array.isArray(list) ? list.map(String) : []);
 
 const words = (text) => String(text ?? "").replaceAll("_", " ").toLowerCase();

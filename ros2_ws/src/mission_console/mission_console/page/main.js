@@ -184,6 +184,7 @@ class Link {
     sessionStorage.setItem("alula-key", this.key);
     this.name = `viewer ${this.key.slice(0, 4)}`;
     this.bar = new OperatorBar((asked) => this.send(asked), (name) => this.watch(name));
+    this.hands = new HandsView((asked) => this.send(asked), (...words_) => this.bar.armed(...words_));
     byId("link").hidden = false;
     this.open();
     setInterval(() => this.judge(), 200);
@@ -192,7 +193,7 @@ class Link {
   open() {
     this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/feed${location.search}`);
     this.begun = performance.now();
-    this.socket.addEventListener("open", () => this.send({ key: this.key, name: this.name, run: this.run, ...this.at }));
+    this.socket.addEventListener("open", () => this.send({ key: this.key, name: this.name, run: this.run, hands: this.hands.box.open, ...this.at }));
     this.socket.addEventListener("message", ({ data }) => this.hear(JSON.parse(data)));
     this.socket.addEventListener("close", () => setTimeout(() => this.open(), AGAIN_MS));
   }
@@ -216,14 +217,15 @@ class Link {
       take(said.entries);
     }
     if (said.answer !== undefined) {
-      this.bar.say(`${said.command}: ${said.answer}`);
+      (said.command === "skill" ? this.hands : this.bar).say(`${said.command}: ${said.answer}`);
       if (said.started) this.run = said.started;
     }
     if (said.status) {
       this.status = said.status;
       if (this.run && said.status.run !== this.run && !said.status.runs.includes(this.run)) this.run = "";
-      this.bar.show(said.status, last(run.unmet.v));
+      this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null);
     }
+    if (said.hands && said.hands.run === this.status?.run) this.hands.show(said.hands);
     this.judge();
   }
 
@@ -238,6 +240,7 @@ class Link {
     setText(byId("link"), stale ? since : { live: "live", over: this.status?.run ? "this run is over" : "no run yet", "catching up": "catching up" }[state] + (problems.length ? ` (${problems.join("; ")})` : ""));
     byId("link").dataset.state = live.state = state;
     this.bar.enable();
+    this.hands.enable(Boolean(this.status?.commands && this.status.live) && !stale);
   }
 }
 

@@ -1,5 +1,5 @@
-// The operator's acts, on the live page: who commands, start, stop and land, everything off. Each needs more than a slip of the finger:
-// two presses in turn, and for everything off a word that is typed.
+// The operator's acts, on the live page: who commands, start, pause, stop and land, everything off. Each needs more than a slip of the
+// finger: two presses in turn, and for everything off a word that is typed.
 
 const ARMED_MS = 4000;
 
@@ -11,7 +11,10 @@ class OperatorBar {
     this.runs = el("select", { "aria-label": "run that is shown", onchange: (event) => watch(event.target.value) });
     this.take = el("button", { type: "button", onclick: () => send({ command: "take" }) }, "take over");
     this.report = el("a", { target: "_blank", rel: "noopener", hidden: true }, "open the report");
-    this.checks = el("ul", { class: "checks", "aria-label": "What keeps the mission from starting" });
+    this.checks = el("ul", { class: "checks", "aria-label": "What the mission needs to start" });
+    this.pause = this.armed("pause", "press again: pause", () => send({ command: "pause", run: this.status.run }));
+    this.resume = this.armed("go on", "press again: go on", () => send({ command: "resume", run: this.status.run }), "go");
+    this.held = el("p", { class: "held", role: "status" });
     this.abort = this.armed("stop and land", "press again: stop and land", () => send({ command: "abort", run: this.status.run }));
     this.word = el("input", { type: "text", size: 5, "aria-label": "type OFF to switch everything off", placeholder: "type OFF", oninput: () => this.enable() });
     this.off = this.armed("everything off", "press again: end all processes", () => {
@@ -23,7 +26,8 @@ class OperatorBar {
     byId("operator").append(
       el("div", { class: "acts" }, el("label", {}, "run ", this.runs), this.report, this.role, this.take),
       el("details", {}, el("summary", {}, "start a mission"), this.form),
-      el("div", { class: "acts" }, this.abort, this.word, this.off),
+      el("div", { class: "acts" }, this.pause, this.resume, this.abort, this.word, this.off),
+      this.held,
       this.checks,
       this.answer,
     );
@@ -31,16 +35,22 @@ class OperatorBar {
 
   startForm() {
     const field = (label, input) => el("label", {}, `${label} `, input);
+    const text = (placeholder, label, attributes = {}) => el("input", { type: "text", placeholder, "aria-label": label, autocomplete: "off", ...attributes });
     this.scenario = el("select", { name: "scenario" });
     this.seed = el("input", { type: "number", min: 0, max: 2147483647, value: 0 });
-    this.faults = el("input", { type: "text", placeholder: "zed@30, lidar@60", "aria-label": "failures, as zed@30" });
-    this.over = el("select", {}, el("option", { value: "simulator" }, "simulator"), el("option", { value: "mocks" }, "mocks"));
+    this.faults = text("zed@30, lidar@60", "failures, as zed@30");
+    this.worlds = el("datalist", { id: "worlds" });
+    this.world = text("the scenario's", "route and world: a name, or a file on the robot's computer", { list: "worlds" });
+    this.vehicle = el("select", { onchange: () => this.enable() });
+    this.autopilot = text("udpin:127.0.0.1:14550", "MAVLink connection of the vehicle's autopilot");
     this.begin = this.armed("start", "press again: start", () => {
       const faults = this.faults.value.split(/[\s,]+/).filter(Boolean);
-      this.send({ command: "start", scenario: this.scenario.value, seed: Number(this.seed.value), faults, mock: this.over.value === "mocks" });
+      const autopilot = this.vehicle.value === "vehicle" ? this.autopilot.value.trim() : "";
+      this.send({ command: "start", scenario: this.scenario.value, seed: Number(this.seed.value), faults, world: this.world.value.trim(), vehicle: this.vehicle.value, autopilot });
       this.say("starting …");
     }, "go");
-    return el("form", { "aria-label": "Start a mission", onsubmit: (event) => event.preventDefault() }, field("scenario", this.scenario), field("seed", this.seed), field("failures", this.faults), field("over", this.over), this.begin);
+    this.connection = field("at", this.autopilot);
+    return el("form", { "aria-label": "Start a mission", onsubmit: (event) => event.preventDefault() }, field("scenario", this.scenario), field("route and world", this.world), this.worlds, field("vehicle", this.vehicle), this.connection, field("seed", this.seed), field("failures", this.faults), this.begin);
   }
 
   /** A button that acts on the second press within some seconds. */
@@ -70,23 +80,30 @@ class OperatorBar {
     setText(this.answer, text);
   }
 
-  show(status, unmet) {
-    this.status = status;
+  /** How things are; `start`: {unmet, met} of the mission's start, `held`: what a pause holds, null when there is none. */
+  show(status, start, held) {
+    [this.status, this.paused] = [status, held !== null];
     rewrite(this.runs, status.runs, (name) => el("option", { value: name }, name));
     if (this.runs.value !== status.run && document.activeElement !== this.runs) this.runs.value = status.run;
     rewrite(this.scenario, status.scenarios, (name) => el("option", { value: name }, name));
+    rewrite(this.worlds, status.worlds, (name) => el("option", { value: name }));
+    rewrite(this.vehicle, status.vehicles, (name) => el("option", { value: name }, name));
     this.report.hidden = !status.report;
     if (status.report) this.report.href = `/runs/${encodeURIComponent(status.run)}/report.html${location.search}`;
     setText(this.role, status.commands ? `you command; ${status.viewers} watching` : `${status.commander || "nobody"} commands; you watch`);
     this.take.hidden = status.commands;
-    rewrite(this.checks, unmet ?? [], (sentence) => el("li", {}, sentence));
+    const checks = [...(start?.unmet ?? []).map((sentence) => [sentence, ""]), ...(start?.met ?? []).map((sentence) => [sentence, "met"])];
+    rewrite(this.checks, checks, ([sentence, kind]) => el("li", { class: kind }, el("span", { class: "sr" }, kind ? "met: " : "not met: "), sentence));
+    setText(this.held, held === null ? "" : `The mission is paused. ${held}`);
     this.enable();
   }
 
   enable() {
     const may = Boolean(this.status?.commands) && live.state !== "stale";
     this.begin.disabled = !may;
-    this.abort.disabled = !may || !this.status.live;
+    this.abort.disabled = this.pause.disabled = this.resume.disabled = !may || !this.status.live;
+    [this.pause.hidden, this.resume.hidden] = [this.paused, !this.paused];
+    this.connection.hidden = this.vehicle.value !== "vehicle";
     this.off.disabled = this.abort.disabled || this.word.value.trim().toUpperCase() !== "OFF";
   }
 }
