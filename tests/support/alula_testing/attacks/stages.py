@@ -8,7 +8,7 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any, Protocol
@@ -26,6 +26,7 @@ from skill_runtime.local import LocalManagers, LocalWorld
 LOOK_S = 0.02
 SWEPT_AFTER_S = 5.0
 """As managers do when they start; so those that were killed last may have left some."""
+TAIL_LINES = 40
 FAILURES = ("listener", "Fatal Python error", "terminate called", "Segmentation fault", "InvalidHandle")
 """What managers log when they could not do their own work, whatever their hooks do."""
 
@@ -171,8 +172,13 @@ class LiveStage:
 
     def _serve(self) -> subprocess.Popen[str]:
         managers = self._graph.start("server", str(self._chance.randrange(2**31)), log=self._log)  # type: ignore[arg-type]
-        assert self._graph.read_until_ready(managers), f"the managers do not start: {managers.wait(PATIENCE_S)}"
+        assert self._graph.read_until_ready(managers), f"the managers do not start: {managers.wait(PATIENCE_S)}\n{self._tail()}"
         return managers
+
+    def _tail(self) -> str:
+        """Return what managers have logged last."""
+        self._log.seek(0)
+        return "".join(deque(self._log, TAIL_LINES))
 
     def _fly(self) -> None:
         found = self.until(lambda: all(client.ready for client in self.clients), PATIENCE_S)

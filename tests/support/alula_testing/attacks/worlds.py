@@ -20,8 +20,10 @@ def ros1() -> Iterator[LiveGraph]:
         from skillset_ros1 import SkillsetClient
 
         graph = LiveGraph("ros1", lambda: SkillsetClient("navigation"))
-        yield graph
-        graph.close()
+        try:
+            yield graph
+        finally:
+            graph.close()
 
 
 @contextmanager
@@ -53,14 +55,16 @@ def ros2() -> Iterator[LiveGraph]:
         return client
 
     graph = LiveGraph("ros2", make_client)
-    yield graph
-    graph.close()
-    for executor in executors:
-        executor.shutdown(timeout_sec=5.0)
-    for thread in threads:
-        thread.join(5.0)
-    rclpy.try_shutdown()
-    claim.release()
+    try:
+        yield graph
+    finally:
+        graph.close()
+        for executor in executors:
+            executor.shutdown(timeout_sec=5.0)
+        for thread in threads:
+            thread.join(5.0)
+        rclpy.try_shutdown()
+        claim.release()
 
 
 WORLDS: Mapping[str, Callable[[], AbstractContextManager[LiveGraph]]] = {"ros1": ros1, "ros2": ros2}
