@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -19,6 +19,7 @@ from alula_flight.report.phases import Phases
 
 FOLDER = "video"
 FREEZE_S = 0.5
+QUALITIES = ("good", "degraded", "critical", "out")  # of the radio, the best first
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 
 Floats = NDArray[np.float64]
@@ -113,9 +114,14 @@ def radio_lost_s(video: Video, phases: Phases) -> float | None:
     if video.criterion is None:
         return None
     before = [state for state in video.radio if state.t_s <= video.end_s]
-    if not before or before[-1].quality == "good":
+    if not before or before[-1].quality == QUALITIES[0]:
         return None
-    return phases.zero_s + before[-1].t_s
+    as_bad = takewhile(lambda state: _rank(state) >= _rank(before[-1]), reversed(before))
+    return phases.zero_s + min(state.t_s for state in as_bad)
+
+
+def _rank(state: RadioState) -> int:
+    return QUALITIES.index(state.quality)
 
 
 def summarise_video(video: Video) -> VideoSummary:
