@@ -16,7 +16,7 @@ from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.settings import FOLLOWED
 from uav_simulator.world.config import find_world, load_world
 
-RADIO_PORT, RADIO_PORTS = 42000, 8
+RADIO_PORT, RADIO_PORTS = 42000, 10
 """The UDP ports of a run's radio: from the first on, so many for each DDS domain, so that runs don't meet."""
 
 

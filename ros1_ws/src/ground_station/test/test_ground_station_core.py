@@ -146,9 +146,9 @@ def test_loss_is_counted_over_the_wrap_of_sequence_numbers():
 def test_the_control_link_is_a_ground_station_s_heartbeat_twice_a_second():
     link = ControlLink()
     beats = [link.due(n * NS // 10) for n in range(30)]
-    assert sum(beat is not None for beat in beats) == 6
-    assert beats[0][0] == 0xFD, "MAVLink 2"
-    assert (beats[0][5], beats[0][6]) == (255, 190)
+    assert sum(map(len, beats)) == 6, "and nothing else while the stick rests"
+    assert beats[0][0][0] == 0xFD, "MAVLink 2"
+    assert (beats[0][0][5], beats[0][0][6]) == (255, 190)
 
 
 # --- whole streams ------------------------------------------------------------------------------------------------------

@@ -169,7 +169,13 @@ def stage(ros_master, start_node, tmp_path):
         STREAM: [f"_video_port:={video.port}", f"_report_port:={base + 3}", f"_key:={KEY}"],
         GROUND: [f"_video_port:={base + 1}", f"_report_port:={report.port}", f"_control_port:={base + 4}", f"_player_port:={base + 6}"],
     }
-    parameters[GROUND] += [f"_key:={KEY}", "_reference:=/camera/image_raw", f"_width:={WIDTH}", f"_height:={HEIGHT}"]
+    parameters[GROUND] += [
+        f"_telemetry_port:={base + 8}",
+        f"_key:={KEY}",
+        "_reference:=/camera/image_raw",
+        f"_width:={WIDTH}",
+        f"_height:={HEIGHT}",
+    ]
     parameters[GROUND] += [f"_video_path:={tmp_path}"]
     nodes = {name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *words]) for name, words in parameters.items()}
     flight = Flight(done)

@@ -117,3 +117,63 @@ def test_the_yaw_stick_overrides_the_setpoints_yaw_until_it_is_centred():
     link.pilot.yaw_stick(0.0)
     link.run(5.0, each_tick=lambda: link.setpoint(POSITION_YAW, hold, yaw=math.radians(90)))
     assert yaw_ned_deg(link) == pytest.approx(90.0, abs=3.0)
+
+
+# --- a ground station's sticks: MANUAL_CONTROL -----------------------------------------------------------------------------
+
+
+def sticks(link, *, system=255, target=1, x=0, y=0, z=500, r=0):
+    sender = mavlink.MAVLink(None, srcSystem=system, srcComponent=190)
+    link.endpoint.feed(mavlink.MAVLink_manual_control_message(target, x, y, z, r, 0).pack(sender))
+
+
+def heading_rad(link):
+    return math.radians(90.0 - yaw_ned_deg(link))
+
+
+def test_in_guided_the_sticks_do_nothing_but_turn_the_nose():
+    link = Link().flying()
+    start = link.position
+    link.run(3.0, each_tick=lambda: sticks(link, x=1000, y=-1000, z=1000))
+    assert (link.pilot.mode, link.distance_to(start) < 0.15) == (GUIDED, True)
+    before_deg = yaw_ned_deg(link)
+    link.run(1.0, each_tick=lambda: sticks(link, r=200))
+    assert (yaw_ned_deg(link) - before_deg) % 360.0 == pytest.approx(30.0, abs=15.0), "clockwise"
+
+
+@pytest.mark.parametrize(("axis", "ahead", "right", "up"), [("x", 1, 0, 0), ("y", 0, 1, 0), ("z", 0, 0, 1)])
+def test_in_loiter_the_sticks_fly_and_centred_ones_hold(axis, ahead, right, up):
+    link = Link(params={"LOIT_SPEED": 300.0}).flying()
+    link.pilot.set_mode(LOITER)
+    (x0, y0, z0), yaw = link.position, heading_rad(link)
+    link.run(4.0, each_tick=lambda: sticks(link, **{axis: 1000}))
+    x, y, z = link.position
+    gone = ((x - x0) * math.cos(yaw) + (y - y0) * math.sin(yaw), (x - x0) * math.sin(yaw) - (y - y0) * math.cos(yaw), z - z0)
+    for part, wanted in zip(gone, (ahead, right, up), strict=True):
+        assert part > 4.0 if wanted else abs(part) < 0.3
+    link.run(4.0, each_tick=lambda: sticks(link))
+    held = link.position
+    link.run(3.0, each_tick=lambda: sticks(link))
+    assert link.distance_to(held) < 0.15
+
+
+def test_sticks_that_are_not_heard_of_any_more_fly_nothing():
+    link = Link(params={"LOIT_SPEED": 300.0, "RC_OVERRIDE_TIME": 0.5}).flying()
+    link.pilot.set_mode(LOITER)
+    link.run(2.0, each_tick=lambda: sticks(link, x=1000))
+    link.run(0.5)
+    left = link.position
+    link.run(10.0)
+    assert link.distance_to(left) < 4.0, "the way that it needs to stop"
+    held = link.position
+    link.run(3.0)
+    assert link.distance_to(held) < 0.15
+
+
+@pytest.mark.parametrize("wrong", [{"system": 254}, {"target": 2}, {"x": 0x7FFF, "y": 0x7FFF, "z": 0x7FFF, "r": 0x7FFF}])
+def test_sticks_of_others_and_axes_that_are_not_there_fly_nothing(wrong):
+    link = Link().flying()
+    link.pilot.set_mode(LOITER)
+    start = link.position
+    link.run(3.0, each_tick=lambda: sticks(link, **{"x": 1000, **wrong}))
+    assert link.distance_to(start) < 0.15

@@ -1,4 +1,4 @@
-"""The node /ground_station: RTP in, pictures and reports out, and the telepilot's control link.
+"""The node /ground_station: RTP in, pictures and reports out, and the telepilot's control link and stick.
 
 It stands for another machine: of the drone it knows what the radio brings. Only the mission clock, and in a simulation the camera's
 own pictures to compare with, come from elsewhere.
@@ -10,8 +10,10 @@ import json
 from pathlib import Path
 
 import rospy
+from geometry_msgs.msg import Twist
 from radio_link.loop import MissionLoop
 from sensor_msgs.msg import Image
+from uav_msgs.srv import Command, CommandResponse
 from video_stream.node import IMAGE_BYTES, pixels
 from video_stream.recorder import Film
 from video_stream.wire import NS, Seal, sdp
@@ -19,7 +21,12 @@ from video_stream.wire import NS, Seal, sdp
 from ground_station.control import ControlLink
 from ground_station.receiver import Picture, VideoReceiver
 from ground_station.settings import GroundSettings
+from ground_station.stick import Deflection
 from perception_core.ros import read_settings
+from resource_reporter import ToldService
+
+VIDEO, TELEMETRY = 0, 1
+"""The sockets: what the drone films, and what its autopilot says."""
 
 
 class GroundStationNode:
@@ -33,9 +40,11 @@ class GroundStationNode:
         self._log = _ShownLog(Path(settings.video_path), settings) if settings.video_path else None
         self._screen = rospy.Publisher("~screen", Image, queue_size=1)
         self._refused = 0
-        self._loop: MissionLoop[Image] = MissionLoop(
-            [settings.video_port], on_tick=self._on_tick, on_datagram=self._on_datagram, on_item=self._on_reference
+        self._loop: MissionLoop[Image | Twist] = MissionLoop(
+            [settings.video_port, settings.telemetry_port], on_tick=self._on_tick, on_datagram=self._on_datagram, on_item=self._on_item
         )
+        self._stick = rospy.Subscriber("~stick", Twist, self._loop.post, queue_size=1, tcp_nodelay=True)
+        self._give_back = ToldService("~give_back", Command, self._on_give_back)
         if settings.reference:
             self._subscriber = rospy.Subscriber(
                 settings.reference, Image, self._loop.post, queue_size=5, buff_size=IMAGE_BYTES, tcp_nodelay=True
@@ -47,10 +56,21 @@ class GroundStationNode:
         if self._log is not None:
             self._log.close()
 
-    def _on_reference(self, message: Image) -> None:
-        self._receiver.reference(message.header.stamp.to_nsec(), pixels(message))
+    def _on_item(self, message: Image | Twist) -> None:
+        if isinstance(message, Image):
+            self._receiver.reference(message.header.stamp.to_nsec(), pixels(message))
+        else:
+            ahead, turn = message.linear, message.angular.z
+            self._control.stick.move(Deflection(ahead.x, ahead.y, ahead.z, turn), self._loop.now_ns)
 
-    def _on_datagram(self, _socket: int, data: bytes) -> None:
+    def _on_give_back(self, _request: object) -> CommandResponse:
+        reason = self._control.stick.give_back(self._loop.now_ns)
+        return CommandResponse(accepted=not reason, reason=reason)
+
+    def _on_datagram(self, source: int, data: bytes) -> None:
+        if source == TELEMETRY:
+            self._control.hear(data)
+            return
         # A player believes whatever comes: it gets the drone's packets alone, each once.
         if self._receiver.datagram(data, self._loop.now_ns):
             self._loop.send(data, self._settings.player_port)
@@ -62,9 +82,8 @@ class GroundStationNode:
         report = self._receiver.report(now_ns)
         if report is not None:
             self._loop.send(report.pack(self._seal), self._settings.report_port)
-        heartbeat = self._control.due(now_ns) if self._settings.heartbeat else None
-        if heartbeat is not None:
-            self._loop.send(heartbeat, self._settings.control_port)
+        for data in self._control.due(now_ns) if self._settings.heartbeat else ():
+            self._loop.send(data, self._settings.control_port)
         self._tell_refused()
 
     def _show(self, picture: Picture) -> None:

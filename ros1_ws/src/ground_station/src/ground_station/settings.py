@@ -12,10 +12,11 @@ class GroundSettings:
     video_port: int = 42001  # of this node: where RTP arrives from the radio
     report_port: int = 42002  # of the radio: where reports go
     control_port: int = 42004  # of the radio: where the telepilot's MAVLink goes
+    telemetry_port: int = 42008  # of this node: where the autopilot's MAVLink arrives from the radio
     player_port: int = 42006  # where the RTP that is the drone's is passed on to any player
     key: str = "alula"  # shared with the drone
     reference: str = ""  # topic of the camera that the drone films with, to compare with; only a simulation has it here
     width: int = 640
     height: int = 360
     video_path: str = ""  # folder for received.mkv and shown.jsonl; empty: nothing is recorded
-    heartbeat: bool = True  # the telepilot's control link: a MAVLink heartbeat twice a second
+    heartbeat: bool = True  # the telepilot's control link: heartbeats, and the stick when it is moved

@@ -59,7 +59,7 @@ class RadioLinkNode:
 
     def __init__(self, settings: RadioSettings) -> None:
         base = settings.base_port
-        self._to = {VIDEO: base + 1, REPORT: base + 3, CONTROL: settings.control_to or base + 5, TELEMETRY: base + 7}
+        self._to = {VIDEO: base + 1, REPORT: base + 3, CONTROL: settings.control_to or base + 5, TELEMETRY: base + 8}
         self._radio = Radio(make_place(settings), parse_faults(settings.faults, FAULTS), seed=settings.seed)
         self._vehicle = Vehicle()
         self._told: Situation | None = None

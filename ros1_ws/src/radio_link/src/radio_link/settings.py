@@ -9,9 +9,9 @@ from dataclasses import dataclass
 class RadioSettings:
     """Private parameters of /radio_link.
 
-    Eight UDP ports on loopback from ``base_port`` on: the radio takes the drone's video (+0), the ground's reports (+2) and the
+    Ten UDP ports on loopback from ``base_port`` on: the radio takes the drone's video (+0), the ground's reports (+2) and the
     ground's control link (+4), and brings them to the ground (+1) and the drone (+3, ``control_to``); what the autopilot answers
-    goes to the ground (+7).
+    goes to the ground (+8). A player has +6 and, for RTCP, +7.
     """
 
     base_port: int = 42000

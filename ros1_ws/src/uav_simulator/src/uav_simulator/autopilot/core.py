@@ -17,6 +17,7 @@ from uav_simulator.autopilot.navigator import Goal, Navigator
 from uav_simulator.autopilot.params import Parameters
 from uav_simulator.autopilot.return_home import ReturnHome
 from uav_simulator.autopilot.setpoint import RawSetpoint, read_setpoint
+from uav_simulator.autopilot.sticks import Deflection, Sticks
 from uav_simulator.autopilot.types import LandedState, Mode, Notice, Result, Severity, SystemStatus, Text
 from uav_simulator.frames import Vec3, wrap_pi
 from uav_simulator.imperfections import Imperfections
@@ -30,6 +31,7 @@ SLOW_LANDING_BELOW_M = 10.0
 MANUAL = (Mode.STABILIZE, Mode.ALT_HOLD)  # need no position
 EARLY_S, EARLY_STAY_S = 2.0, 1.4  # a mode that needs a position and is taken so early after power-up does not stay
 PREARM_PERIOD_S = 30.0  # of the texts that say what is missing
+STEERED = (Mode.LOITER, Mode.POSHOLD)  # where the pilot's sticks fly
 NOT_ARMABLE = (Mode.AUTO, Mode.RTL, Mode.LAND, Mode.BRAKE)
 FORCE_MAGIC = 21196.0  # param2 of MAV_CMD_COMPONENT_ARM_DISARM
 
@@ -71,6 +73,9 @@ class Autopilot:
         self.home: Vec3 | None = None
         self.flown_s = 0.0
         self._failsafes = Failsafes(self.params)
+        self._sticks = Sticks(self.params)
+        self._steering = False
+        self._turning_rad_s = 0.0
         self._takeoff: Takeoff | None = None
         self._landed_since_s = 0.0
         self._return: ReturnHome | None = None
@@ -237,6 +242,10 @@ class Autopilot:
         if self._failsafes.set_rc(lost=lost):
             self._fail_safe("Radio Failsafe")
 
+    def manual_control(self, raw: Deflection) -> None:
+        """Take the sticks of the ground station; they fly in modes of the pilot's, in GUIDED they turn the nose alone [11]."""
+        self._sticks.move(raw, self.now_s)
+
     def yaw_stick(self, rate_rad_s: float) -> None:
         """Turn by the pilot's stick until it is centred, 0 [11]."""
         self._navigator.yaw_stick_rad_s = rate_rad_s
@@ -254,6 +263,7 @@ class Autopilot:
         self._wait_for_readiness()
         if self.armed and self._failsafes.gcs_falls_silent(now_s):
             self._fail_safe("GCS Failsafe")
+        self._follow_sticks()
         self._progress_takeoff()
         self._progress_landing()
         self._watch_touch_down(dt_s)
@@ -298,6 +308,9 @@ class Autopilot:
         self._return = None
         nav = self._navigator
         nav.reset_speeds()
+        if mode in STEERED:
+            pilot_m_s = self.params["PILOT_SPEED_UP"] / 100.0
+            nav.speeds_m_s = {"horizontal": self.params["LOIT_SPEED"] / 100.0, "up": pilot_m_s, "down": pilot_m_s}
         nav.hold_yaw()
         nav.stop()
         if mode is Mode.RTL and self.home:
@@ -316,6 +329,20 @@ class Autopilot:
             self.disarm()
         elif self.armed and self.mode is not Mode.LAND:
             self.set_mode(Mode.RTL)
+
+    def _follow_sticks(self) -> None:
+        """Fly as the ground station's sticks say, and stop when they are centred, or were not heard of for too long."""
+        stick, nav = self._sticks.at(self.now_s), self._navigator
+        turning_rad_s = self._sticks.turn_rad_s(stick) if self.mode in {*STEERED, Mode.GUIDED} else 0.0
+        if turning_rad_s != self._turning_rad_s:
+            self._turning_rad_s = turning_rad_s
+            self.yaw_stick(turning_rad_s)
+        steering = self.mode in STEERED and not self.landed and stick.moves
+        if steering:
+            nav.goal = Goal(None, None, self._sticks.velocity_m_s(stick, nav.yaw_rad))
+        elif self._steering and self.mode in STEERED:
+            nav.stop()
+        self._steering = steering
 
     def _progress_takeoff(self) -> None:
         """Spool up, lift off, and end the take-off at its height [5]."""

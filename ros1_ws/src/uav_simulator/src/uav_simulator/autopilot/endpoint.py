@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from uav_simulator.autopilot import telemetry
 from uav_simulator.autopilot.core import FORCE_MAGIC, Autopilot
 from uav_simulator.autopilot.setpoint import BODY_NED, BODY_OFFSET_NED, RawSetpoint
+from uav_simulator.autopilot.sticks import Deflection
 from uav_simulator.autopilot.streams import Streams
 from uav_simulator.autopilot.types import Mode, Notice, Result
 from uav_simulator.frames import enu_from_ned, frd_from_flu, yaw_enu_from_ned
@@ -21,6 +22,7 @@ from uav_simulator.frames import enu_from_ned, frd_from_flu, yaw_enu_from_ned
 SYSTEM, COMPONENT = 1, 1  # of the autopilot
 GCS_SYSTEM, GCS_COMPONENT = 255, 190
 TIMESYNC_PERIOD_S = 10.0
+NO_AXIS = 0x7FFF  # of MANUAL_CONTROL: there is no such stick
 SPEED_AXES = {0: "horizontal", 1: "horizontal", 2: "up", 3: "down"}
 Message = Any  # pymavlink's messages have no types
 
@@ -53,6 +55,7 @@ class Endpoint:
             "SET_MODE": self._on_set_mode,
             "SET_POSITION_TARGET_LOCAL_NED": self._on_setpoint,
             "REQUEST_DATA_STREAM": self._on_request_data_stream,
+            "MANUAL_CONTROL": self._on_manual_control,
             "PARAM_REQUEST_READ": self._on_param_read,
             "PARAM_REQUEST_LIST": self._on_param_list,
             "PARAM_SET": self._on_param_set,
@@ -177,6 +180,16 @@ class Endpoint:
                 yaw_rate_rad_s=-message.yaw_rate,
             )
         )
+
+    def _on_manual_control(self, message: Message) -> None:
+        """Take the sticks of the ground station that SYSID_MYGCS names; like a heartbeat, they say that it is there."""
+        system = message.get_srcSystem()
+        if message.target != SYSTEM or system != round(self._pilot.params["SYSID_MYGCS"]):
+            return
+        self._hear_gcs(system)
+        forward, right, clockwise = (0.0 if axis == NO_AXIS else axis / 1000.0 for axis in (message.x, message.y, message.r))
+        up = 0.0 if message.z == NO_AXIS else message.z / 500.0 - 1.0
+        self._pilot.manual_control(Deflection(forward, -right, up, -clockwise))
 
     def _on_request_data_stream(self, message: Message) -> None:
         start = bool(message.start_stop)

@@ -15,8 +15,12 @@ DEFAULTS: dict[str, float] = {
     "FS_THR_ENABLE": 1.0,  # 1: RTL when the remote control is lost
     "GUID_TIMEOUT": 3.0,  # s after which a velocity setpoint expires
     "LAND_SPEED": 50.0,  # cm/s below 10 m
+    "LOIT_SPEED": 1250.0,  # cm/s at full stick
+    "PILOT_SPEED_UP": 250.0,  # cm/s at full stick, down alike
+    "PILOT_Y_RATE": 202.5,  # deg/s at full stick
     "PSC_JERK_XY": 5.0,  # m/s3
     "PSC_JERK_Z": 10.0,  # m/s3
+    "RC_OVERRIDE_TIME": 3.0,  # s after which a ground station's sticks count no more
     "RTL_ALT": 1500.0,  # cm above home
     "RTL_LOIT_TIME": 5000.0,  # ms above home
     "SYSID_MYGCS": 255.0,
