@@ -126,9 +126,7 @@ class MockedMission:
             self.director.step()
         except Exception as error:  # noqa: BLE001 - as over ROS 2: whatever breaks in a tree, the robot has to come to rest
             self.director.abort(f"the tree raised {type(error).__name__}: {error}")
-        if self._record is None:
-            self.director.remember()
-        else:
+        if self._record is not None:
             self._record.outcome_of_tick(self.director)
 
     def _abort_now(self, reason: str) -> None:

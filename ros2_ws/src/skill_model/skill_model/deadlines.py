@@ -83,6 +83,8 @@ def _recovering(skillset: Skillset, data: str) -> Iterator[tuple[Skill, Invarian
 
 def due_ns(skillset: Skillset, situation: Situation) -> int | None:
     """Return when time alone next breaks an invariant or a progress deadline, or None; it may be in the past."""
+    if not (situation.false_since or situation.progressed):
+        return None  # which is asked for before every step
     return min((*_durations(skillset, situation), *_deadlines(skillset, situation)), default=None)
 
 

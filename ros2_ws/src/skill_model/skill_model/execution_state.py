@@ -19,15 +19,12 @@ class ExecutionState(Enum):
     TERMINATED = "TERMINATED"
     FAILED = "FAILED"
 
-    @property
-    def terminal(self) -> bool:
-        """Tell whether nothing follows."""
-        return not (self is ExecutionState.REQUESTED or self.active)
+    active: bool
+    """Whether the execution has started and not ended."""
+    terminal: bool
+    """Whether nothing follows."""
 
-    @property
-    def active(self) -> bool:
-        """Tell whether the execution has started and not ended."""
-        return self in _ACTIVE
-
-
-_ACTIVE = frozenset({ExecutionState.RUNNING, ExecutionState.PAUSED, ExecutionState.INTERRUPTING})
+    def __init__(self, name: str) -> None:
+        # Attributes and no properties: each leaf of a tree asks at each tick.
+        self.active = name in {"RUNNING", "PAUSED", "INTERRUPTING"}
+        self.terminal = not (self.active or name == "REQUESTED")

@@ -13,7 +13,7 @@ import types
 import typing
 from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from skill_model import model
@@ -39,8 +39,9 @@ def to_json(skillset: Skillset, *, indent: int | None = None) -> str:
     return json.dumps(_encode(skillset), indent=indent, allow_nan=False)
 
 
+@lru_cache(maxsize=32)
 def from_json(text: str) -> Skillset:
-    """Return the model that ``to_json`` wrote; raise ModelFormatError naming the place when it is none."""
+    """Return the model that ``to_json`` wrote, the same one for the same text; raise ModelFormatError naming the place when it is none."""
     try:
         value = json.loads(text)
         return typing.cast("Skillset", _decode(value, Skillset, "skillset", 0))

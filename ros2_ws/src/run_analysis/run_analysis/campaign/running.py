@@ -29,9 +29,11 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: s
     left = [flight for flight in campaign.flights if flight.number not in table.rows]
     if not left:
         return
-    from distributed import Client, LocalCluster, as_completed  # late: it takes a second, and a finished campaign does not need it
+    from dask import config  # late: it takes a second, and a finished campaign does not need it
+    from distributed import Client, LocalCluster, as_completed
 
-    with ExitStack() as stack:
+    # Dask samples what its workers do a hundred times a second; that is looked at nowhere.
+    with config.set({"distributed.worker.profile.enabled": False}), ExitStack() as stack:
         try:
             if dask is None:
                 workers = min(campaign.at_once or os.cpu_count() or 1, len(left))

@@ -69,7 +69,10 @@ class ExecutionContext:
     @property
     def situation(self) -> Situation:
         """Return the situation now."""
-        return replace(self._situation, now_ns=self._clock_ns())
+        now_ns = self._clock_ns()
+        if now_ns != self._situation.now_ns:
+            self._situation = replace(self._situation, now_ns=now_ns)
+        return self._situation
 
     @property
     def elapsed(self) -> bool:

@@ -21,28 +21,20 @@ class WorldError(SkillRuntimeError):
 class Timer:
     """A job that waits for its moment."""
 
-    __slots__ = ("_job", "when_ns")
+    __slots__ = ("job", "when_ns")
 
     def __init__(self, when_ns: int, job: Job) -> None:
         self.when_ns = when_ns
-        self._job: Job | None = job
+        self.job: Job | None = job
 
     @property
     def pending(self) -> bool:
         """Tell whether the job is still to come."""
-        return self._job is not None
+        return self.job is not None
 
     def cancel(self) -> None:
         """Let the job not happen; without effect when it has."""
-        self._job = None
-
-    def fire(self) -> bool:
-        """Do the job, once; False when it was done or cancelled before."""
-        job, self._job = self._job, None
-        if job is None:
-            return False
-        job()
-        return True
+        self.job = None
 
 
 class VirtualClock:
@@ -74,8 +66,9 @@ class VirtualClock:
 
     def at(self, when_ns: int, job: Job) -> Timer:
         """Have a job done at a moment; at once, after what is due already, when the moment has passed."""
-        timer = Timer(max(when_ns, self._now_ns), job)
-        heapq.heappush(self._queue, (timer.when_ns, next(self._numbers), timer))
+        when_ns = max(when_ns, self._now_ns)
+        timer = Timer(when_ns, job)
+        heapq.heappush(self._queue, (when_ns, next(self._numbers), timer))
         return timer
 
     def after(self, delay_s: float, job: Job) -> Timer:
@@ -92,15 +85,17 @@ class VirtualClock:
         Raises:
             WorldError: jobs beget jobs without end, and time stands still.
         """
-        while self._queue and self._queue[0][0] <= until_ns:
-            when_ns, _, timer = heapq.heappop(self._queue)
-            if not timer.pending:
+        queue = self._queue
+        while queue and queue[0][0] <= until_ns:
+            when_ns, _, timer = heapq.heappop(queue)
+            job, timer.job = timer.job, None
+            if job is None:  # cancelled
                 continue
             self._at_once = self._at_once + 1 if when_ns == self._now_ns else 0
             if self._at_once > JOBS_AT_ONCE:
                 raise WorldError(f"time stands still at {self.now_s:g} s: more than {JOBS_AT_ONCE} jobs at one moment")
             self._now_ns = when_ns
-            timer.fire()
+            job()
             return True
         self._now_ns = max(self._now_ns, until_ns)
         return False

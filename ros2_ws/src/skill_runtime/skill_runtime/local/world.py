@@ -112,11 +112,11 @@ class LocalWorld:
         """
         if self._running:
             raise WorldError("the world runs already: a job can't wait for it; use add_done_callback or on_change there")
-        until_ns = self.clock.now_ns + round(timeout_s * NANOSECONDS)
+        until_ns, do_next = self.clock.now_ns + round(timeout_s * NANOSECONDS), self.clock.do_next
         self._running = True
         try:
             while not condition():
-                if not self.clock.do_next(until_ns):
+                if not do_next(until_ns):
                     return condition()
         finally:
             self._running = False
