@@ -46,13 +46,19 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
-    """Tell whether the vehicle came down; None where it never took off, or was taken away from the mission in the air."""
-    changes = [event for event in events if isinstance(event, TransitionEvent)]
-    last = {event.resource: event.to_state for event in changes}
-    if "flight_status" not in last:
+    """Tell whether the vehicle came down; None where it never took off, or was taken away from the mission in the air.
+
+    What was taken away is not the mission's any more, also where it is given back: it commands nothing, and others land it.
+    """
+    flight_status, taken = "", False
+    for event in events:
+        if isinstance(event, TransitionEvent):
+            if event.resource == "flight_status":
+                flight_status = event.to_state
+            taken = taken or (event.resource == "SDK_authority" and event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR")
+    if not flight_status:
         return None
-    down = last["flight_status"] == "ON_GROUND"
-    return down or (None if last.get("SDK_authority") == "UNAVAILABLE" else False)
+    return flight_status == "ON_GROUND" or (None if taken else False)
 
 
 def _row(flight: Flight, found: Mapping[str, Any], events: Sequence[EngineEvent], monitor: Monitor, ways: Sequence[Way]) -> Row:
