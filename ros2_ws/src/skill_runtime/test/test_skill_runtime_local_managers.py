@@ -5,15 +5,19 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from skill_runtime_local_rig import Timed, make, timed
 from skill_runtime_models import flying_skillset
 
+from alula_testing.recorder import Recorder
 from skill_model.execution_state import ExecutionState
 from skill_model.json_form import from_json
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.local import LocalWorld, WorldError
+from skill_runtime.local.middleware import VirtualMiddleware
+from skill_runtime.managers import Managers
 
 
 def test_managers_that_are_not_there_or_have_gone_leave_nobody_waiting():
@@ -40,6 +44,37 @@ def test_managers_that_are_not_there_or_have_gone_leave_nobody_waiting():
     assert client.resources == {"sdk": "UNAVAILABLE", "axes": "AVAILABLE"}
     with pytest.raises(WorldError, match="already"):
         world.serve(flying_skillset(), timed)
+
+
+class Hasty(VirtualMiddleware):
+    """Clients ask in the very moment that a service or an action is there, as those of managers that were killed do."""
+
+    def __init__(self, bus):
+        super().__init__(bus, "flying", model=flying_skillset())
+        self.replies = []
+        self.ends = []
+
+    def serve(self, service, handler):
+        super().serve(service, handler)
+        if service == "transition":
+            handler({"resource": "sdk", "to": "AVAILABLE"}, self.replies.append)
+
+    def serve_action(self, skill, on_goal, on_cancel):
+        server = super().serve_action(skill, on_goal, on_cancel)
+        goal = SimpleNamespace(id="early", inputs={"height": 3.0}, report=lambda *_: None, finish=self.ends.append)
+        on_goal(goal)
+        return server
+
+
+def test_managers_are_asked_for_nothing_before_they_can_tell_of_it():
+    world = LocalWorld()
+    hasty = Hasty(world._bus)
+    managers = Managers(hasty, flying_skillset(), {"takeoff": Recorder()}, bindings=None)
+    world.run_for(1.0)
+    assert hasty.errors == []
+    assert hasty.replies[0].accepted
+    managers.close("over")
+    assert [end.id for end in hasty.ends] == ["early"]
 
 
 def test_a_start_on_its_way_to_managers_that_die_fails():

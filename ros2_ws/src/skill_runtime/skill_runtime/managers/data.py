@@ -36,13 +36,16 @@ class DataManager:
         self._received: dict[str, Sample] = {}
         self._watched: set[str] = set()
         self._lock = threading.Lock()
-        bound = bindings or {}
+        self._bindings = bound = bindings or {}
         self._publishers = {data.name: middleware.advertise(data_topic(data, bound.get(data.name, ("", ""))[1])) for data in skillset.data}
-        for name, (source, type_name) in bound.items():
+
+    def serve(self) -> None:
+        """Take values, and questions for them."""
+        for name, (source, type_name) in self._bindings.items():
             if name in self._data:
                 topic = Topic(source, type_name=type_name, wrapped=self._data[name].type in PRIMITIVES, outside=True)
-                middleware.subscribe(topic, functools.partial(self._take, name))
-        middleware.serve("get_data", self._answer)
+                self._middleware.subscribe(topic, functools.partial(self._take, name))
+        self._middleware.serve("get_data", self._answer)
 
     def receive(self, name: str, value: object) -> None:
         """Take a value; raise KeyError when there is no such data."""

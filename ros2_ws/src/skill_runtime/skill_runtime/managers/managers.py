@@ -79,12 +79,15 @@ class Managers:
             hook_timeout_s=hook_timeout_s,
         )
         self._alarm = EngineAlarm(middleware, self.engine)
-        self.data = DataManager(middleware, skillset, bindings, self._update_data)
+        self.data = DataManager(middleware, skillset, bindings, self.update_data)
         self.resources = ResourceManager(middleware, self.engine, self.life)
         self._events = middleware.advertise(EVENTS)
         self.skills = {skill.name: SkillManager(middleware, self.engine, skill, make) for skill in skillset.skills}
         self._records = SkillStatesPublisher(middleware, skillset, self.life)
-        servers = {name: manager.server for name, manager in self.skills.items()}
+        # Served once all are made: clients of managers that were here before ask at once, on other threads.
+        self.data.serve()
+        self.resources.serve()
+        servers = {name: manager.serve() for name, manager in self.skills.items()}
         Questions(middleware, self.engine, servers, make)
         # The sign of life comes last: who hears it finds everything there.
         middleware.announce(self.life, on_rival or self._on_rival)
@@ -110,7 +113,8 @@ class Managers:
         self._records.on_events(events)
         self._alarm.look()
 
-    def _update_data(self, name: str, value: object | None) -> None:
+    def update_data(self, name: str, value: object | None) -> None:
+        """Have conditions see a value of a data, or None: there is no fresh one any more."""
         self.engine.update_data(name, value)
         self._alarm.look()
 

@@ -14,14 +14,18 @@ class ResourceManager:
     """Publishes ``resource_states`` once a step, and serves ``transition`` and ``trigger``."""
 
     def __init__(self, middleware: Middleware, engine: SkillsetEngine, life: str) -> None:
+        self._middleware = middleware
         self._engine = engine
         self._life = life
         self._publisher = middleware.advertise(RESOURCE_STATES)
         # Kept apart from the engine's, so that each message is the state after the step that it is sent for.
         self._latest = {name: ResourceValue(status.state, "", status.stamp_ns) for name, status in engine.resources.items()}
         self._publish(0, middleware.now_ns())
-        middleware.serve("transition", self._transition)
-        middleware.serve("trigger", self._trigger)
+
+    def serve(self) -> None:
+        """Take transitions and events."""
+        self._middleware.serve("transition", self._transition)
+        self._middleware.serve("trigger", self._trigger)
 
     def on_events(self, events: Sequence[EngineEvent]) -> None:
         """Follow the transitions of one step."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from skill_model.model import Skill
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.middleware import Goal, Middleware
+from skill_runtime.middleware import ActionServer, Goal, Middleware
 
 
 class SkillManager:
@@ -30,7 +30,10 @@ class SkillManager:
         self._make_inputs = make_inputs
         self._goals: dict[str, Goal] = {}
         self._reported: set[str] = set()
-        self.server = middleware.serve_action(skill.name, self._on_goal, self._on_cancel)
+
+    def serve(self) -> ActionServer:
+        """Take goals."""
+        return self._middleware.serve_action(self._skill.name, self._on_goal, self._on_cancel)
 
     def on_event(self, event: ExecutionEvent) -> None:
         """Follow an execution of this skill."""
