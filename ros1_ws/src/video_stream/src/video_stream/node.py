@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from uav_msgs.srv import Stream, StreamResponse
 
 from perception_core.ros import read_settings
 from resource_reporter import ResourceReporter, ToldService
+from video_stream.camera import CameraError, CameraSource, CameraThread
 from video_stream.criteria import Criteria, Margins, Watch
 from video_stream.encoder import Rgb
 from video_stream.levels import Level
@@ -44,6 +45,14 @@ def pixels(message: Image) -> Rgb:
     return np.ascontiguousarray(image if RED_FIRST[message.encoding] else image[..., ::-1])
 
 
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a camera that is read here, (H, W, 3) uint8 RGB, and when it came."""
+
+    image: Rgb
+    stamp_ns: int
+
+
 class VideoStreamNode:
     """Sends while it is enabled; listens always."""
 
@@ -56,17 +65,37 @@ class VideoStreamNode:
         self._log = _SentLog(Path(settings.video_path)) if settings.video_path else None
         self._reporter = ResourceReporter("video")
         self._state = rospy.Publisher("~state", VideoState, queue_size=5)
-        self._loop: MissionLoop[Image] = MissionLoop(
-            [settings.report_port], on_tick=self._on_tick, on_datagram=self._on_report, on_item=self._on_image
+        self._camera = self._opened_camera(settings) if settings.source else None
+        self._waiting = False
+        self._failure = ""
+        self._loop: MissionLoop[Image | Picture] = MissionLoop(
+            [settings.report_port], on_tick=self._on_tick, on_datagram=self._on_report, on_item=self._on_item
         )
         self._service = ToldService("~stream", Stream, self._on_stream)
-        self._subscriber = rospy.Subscriber(settings.image, Image, self._loop.post, queue_size=2, buff_size=IMAGE_BYTES, tcp_nodelay=True)
+        if self._camera is None:
+            self._subscriber = rospy.Subscriber(
+                settings.image, Image, self._loop.post, queue_size=2, buff_size=IMAGE_BYTES, tcp_nodelay=True
+            )
 
     def run(self) -> None:
-        """Work until ROS shuts down; the film is whole then."""
+        """Work until ROS shuts down, or the camera gives no more pictures (then CameraError); the film is whole then."""
+        if self._camera is not None:
+            self._camera.start()
         self._loop.run()
+        if self._camera is not None:
+            self._camera.close()
         if self._log is not None:
             self._log.close()
+        if self._failure:
+            raise CameraError(self._failure)
+
+    def _opened_camera(self, settings: StreamSettings) -> CameraThread:
+        source = CameraSource(name=settings.source, width=settings.source_width, height=settings.source_height, fps=settings.source_fps)
+        return CameraThread(source, self._on_picture, now_s=rospy.get_time, ended=self._on_camera_end)
+
+    def _on_camera_end(self, reason: str) -> None:
+        self._failure = reason
+        rospy.signal_shutdown(reason)
 
     def _fresh_sender(self) -> VideoSender:
         limits = replace(RateSettings(), max_bps=self._settings.max_bps, min_bps=self._settings.min_bps)
@@ -83,13 +112,22 @@ class VideoStreamNode:
             self._watch = Watch(criteria, self._loop.now_ns)
         return StreamResponse(accepted=not problem, reason=problem)
 
-    def _on_image(self, message: Image) -> None:
-        stamp_ns = message.header.stamp.to_nsec()
-        if self._watch is not None:
-            try:
-                self._send(pixels(message), stamp_ns)
-            except ValueError as error:
-                rospy.logerr_throttle(5.0, f"{self._settings.image}: {error}")
+    def _on_picture(self, image: Rgb) -> None:
+        """Hand a picture of the camera's thread to the loop, unless one waits there already."""
+        if not self._waiting:
+            self._waiting = True
+            self._loop.post(Picture(image, rospy.Time.now().to_nsec()))
+
+    def _on_item(self, item: Image | Picture) -> None:
+        self._waiting = False
+        if self._watch is None:
+            return
+        try:
+            picture = item if isinstance(item, Picture) else Picture(pixels(item), item.header.stamp.to_nsec())
+        except ValueError as error:
+            rospy.logerr_throttle(5.0, f"{self._settings.image}: {error}")
+            return
+        self._send(picture.image, picture.stamp_ns)
 
     def _send(self, image: Rgb, stamp_ns: int) -> None:
         frame = self._sender.frame(image, stamp_ns, max(self._loop.now_ns, stamp_ns))
@@ -174,6 +212,10 @@ class _SentLog:
 
 
 def main() -> None:
-    """Run the node until ROS shuts down."""
+    """Run the node until ROS shuts down; a camera that can't be opened or ends ends it with one line."""
     rospy.init_node("video_stream")
-    VideoStreamNode(read_settings(StreamSettings())).run()
+    try:
+        VideoStreamNode(read_settings(StreamSettings())).run()
+    except CameraError as error:
+        rospy.logfatal(str(error))
+        raise SystemExit(2) from error

@@ -10,6 +10,10 @@ class StreamSettings:
     """Private parameters of /video_stream; ports are UDP on loopback."""
 
     image: str = "/camera/image_raw"  # sensor_msgs/Image, rgb8 or bgr8: the simulated camera or a driver's topic
+    source: str = ""  # in place of that topic: a V4L2 device (/dev/video0), or any film or address that FFmpeg reads
+    source_width: int = 640  # asked of a device
+    source_height: int = 360
+    source_fps: float = 20.0
     video_port: int = 42000  # of the radio: where RTP goes
     report_port: int = 42003  # of this node: where the ground station's reports arrive
     key: str = "alula"  # shared with the ground station
