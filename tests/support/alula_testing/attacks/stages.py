@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any, Protocol
 
@@ -152,7 +152,7 @@ class LiveStage:
             self._managers.kill()
             code = "hangs"
         self._log.seek(0)
-        said = [line.strip() for line in self._log if any(word in line for word in FAILURES)]
+        said = failures_in(self._log)
         self._log.close()
         return {
             "not done": said[:20],
@@ -190,6 +190,20 @@ class LiveStage:
         """Take a transition; a client that has just doubted slow managers is asked again."""
         asked = self.clients[0].transition(resource, state)
         return bool(asked.wait(PATIENCE_S)) and not asked.failure
+
+
+def failures_in(log: Iterable[str]) -> list[str]:
+    """Return the lines of a log that tell of a failure, each traceback's error beside its beginning."""
+    found: list[str] = []
+    inside = False
+    for line in log:
+        if any(word in line for word in FAILURES):
+            found.append(line.strip())
+            inside = "Traceback" in line
+        elif inside and line.strip() and not line[0].isspace():
+            found[-1] += f" ... {line.strip()}"
+            inside = False
+    return found
 
 
 def what_is_known(client: Any) -> dict[str, object]:
