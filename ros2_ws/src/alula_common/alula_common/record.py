@@ -36,11 +36,17 @@ TREE = "/tree"
 BLACKBOARD = "/blackboard"
 """Values of the mission's blackboard that changed, by name."""
 TICKS = "/ticks"
-"""Each tick of the tree, before what it decides: ``{unmet}``, what keeps the mission from starting; empty once it has started."""
+"""Each tick of the tree, before what it decides: ``{unmet}``, what keeps the mission from starting; empty once it has started.
+
+Before that also ``conditions``, all that it needs: ``[[needed, what is so instead or ""], ...]``.
+"""
 REPORTS = "/reports"
 """What the tree was told of its executions: ``{skillset, skill, id, state, progress, result, message, outputs}``, at each change."""
 OPERATOR = "/operator"
-"""What the operator did: ``{command, by}`` and what belongs to it."""
+"""What the operator did: ``{command, by}`` and what belongs to it.
+
+By "mission": what it was told (abort, pause, resume), and what holds since (paused).
+"""
 DATA = "/data"
 """Samples of data that a skillset got: ``{skillset, data, value, stamp_s}``; each where the model's conditions ask for the data, else
 one a second."""

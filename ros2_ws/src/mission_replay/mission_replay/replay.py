@@ -131,10 +131,17 @@ class Replay:
             if not self._free and not (self._ticked and entry.value.get("unmet")):
                 self._tick()
         elif entry.topic == OPERATOR:
-            if entry.value.get("command") == "abort" and entry.value.get("by") == "mission":
-                self.director.abort(str(entry.value.get("reason", "")))
+            if entry.value.get("by") == "mission":
+                self._obey(str(entry.value.get("command")), str(entry.value.get("reason", "")))
         else:
             self.vehicle.take(entry, diverged=self._comparison.difference is not None)
+
+    def _obey(self, command: str, reason: str) -> None:
+        """Have the mission do what it was told from outside then, where it can now."""
+        if command == "abort":
+            self.director.abort(reason)
+        elif command in {"pause", "resume"} and not self.director.refusal(paused=command == "pause"):
+            (self.director.pause if command == "pause" else self.director.resume)()
 
     def _after_the_record(self) -> None:
         """Go on without it, where that was asked for; what was expected and did not come is a difference."""

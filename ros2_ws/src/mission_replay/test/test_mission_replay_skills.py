@@ -75,12 +75,36 @@ def test_a_replay_is_a_record_that_replays(zed_dead, tmp_path):
     assert main([str(tmp_path / "again")]) == SAME
 
 
-def test_an_abort_is_decided_as_it_was(tmp_path):
+def mapping_over_mocks(out: Path) -> MockedMission:
+    """Return a mission that is to be told something on the way."""
     route = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml")
     skillsets = mock_flight.drone(("navigation", "perception", "mapping"))
     behaviour = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone())
-    (tmp_path / "run").mkdir()
-    mission = MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(route), out=tmp_path / "run")
+    out.mkdir()
+    return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(route), out=out)
+
+
+def test_a_pause_is_decided_as_it_was(tmp_path):
+    mission = mapping_over_mocks(tmp_path / "run")
+
+    def tell(command: str) -> None:
+        mission._record.told(command, "")
+        (mission.director.pause if command == "pause" else mission.director.resume)()
+
+    mission.world.clock.after(15.0, lambda: tell("pause"))
+    mission.world.clock.after(75.0, lambda: tell("resume"))
+    assert mission.run().outcome is Outcome.ACCOMPLISHED
+    asked = [(kind, skill) for kind, _, skill, _ in requests(tmp_path / "run") if kind in {"pause", "resume"}]
+    assert asked.count(("pause", "zed_depthmap")) == 3  # no mock can hold
+    assert asked.count(("resume", "zed_depthmap")) == 1
+    assert ("resume", "goto_straight") not in asked  # it has ended meanwhile
+    assert main([str(tmp_path / "run"), "--out", str(tmp_path / "again")]) == SAME
+    assert requests(tmp_path / "again") == requests(tmp_path / "run")
+    assert ending(tmp_path / "again") == ending(tmp_path / "run")
+
+
+def test_an_abort_is_decided_as_it_was(tmp_path):
+    mission = mapping_over_mocks(tmp_path / "run")
     mission.world.clock.after(15.0, lambda: mission.abort("told to end"))
     assert mission.run().outcome is Outcome.ABORTED
     assert main([str(tmp_path / "run"), "--out", str(tmp_path / "again")]) == SAME

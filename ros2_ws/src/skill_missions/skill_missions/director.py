@@ -11,6 +11,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from skill_missions.blackboard import Blackboard
+from skill_missions.conditions import Condition
+from skill_missions.pausing import Pause, PauseRefusedError
 from skill_missions.treeview import NodeView, TreeWatch
 
 START_TIMEOUT_S = 90.0
@@ -63,8 +65,8 @@ class Mission(Protocol):
         """Tell whether the tree has the robot brought to rest by now, so that an abort has nothing to add."""
         ...
 
-    def unmet_conditions(self) -> list[str]:
-        """Return what keeps the mission from starting, in words."""
+    def conditions(self) -> list[Condition]:
+        """Return what the mission needs to start, met or not."""
         ...
 
     def stop_here(self) -> Behaviour:
@@ -84,14 +86,57 @@ class Director:
         self._wait_until_s: float | None = None
         self._watch = TreeWatch(mission.root)
         self._abort_reason = ""
+        self._pause: Pause | None = None
+        self._held = ""
         self._stop: Behaviour | None = None
         self._stop_watch: TreeWatch | None = None
         self._phase: Callable[[], None] = self._wait
 
     def step(self) -> None:
         """Do what is to be done now; returns at once. The mission is over when ``end`` is set."""
-        if self.end is None:
+        if self.end is not None:
+            return
+        if self._pause is None:
             self._phase()
+        else:
+            self._held = self._pause.step(self.blackboard.now_s) or self._held
+
+    def refusal(self, *, paused: bool) -> str:
+        """Return why the mission can't be paused, or can't go on, now; empty when it can."""
+        if not paused:
+            return "" if self._pause is not None else "the mission is not paused"
+        if self.end is not None or self._phase == self._settle:
+            return "the mission is over already"
+        if self.start_s is None:
+            return "the mission has not started"
+        return "the robot is being stopped already" if self._stop is not None or self._mission.stopping else ""
+
+    def pause(self) -> str:
+        """Tick the tree no more until `resume`, and have the skills that can hold hold; return what was asked for, in words.
+
+        An abort ends the pause, too.
+
+        Raises:
+            PauseRefusedError: the mission does not run, or the robot is on its way to rest.
+        """
+        refusal = self.refusal(paused=True)
+        if refusal:
+            raise PauseRefusedError(refusal)
+        if self._pause is None:
+            self._pause = Pause(self._mission.root, self.blackboard.now_s)
+        return self._pause.words()
+
+    def resume(self) -> None:
+        """Have the skills go on, and tick the tree again; raise PauseRefusedError when it is not paused."""
+        if self._pause is None:
+            raise PauseRefusedError(self.refusal(paused=False))
+        self._pause.end()
+        self._pause = None
+
+    def news_of_pause(self) -> str:
+        """Return what holds and what goes on since the mission was paused, in words, once; empty when there is nothing new."""
+        held, self._held = self._held, ""
+        return held
 
     def abort(self, reason: str) -> str:
         """Stop what runs and bring the robot to rest where it is; return what happens, in words."""
@@ -103,15 +148,16 @@ class Director:
         if self._stop is not None or self._mission.stopping:
             return "the robot is being stopped already"
         self._abort_reason = reason
+        self._pause = None
         self._mission.root.stop(Status.INVALID)
         self._stop = self._mission.stop_here()
         self._stop_watch = TreeWatch(self._stop)
         self._phase = self._halt
         return "the robot stops where it is"
 
-    def unmet(self) -> list[str]:
-        """Return what keeps the mission from starting, in words; nothing once it has started, or is over."""
-        return self._mission.unmet_conditions() if self.start_s is None and self.end is None else []
+    def conditions(self) -> list[Condition]:
+        """Return what the mission needs to start; nothing once it has started, or is over."""
+        return self._mission.conditions() if self.start_s is None and self.end is None else []
 
     def remember(self) -> None:
         """Take note of how each node is; for those who look at the tree later only, instead of ``view`` after each step."""
@@ -130,7 +176,7 @@ class Director:
     # --- phases ------------------------------------------------------------------------------------------------------
 
     def _wait(self) -> None:
-        unmet, now_s = self._mission.unmet_conditions(), self.blackboard.now_s
+        unmet, now_s = [one.unmet for one in self._mission.conditions() if one.unmet], self.blackboard.now_s
         if self._wait_until_s is None and now_s > 0.0:  # zero: the mission clock was not heard yet
             self._wait_until_s = now_s + self._start_timeout_s
         if not unmet:

@@ -20,9 +20,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from skillset_interfaces.msg import Event
 from std_msgs.msg import Header, String
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from skill_missions.director import EXIT_CODES, START_TIMEOUT_S, Director, End, Outcome
+from skill_missions.pausing import PauseRefusedError
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
 from skill_missions.skillset import MissionClient
@@ -55,6 +56,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for name in plan.skillsets:
             self.create_subscription(Event, f"/{name}/events", self._on_event, ALL_EVENTS)
         self.create_service(Trigger, "/mission/abort", self._on_abort)
+        self.create_service(SetBool, "/mission/pause", self._on_pause)
         self.create_timer(TICK_PERIOD_S, self.wake)
 
     @property
@@ -78,6 +80,9 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
             self.get_logger().error(f"the tree raised {type(error).__name__}: {error}")
             self.director.abort(f"the tree raised {type(error).__name__}: {error}")
+        held = self.director.news_of_pause()
+        if held:
+            self.record.told("paused", held)
         stamp = self.get_clock().now().to_msg()
         self._heartbeat.publish(Header(stamp=stamp, frame_id="mission"))
         self.record.outcome_of_tick(self.director)
@@ -88,6 +93,21 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.record.abort(reason)
         answer = self.director.abort(reason)
         self.get_logger().warning(f"{reason}: {answer}")
+        self.wake()
+        return answer
+
+    def set_paused(self, *, paused: bool) -> str:
+        """Pause the mission, or have it go on; return what happens, in words. Raises PauseRefusedError."""
+        refusal = self.director.refusal(paused=paused)
+        if refusal:
+            raise PauseRefusedError(refusal)
+        self.record.told("pause" if paused else "resume", "")
+        if paused:
+            answer = f"the mission is paused: {self.director.pause()}"
+        else:
+            self.director.resume()
+            answer = "the mission goes on"
+        self.get_logger().warning(answer)
         self.wake()
         return answer
 
@@ -119,6 +139,13 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self.abort("aborted by the operator")
         response.success = self.director.end is None or self.director.end.outcome is Outcome.ABORTED
+        return response
+
+    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        try:
+            response.success, response.message = True, self.set_paused(paused=request.data)
+        except PauseRefusedError as error:
+            response.success, response.message = False, str(error)
         return response
 
 

@@ -71,13 +71,22 @@ class MissionRecord:
 
     def abort(self, reason: str) -> None:
         """Write that the mission is told from outside to stop; to be called before it does."""
-        self._write(OPERATOR, {"command": "abort", "by": "mission", "reason": reason})
+        self.told("abort", reason)
+
+    def told(self, command: str, reason: str) -> None:
+        """Write what the mission is told from outside (``abort``, ``pause``, ``resume``) before it obeys, and what came of it (``paused``).
+
+        The reason may be empty.
+        """
+        self._write(OPERATOR, {"command": command, "by": "mission", "reason": reason})
 
     # --- what the mission does ---------------------------------------------------------------------------------------
 
     def tick(self, director: Director) -> None:
         """Write that the tree is ticked now; to be called before it is."""
-        self._write(TICKS, {"unmet": director.unmet()})
+        conditions = director.conditions()
+        known = {"conditions": [[one.needed, one.unmet] for one in conditions]} if conditions else {}
+        self._write(TICKS, {"unmet": [one.unmet for one in conditions if one.unmet], **known})
 
     def decision(self, kind: str, skillset: str, skill: str, execution_id: str, inputs: Mapping[str, object]) -> None:
         """Write a request of the tree."""

@@ -8,7 +8,9 @@ from uav_missions_fakes import World, clients, make_blackboard
 
 from skill_missions.director import EXIT_CODES, Director, Outcome
 from skill_missions.drawing import draw
-from uav_missions.mapping import MappingMission, unmet_conditions
+from skill_missions.pausing import PauseRefusedError
+from skill_model.execution_state import ExecutionState
+from uav_missions.mapping import MappingMission, conditions
 
 READY = {
     "SDK_authority": "AVAILABLE",
@@ -62,7 +64,7 @@ def test_each_condition_of_the_start_counts(resource, state):
 def unmet(world: World, **remarks: str) -> list[str]:
     blackboard = make_blackboard(world)
     blackboard.remarks.update({name.replace("__", "."): remark for name, remark in remarks.items()})
-    return unmet_conditions(clients(world), blackboard)
+    return [one.unmet for one in conditions(clients(world), blackboard) if one.unmet]
 
 
 def test_a_missing_driver_is_named():
@@ -76,7 +78,16 @@ def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():
     world = World(resources=dict(READY))
     skillsets = clients(world)
     skillsets.mapping.ready = False
-    assert unmet_conditions(skillsets, make_blackboard(world)) == ["the skillset mapping can't be called"]
+    every = conditions(skillsets, make_blackboard(world))
+    assert [one.unmet for one in every if one.unmet] == ["the skillset mapping can't be called"]
+    assert [one.needed for one in every] == [
+        *(f"the skillset {name} answers" for name in ("navigation", "perception", "mapping")),
+        "the autopilot is ready and ours to command",
+        "the home point is valid",
+        "the vehicle is on the ground",
+        "the state of the ZED is known",
+        "the LiDAR works",
+    ]
 
 
 def test_a_broken_zed_does_not_keep_the_mission_from_starting():
@@ -181,3 +192,114 @@ def test_the_drawing_shows_every_node_in_the_signs_of_the_paper():
     for element in shapes:
         if element.tag == f"{space}rect" and element.get("x"):
             assert float(element.get("x")) + float(element.get("width")) <= width
+
+
+# --- pause -----------------------------------------------------------------------------------------------------------------
+
+
+def paused_on_the_way(world: World) -> Director:
+    """Return a mission that is paused while it flies straight."""
+    director = make(world)
+    run(director, world, until=lambda: ("running", "goto_straight") in world.log)
+    director.pause()
+    return director
+
+
+def pass_time(director: Director, world: World, duration_s: float) -> list[str]:
+    """Step through a time; return the news of the pause."""
+    news = []
+    end_s = world.now_s + duration_s
+    while world.now_s < end_s:
+        director.step()
+        news.append(director.news_of_pause())
+        world.pass_time()
+    return [words for words in news if words]
+
+
+def test_a_paused_mission_holds_what_can_hold_and_goes_on_where_it_was():
+    world = World(resources=dict(READY))
+    director = paused_on_the_way(world)
+    starts, tree = len(world.starts()), director.view().as_dict()
+    (news,) = pass_time(director, world, 30.0)
+    assert "navigation.goto_straight holds" in news
+    assert "perception.zed_depthmap goes on (zed_depthmap can't be paused)" in news
+    assert "mapping.lidar_mapping goes on" in news
+    assert (len(world.starts()), director.view().as_dict()) == (starts, tree)
+    assert [handle.skill for handle in world.running() if handle.state is ExecutionState.PAUSED] == ["goto_straight"]
+    director.resume()
+    run(director, world)
+    assert director.end.outcome is Outcome.ACCOMPLISHED
+    assert not world.conflicts
+
+
+def test_a_climb_is_finished_and_nothing_follows_before_the_mission_goes_on():
+    world = World(resources=dict(READY))
+    director = make(world)
+    run(director, world, until=lambda: ("running", "takeoff") in world.log)
+    director.pause()
+    news = pass_time(director, world, 10.0)
+    assert ("end", "takeoff", "AT_ALTITUDE") in world.log
+    assert news[-1] == "navigation.takeoff has ended"
+    assert world.starts() == ["takeoff"]
+    director.resume()
+    run(director, world)
+    assert director.end.outcome is Outcome.ACCOMPLISHED
+
+
+def test_a_skill_that_is_just_being_started_is_asked_again():
+    world = World(resources=dict(READY), not_yet={"goto_straight"})
+    director = paused_on_the_way(world)
+    world.not_yet.clear()
+    assert ["goto_straight holds" in news for news in pass_time(director, world, 2.0)] == [True]
+
+
+def test_a_failure_during_a_pause_is_dealt_with_when_the_mission_goes_on():
+    world = World(resources=dict(READY))
+    director = paused_on_the_way(world)
+    world.break_sensor("zed")
+    pass_time(director, world, 5.0)
+    assert "lidar_depthmap" not in world.starts()
+    director.resume()
+    run(director, world)
+    assert director.end.outcome is Outcome.DEGRADED
+    assert not world.conflicts
+
+
+def test_a_skill_that_can_not_go_on_is_interrupted_so_that_the_tree_goes_on():
+    world = World(resources=dict(READY), forgets={"goto_straight"})
+    director = paused_on_the_way(world)
+    pass_time(director, world, 1.0)
+    director.resume()
+    run(director, world)
+    assert ("interrupt", "goto_straight") in world.log
+    assert director.end is not None
+    assert not world.running()
+
+
+def test_an_abort_ends_the_pause_and_lands():
+    world = World(resources=dict(READY))
+    director = paused_on_the_way(world)
+    pass_time(director, world, 1.0)
+    assert director.abort("operator") == "the robot stops where it is"
+    run(director, world)
+    assert director.end.outcome is Outcome.ABORTED
+    assert world.resources["flight_status"] == "ON_GROUND"
+    assert not world.running()
+
+
+def test_what_can_not_be_paused_says_why():
+    world = World(resources=dict(READY))
+    director = make(world)
+
+    def refusal() -> str:
+        with pytest.raises(PauseRefusedError) as refused:
+            director.pause()
+        return str(refused.value)
+
+    assert refusal() == "the mission has not started"
+    with pytest.raises(PauseRefusedError, match="the mission is not paused"):
+        director.resume()
+    run(director, world, until=lambda: ("running", "land") in world.log)
+    assert refusal() == "the robot is being stopped already"
+    run(director, world)
+    assert refusal() == "the mission is over already"

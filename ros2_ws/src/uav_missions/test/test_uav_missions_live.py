@@ -12,9 +12,10 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from std_srvs.srv import SetBool
 from uav_skills_rig import Rig
 
-from alula_common.record import EVENTS, read_record
+from alula_common.record import EVENTS, OPERATOR, read_record
 
 CLOCKS_APART_S = 0.1
 """Managers under load stamp by a clock message that is some ticks old."""
@@ -113,6 +114,36 @@ def test_losing_the_zed_is_survived_within_a_second(mission):
     assert lidar["stamp_s"] - failure_s < 1.0
     skills = starts_since(mission, failure_s - CLOCKS_APART_S)
     assert skills == ["lidar_depthmap", "rotate_head", "lock_head", "goto", "rotate_head", "lock_head", "goto", "land"]
+
+
+def set_paused(mission: Mission, *, paused: bool) -> SetBool.Response:
+    caller = mission.rig.caller.create_client(SetBool, "/mission/pause")
+    assert caller.wait_for_service(30.0)
+    answer = caller.call(SetBool.Request(data=paused), timeout_sec=30.0)
+    mission.rig.caller.destroy_client(caller)
+    return answer
+
+
+def test_a_pause_holds_the_vehicle_on_its_way_and_the_mission_goes_on(mission):
+    functional = mission.rig.functional
+    mission.until(lambda: functional.names().count("set_position") == 2 and functional.vehicle.place[0] > 2.0)
+    answer = set_paused(mission, paused=True)
+    assert (answer.success, answer.message.startswith("the mission is paused: ")) == (True, True)
+    mission.until(lambda: functional.names()[-1] == "hover")
+    place, paused_s = list(functional.vehicle.place), functional.now_s
+    mission.until(lambda: functional.now_s > paused_s + 3.0)
+    assert list(functional.vehicle.place) == pytest.approx(place, abs=0.3)
+    assert functional.names()[-1] == "hover"
+    assert functional.vehicle.in_air
+    answer = set_paused(mission, paused=False)
+    assert (answer.success, answer.message) == (True, "the mission goes on")
+    assert mission.exit_code() == 0
+    record = mission.read("mission.json")
+    assert (record["outcome"], record["waypoints_reached"]) == ("accomplished", 3)
+    told = [entry.value for entry in read_record(mission.out) if entry.topic == OPERATOR]
+    assert [(one["by"], one["command"]) for one in told] == [("mission", "pause"), ("mission", "paused"), ("mission", "resume")]
+    assert "navigation.goto_straight holds" in told[1]["reason"]
+    assert "perception.zed_depthmap goes on (zed_depthmap can't be paused)" in told[1]["reason"]
 
 
 def test_losing_both_sensors_lands_where_it_is(mission):

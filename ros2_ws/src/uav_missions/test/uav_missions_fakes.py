@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from skill_missions.pending import PendingInterrupts
 from skill_model.execution_state import ExecutionState as State
 from skill_runtime.handle import SkillHandle
+from skill_runtime.waiting import Pending
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients
 from uav_missions.route import Route
@@ -38,13 +39,26 @@ NOMINAL = {
 }
 
 
+PAUSABLE = {"goto", "goto_straight"}
+
+
 class FakeHandle(SkillHandle):
     def __init__(self, skill: str, inputs: dict, world: World) -> None:
-        super().__init__(skill, str(len(world.handles)))
+        super().__init__(skill, str(len(world.handles)), pause=self._hold if skill in PAUSABLE else None)
         self.inputs = inputs
         self.world = world
         self.started_s = world.now_s
         self.interrupted_s: float | None = None
+
+    def _hold(self, paused: bool) -> Pending[str]:  # noqa: FBT001 - as handles call it
+        answer: Pending[str] = Pending()
+        refusal = "" if paused or self.skill not in self.world.forgets else "the way is forgotten"
+        if self.skill in self.world.not_yet or self.state is State.REQUESTED:
+            refusal = "not taken yet"
+        if not refusal:
+            self.enter(State.PAUSED if paused else State.RUNNING)
+        answer.resolve(refusal)
+        return answer
 
     def interrupt(self) -> None:
         self.interrupted_s = self.world.now_s
@@ -66,6 +80,10 @@ class World:
     handles: list[FakeHandle] = field(default_factory=list)
     script: Callable[[FakeHandle], str | None] = lambda _handle: None
     broken: set[str] = field(default_factory=set)
+    not_yet: set[str] = field(default_factory=set)
+    """Skills that refuse a pause, as they do while they are being started."""
+    forgets: set[str] = field(default_factory=set)
+    """Skills that can't go on after a pause."""
     conflicts: list[str] = field(default_factory=list)
     resources: dict[str, str] = field(default_factory=lambda: {"SDK_authority": "AVAILABLE", "flight_status": "ON_GROUND"})
 
@@ -109,6 +127,9 @@ class World:
             return
         if handle.state is State.REQUESTED:
             self._begin(handle)
+            return
+        if handle.state is State.PAUSED:
+            handle.started_s = self.now_s
             return
         handle.progress = 1.0 if handle.skill.endswith("depthmap") else 0.5
         if self.now_s - handle.started_s < self.duration_s:

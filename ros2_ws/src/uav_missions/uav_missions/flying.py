@@ -11,6 +11,7 @@ from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import FailureIsSuccess
 
+from skill_missions.conditions import Condition, condition
 from skill_missions.decorators import RetryAfter, Until
 from skill_missions.leaves import Awaits, Check, Do, SkillLeaf, Stays
 from skill_missions.skillset import Client
@@ -148,17 +149,20 @@ class Flying:
         return yaw_rad is not None and abs(wrap_rad(yaw_rad - sideways_yaw_rad(self._blackboard))) < HEADING_TOLERANCE_RAD
 
 
-def unmet_of_flight(navigation: Client, clients: Iterable[Client], blackboard: RouteBlackboard) -> list[str]:
-    """Return what keeps any mission from starting, in words."""
-    resources = navigation.resources
-    unmet = [f"the skillset {client.skillset} can't be called" for client in clients if not client.ready]
-    if resources.get("SDK_authority") != "AVAILABLE":
-        unmet.append("the autopilot is not ready, or not ours to command (SDK_authority)" + blackboard.because(AUTHORITY))
-    if resources.get("homepoint_status") != "VALID":
-        unmet.append("the home point is not valid")
-    if resources.get("flight_status") != "ON_GROUND":
-        unmet.append("the vehicle is not on the ground")
-    return unmet
+def conditions_of_flight(navigation: Client, clients: Iterable[Client], blackboard: RouteBlackboard) -> list[Condition]:
+    """Return what any mission needs to start."""
+    state = navigation.resources.get
+    grounded = state("flight_status") == "ON_GROUND"
+    authority = "the autopilot is not ready, or not ours to command (SDK_authority)" + blackboard.because(AUTHORITY)
+    return [
+        *(
+            condition(f"the skillset {one.skillset} answers", holds=one.ready, otherwise=f"the skillset {one.skillset} can't be called")
+            for one in clients
+        ),
+        condition("the autopilot is ready and ours to command", holds=state("SDK_authority") == "AVAILABLE", otherwise=authority),
+        condition("the home point is valid", holds=state("homepoint_status") == "VALID", otherwise="the home point is not valid"),
+        condition("the vehicle is on the ground", holds=grounded, otherwise="the vehicle is not on the ground"),
+    ]
 
 
 def beside(name: str, work: Behaviour, companion: Behaviour) -> Parallel:

@@ -45,11 +45,12 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import SuccessIsFailure
 
+from skill_missions.conditions import Condition, condition
 from skill_missions.leaves import Check, Do, SkillLeaf
 from skill_missions.plan import MissionPlan
 from skill_missions.skillset import Client
 from uav_missions.blackboard import RouteBlackboard
-from uav_missions.flying import FlightSettings, Flying, beside, is_on, sees, unmet_of_flight
+from uav_missions.flying import FlightSettings, Flying, beside, conditions_of_flight, is_on, sees
 from uav_missions.plan import route_plan
 from uav_missions.route import Route
 
@@ -103,16 +104,16 @@ class InspectionMission:
         """Tell whether the vehicle is landing."""
         return Status.RUNNING in {self.land.status, self.video_lost.status, self.giving_up.status}
 
-    def unmet_conditions(self) -> list[str]:
-        """Return what keeps the mission from starting, in words."""
-        unmet = unmet_of_flight(self._clients.navigation, vars(self._clients).values(), self._blackboard)
+    def conditions(self) -> list[Condition]:
+        """Return what the mission needs to start, met or not."""
         lidar = self._clients.perception.resources.get("lidar_status", "UNKNOWN")
-        if lidar != "OK":
-            told = "nothing is known of the LiDAR" if lidar == "UNKNOWN" else "the LiDAR is broken, nothing would look ahead"
-            unmet.append(told + self._blackboard.because("perception.lidar_status"))
-        if self._clients.video.resources.get("link") != "UP":
-            unmet.append("the ground station is not heard of (link)")
-        return unmet
+        told = "nothing is known of the LiDAR" if lidar == "UNKNOWN" else "the LiDAR is broken, nothing would look ahead"
+        heard = self._clients.video.resources.get("link") == "UP"
+        return [
+            *conditions_of_flight(self._clients.navigation, vars(self._clients).values(), self._blackboard),
+            condition("the LiDAR works", holds=lidar == "OK", otherwise=told + self._blackboard.because("perception.lidar_status")),
+            condition("the ground station is heard (link)", holds=heard, otherwise="the ground station is not heard of (link)"),
+        ]
 
     def stop_here(self) -> Behaviour:
         """Make a tree that stops the vehicle and lands it where it is; also what an abort from outside ends with."""

@@ -42,11 +42,12 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import SuccessIsFailure
 
+from skill_missions.conditions import Condition, condition
 from skill_missions.leaves import Check, Do, SkillLeaf
 from skill_missions.plan import MissionPlan
 from skill_missions.skillset import Client
 from uav_missions.blackboard import RouteBlackboard
-from uav_missions.flying import FlightSettings, Flying, beside, is_on, sees, unmet_of_flight
+from uav_missions.flying import FlightSettings, Flying, beside, conditions_of_flight, is_on, sees
 from uav_missions.plan import route_plan
 from uav_missions.route import Route
 
@@ -91,9 +92,9 @@ class MappingMission:
         """Tell whether the vehicle is landing."""
         return Status.RUNNING in {self.land.status, self.giving_up.status}
 
-    def unmet_conditions(self) -> list[str]:
-        """Return what keeps the mission from starting, in words."""
-        return unmet_conditions(self._clients, self._blackboard)
+    def conditions(self) -> list[Condition]:
+        """Return what the mission needs to start, met or not."""
+        return conditions(self._clients, self._blackboard)
 
     def stop_here(self) -> Behaviour:
         """Make a tree that stops the vehicle and lands it where it is; also what an abort from outside ends with."""
@@ -129,16 +130,24 @@ class MappingMission:
         return SkillLeaf(name, self._clients.perception, skill, {}, blackboard=self._blackboard)
 
 
-def unmet_conditions(clients: Clients, blackboard: RouteBlackboard) -> list[str]:
-    """Return what keeps the mission from starting, in words."""
-    perception = clients.perception.resources
-    unmet = unmet_of_flight(clients.navigation, vars(clients).values(), blackboard)
-    for sensor, name in (("zed_status", "ZED"), ("lidar_status", "LiDAR")):
-        if perception.get(sensor, "UNKNOWN") == "UNKNOWN":
-            unmet.append(f"nothing is known of the {name}" + blackboard.because(f"perception.{sensor}"))
-    if perception.get("lidar_status") == "BROKEN":
-        unmet.append("the LiDAR is broken, there is nothing to map with" + blackboard.because("perception.lidar_status"))
-    return unmet
+def conditions(clients: Clients, blackboard: RouteBlackboard) -> list[Condition]:
+    """Return what the mission needs to start, met or not."""
+    state = clients.perception.resources.get
+    zed, lidar = (state(f"{sensor}_status", "UNKNOWN") for sensor in ("zed", "lidar"))
+    broken = "the LiDAR is broken, there is nothing to map with"
+    return [
+        *conditions_of_flight(clients.navigation, vars(clients).values(), blackboard),
+        condition(
+            "the state of the ZED is known",
+            holds=zed != "UNKNOWN",
+            otherwise="nothing is known of the ZED" + blackboard.because("perception.zed_status"),
+        ),
+        condition(
+            "the LiDAR works",
+            holds=lidar == "OK",
+            otherwise=(broken if lidar == "BROKEN" else "nothing is known of the LiDAR") + blackboard.because("perception.lidar_status"),
+        ),
+    ]
 
 
 def plan(route: Route) -> MissionPlan:
