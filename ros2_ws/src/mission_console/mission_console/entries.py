@@ -1,8 +1,8 @@
 """What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock; without a time for what holds for the whole run.
 
 Topics of the record (``alula_common.record``) keep their names and contents, with three exceptions. Of the tree the page gets the shape
-once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what keeps
-the mission from starting; of the reports none, because the events tell how executions go.
+once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what the
+mission needs to start, met or not; of the reports none, because the events tell how executions go.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Converter:
         self._shape: list[tuple[int, str, str, str]] = []
         self._nodes: list[tuple[str, str]] = []
         self._sampled_s: dict[tuple[object, object], float] = {}
-        self._unmet: object = None
+        self._start: object = None
 
     def convert(self, entry: Entry) -> Iterator[Wire]:
         """Yield what the page gets of an entry."""
@@ -64,8 +64,8 @@ class Converter:
 
     def _wanted(self, t_s: float, entry: Entry) -> bool:
         if entry.topic == TICKS:
-            before, self._unmet = self._unmet, entry.value.get("unmet")
-            return before != self._unmet
+            before, self._start = self._start, (entry.value.get("unmet"), entry.value.get("conditions"))
+            return before != self._start
         return entry.topic != REPORTS and (entry.topic != DATA or self._due(t_s, entry.value))
 
     def _due(self, t_s: float, sample: Mapping[str, Any]) -> bool:

@@ -16,7 +16,7 @@ import pytest
 from mission_console_records import HOSTILE, LIFT_OFF_S, Story, failing_story, tree, write_record
 
 from alula_common.network import free_port
-from alula_common.record import EVENTS, MISSION, TREE
+from alula_common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
 from mission_console.admission import Admission
 from mission_console.page import REPORT, write_report
 from mission_console.server import Console
@@ -285,6 +285,50 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
         page.wait("document.querySelector('#lines').textContent.includes('The operator: off')")
         assert page.complaints() == []
     assert done == [("abort", "live"), ("everything_off", "live")]
+
+
+def test_what_the_mission_needs_to_start_is_shown_and_turns_green(browser: Any, make_run: Callable[..., Path]) -> None:
+    folder = make_run("live", story=[])
+    ready, fence = ["the home point is valid", "the home point is not valid"], [f"a fence {HOSTILE}", ""]
+    writer = write_record(folder, [(1.0, TICKS, {"unmet": [ready[1]], "conditions": [ready, fence]})], over=False)
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/")
+        page.wait("document.querySelectorAll('#operator .checks li').length === 2")
+        assert page.text("#operator .checks li") == f"not met: the home point is not valid | met: a fence {HOSTILE}"
+        assert page.run("document.querySelectorAll('#operator .checks li.met').length") == 1
+        writer.write(TICKS, 2_000_000_000, {"unmet": [], "conditions": [[ready[0], ""], fence]})
+        writer.write(TICKS, 3_000_000_000, {"unmet": []})
+        page.wait("document.querySelectorAll('#operator .checks li.met').length === 2")
+        assert page.text("#operator .checks li").startswith("met: the home point is valid")
+        assert page.complaints() == []
+    writer.close()
+
+
+def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    folder = make_run("live", story=[])
+    writer = write_record(folder, [entry for entry in failing_story() if entry[0] < LIFT_OFF_S + 20], over=False)
+    monkeypatch.setattr("mission_console.commands.is_live", lambda _run: True)
+    for act in ("pause", "resume"):
+        monkeypatch.setattr(f"mission_console.acts.{act}", lambda run, act=act: done.append(f"{act} {run.name}") or act)
+    button = "[...document.querySelectorAll('#operator button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/")
+        page.wait(f"{button.format('pause')} !== undefined")
+        assert page.run(f"{button.format('go on')} === undefined")
+        page.run(f"{button.format('pause')}.click()")
+        assert done == []
+        page.run(f"{button.format('press again: pause')}.click()")
+        page.wait("document.querySelector('#operator output').textContent === 'pause: pause'")
+        writer.write(OPERATOR, round(33e9), {"command": "paused", "by": "mission", "reason": "navigation.goto holds"})
+        page.wait("document.querySelector('.held').textContent === 'The mission is paused. navigation.goto holds'")
+        page.run(f"{button.format('go on')}.click(), {button.format('press again: go on')}.click()")
+        writer.write(OPERATOR, round(40e9), {"command": "resume", "by": "mission", "reason": ""})
+        page.wait("document.querySelector('.held').textContent === ''")
+        page.wait("document.querySelector('#lines').textContent.includes('The mission goes on.')")
+        assert page.complaints() == []
+    writer.close()
+    assert done == ["pause live", "resume live"]
 
 
 BY_HAND = {

@@ -66,11 +66,12 @@ def test_samples_of_each_data_come_five_times_a_second_at_most() -> None:
     assert sent == [t for t in range(0, 100, 4) for _ in range(2)]
 
 
-def test_ticks_come_when_something_else_keeps_the_mission_from_starting_and_reports_never() -> None:
+def test_ticks_come_when_what_the_mission_needs_to_start_has_changed_and_reports_never() -> None:
     converter = Converter()
-    ticks = [["no GPS"], ["no GPS"], [], [], ["no GPS"]]
+    ticks: list[dict[str, object]] = [{"unmet": ["no GPS"], "conditions": [["GPS", "no GPS"]]}] * 2
+    ticks += [{"unmet": [], "conditions": [["GPS", ""]]}] * 2 + [{"unmet": []}] * 2
     assert [list(converter.convert(entry(REPORTS, 1.0, {}))) for _ in range(2)] == [[], []]
-    sent = [t for t, unmet in enumerate(ticks) for _ in converter.convert(entry(TICKS, float(t), {"unmet": unmet}))]
+    sent = [t for t, tick in enumerate(ticks) for _ in converter.convert(entry(TICKS, float(t), tick))]
     assert sent == [0, 2, 4]
 
 

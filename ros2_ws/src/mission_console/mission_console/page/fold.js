@@ -42,7 +42,7 @@ function newRun() {
     count: 0,
     facts: {}, // topic -> value, of the whole run
     mission: newTrack(),
-    start: newTrack(), // {unmet, met}: what the mission needs to start, in its words
+    start: newTrack(), // [[needed, otherwise]]: what the mission needs to start, in its words; otherwise is empty where it is met
     held: newTrack(), // what a pause of the mission holds, in words; null: it is not paused
     trees: [], // {t, nodes: [{index, depth, parent, children, kind, name, skill, track}]}
     executions: new Map(), // skillset/skill/id -> {skillset, skill, id, inputs, outputs, changes}
@@ -67,7 +67,10 @@ const FOLDERS = {
     if (value.lift_off_s != null) run.departure = value.lift_off_s;
     if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.reason ? `: ${value.reason}` : ""}`);
   },
-  "/ticks": (run, t, { unmet, met }) => push(run.start, t, { unmet: sentences(unmet), met: sentences(met) }),
+  "/ticks": (run, t, { unmet, conditions }) => {
+    const known = Array.isArray(conditions) ? conditions.map(([needed, otherwise]) => [String(needed), String(otherwise ?? "")]) : sentences(unmet).map((sentence) => ["", sentence]);
+    if (known.length || !run.start.t.length) push(run.start, t, known); // once it has started, what it needed stays as it was then: met
+  },
   "/events": (run, t, value) => (value.kind === "TRANSITION" ? foldTransition(run, t, value) : foldExecution(run, t, value)),
   "/tree": (run, t, shape) => foldTree(run, t, shape),
   "/nodes": (run, t, changes) => {
@@ -97,7 +100,7 @@ const FOLDERS = {
   },
   "/decisions": (run, t, value) => run.decisions.push({ t, ...value }),
   "/operator": (run, t, value) => {
-    if (value.by === "mission" && ["pause", "resume", "abort"].includes(value.command)) push(run.held, t, value.command === "pause" ? String(value.reason ?? "") : null);
+    if (value.by === "mission" && ["pause", "paused", "resume", "abort"].includes(value.command)) push(run.held, t, /^pause/.test(value.command) ? String(value.reason ?? "") : null);
     run.operator.push({ t, ...value });
     moment(run, t, "operator", `operator ${value.by ?? ""}: ${value.command}${value.answer || value.reason ? ` (${value.answer || value.reason})` : ""}`);
   },

@@ -80,7 +80,7 @@ class OperatorBar {
     setText(this.answer, text);
   }
 
-  /** How things are; `start`: {unmet, met} of the mission's start, `held`: what a pause holds, null when there is none. */
+  /** How things are; `start`: what the mission needs to start, `held`: what a pause holds, null when there is none. */
   show(status, start, held) {
     [this.status, this.paused] = [status, held !== null];
     rewrite(this.runs, status.runs, (name) => el("option", { value: name }, name));
@@ -92,8 +92,7 @@ class OperatorBar {
     if (status.report) this.report.href = `/runs/${encodeURIComponent(status.run)}/report.html${location.search}`;
     setText(this.role, status.commands ? `you command; ${status.viewers} watching` : `${status.commander || "nobody"} commands; you watch`);
     this.take.hidden = status.commands;
-    const checks = [...(start?.unmet ?? []).map((sentence) => [sentence, ""]), ...(start?.met ?? []).map((sentence) => [sentence, "met"])];
-    rewrite(this.checks, checks, ([sentence, kind]) => el("li", { class: kind }, el("span", { class: "sr" }, kind ? "met: " : "not met: "), sentence));
+    rewrite(this.checks, start ?? [], ([needed, otherwise]) => el("li", { class: otherwise ? "" : "met" }, el("span", { class: "sr" }, otherwise ? "not met: " : "met: "), otherwise || needed));
     setText(this.held, held === null ? "" : `The mission is paused. ${held}`);
     this.enable();
   }

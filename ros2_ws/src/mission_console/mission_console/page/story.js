@@ -161,7 +161,12 @@ function story(run) {
   if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, "The fallback watches: the flight is safe again.", "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
-  for (const act of run.operator) say(act.t, `The operator: ${act.command}.`);
+  for (const act of run.operator) {
+    if (act.by !== "mission") say(act.t, `The operator: ${act.command}.`);
+    else if (act.command === "paused") say(act.t, `The mission is paused: ${act.reason}.`, "reaction");
+    else if (act.command === "resume") say(act.t, "The mission goes on.", "reaction");
+    else if (act.command === "abort") say(act.t, `The mission is told to stop: ${act.reason}.`, "reaction");
+  }
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
   return lines.sort((one, other) => one.t - other.t);
