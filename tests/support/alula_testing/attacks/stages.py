@@ -27,7 +27,7 @@ LOOK_S = 0.02
 SWEPT_AFTER_S = 5.0
 """As managers do when they start; so those that were killed last may have left some."""
 TAIL_LINES = 40
-FAILURES = ("listener", "Fatal Python error", "terminate called", "Segmentation fault", "InvalidHandle")
+FAILURES = ("the listener raised", "Fatal Python error", "terminate called", "Segmentation fault", "InvalidHandle")
 """What managers log when they could not do their own work, whatever their hooks do."""
 
 
