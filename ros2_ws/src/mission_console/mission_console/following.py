@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from alula_common.record import FILE, Entry, RecordError, RecordFollower
+from mission_console.areas import areas_of
 from mission_console.clouds import CloudError, packed, read_points
-from mission_console.entries import MAP, ROUTE, RUN, SUMMARY, Converter, Wire
+from mission_console.entries import AREAS, MAP, ROUTE, RUN, SUMMARY, Converter, Wire
 from mission_console.journal import JournalFollower
 
 
@@ -25,11 +26,12 @@ class RunFollower:
         self._journal = JournalFollower(folder)
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
             (folder / "run.json", RUN, self._run),
+            (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
             (folder / "route.json", ROUTE, self._route),
             (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
             (folder / "summary.json", SUMMARY, _json),
         ]
-        self._seen: dict[Path, tuple[int, int]] = {}
+        self._seen: dict[str, tuple[int, int]] = {}
 
     def poll(self, limit: int | None = None) -> list[Wire]:
         """Return what came since the last call, what belongs to the whole run first.
@@ -43,9 +45,9 @@ class RunFollower:
             try:
                 stat = path.stat()
                 version = (stat.st_mtime_ns, stat.st_size)
-                if self._seen.get(path) == version:
+                if self._seen.get(topic) == version:
                     continue
-                self._seen[path] = version
+                self._seen[topic] = version
                 yield topic, None, read(path)
             except FileNotFoundError:
                 continue

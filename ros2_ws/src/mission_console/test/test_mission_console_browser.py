@@ -86,12 +86,10 @@ class Page:
         return [str(entry["message"]) for entry in self.browser.get_log("browser")]
 
 
-def make_report(folder: Path, story: Story | None = None) -> str:
+def make_report(folder: Path, story: Story | None = None, *, world: str = "yard.yaml") -> str:
     write_record(folder, failing_story() if story is None else story)
     (folder / "summary.json").write_text(json.dumps(SUMMARY), encoding="utf-8")
-    (folder / "run.json").write_text(
-        json.dumps({"scenario": "mapping", "seed": 1, "faults": ["zed@30"], "world": "yard.yaml"}), encoding="utf-8"
-    )
+    (folder / "run.json").write_text(json.dumps({"scenario": "mapping", "seed": 1, "faults": ["zed@30"], "world": world}), encoding="utf-8")
     fault = ("/fault", LIFT_OFF_S + 29.9, {"sensor": "zed", "mode": "dead"})
     health = ("/health", LIFT_OFF_S + 30.0, {"sensor": "zed", "ok": False, "fault": "silent", "reason": "no image for 0.4 s"})
     write_report(folder, [fault, health], title="mapping")
@@ -130,6 +128,28 @@ def test_the_slider_moves_tree_timeline_map_and_figures_together(browser: Any, t
     assert "east 40.0 m" in page.text("#map-words")
     assert page.run("Number(document.querySelector('#timeline .cursor').getAttribute('x1'))") > early
     assert "20 m" in page.text("#charts figcaption")
+
+
+def test_the_map_shows_zones_of_the_radio_and_the_fence(browser: Any, tmp_path: Path) -> None:
+    zones = [
+        {"name": HOSTILE, "quality": "critical", "box": {"low": [8, 0, 0], "high": [12, 2, 9]}},
+        {"name": "mast", "quality": "degraded", "cylinder": {"at": [10, 1], "radius_m": 12, "z": [0, 9]}},
+        {"name": "jammer", "quality": "degraded", "sphere": {"at": [50, 1, 3], "radius_m": 5}},
+    ]
+    (tmp_path / "world.yaml").write_text(json.dumps({"radio_zones": zones}), encoding="utf-8")
+    page = Page(browser, make_report(tmp_path, world=str(tmp_path / "world.yaml")))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    words = {}
+    for t_s in (10.0, 15.0, 30.0, 50.0):
+        page.choose(t_s)
+        words[t_s] = page.text("#map-words")
+    assert f"In the radio zone “{HOSTILE}”: critical." in words[10.0]  # the first that is listed counts
+    assert "In the radio zone “mast”: degraded." in words[15.0]
+    assert "radio zone" not in words[30.0]
+    assert "In the radio zone “jammer”: degraded." in words[50.0]
+    assert "Fence: 60 m around home, 10.0 m away." in words[50.0]
+    page.run("document.querySelector('#map-3d').click()")
+    assert page.complaints() == []
 
 
 def test_keys_go_from_event_to_event(browser: Any, tmp_path: Path) -> None:
@@ -397,7 +417,7 @@ def test_skills_are_driven_by_hand(
         height = page.browser.find_element("css selector", ".skill input")
         height.clear()
         height.send_keys("4.5")
-        start = "document.querySelector('.skill .go')"
+        start = "document.querySelector('#hands form .go')"
         page.run(f"{start}.click()")
         assert page.run(f"{start}.textContent") == "press again: start takeoff"
         assert LISTENED[0].asked == []

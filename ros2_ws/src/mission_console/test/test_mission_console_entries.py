@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 from mission_console_records import HOSTILE, failing_story, tree, write_map, write_record
 
 from alula_common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
+from mission_console.areas import FENCE, areas_of
 from mission_console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
-from mission_console.entries import MAP, NODES, ROUTE, RUN, Converter
+from mission_console.entries import AREAS, MAP, NODES, ROUTE, RUN, Converter
 from mission_console.feed import CHUNK_BYTES, Feed, Place, place_of
 from mission_console.following import RunFollower
 from mission_console.journal import note
@@ -119,7 +121,7 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     writer = write_record(tmp_path, story[:3], over=False)
     (tmp_path / "run.json").write_text('{"scenario": "mapping", "world": "/a/b/yard.yaml", "run_id": "x"}', encoding="utf-8")
     first = follower.poll()
-    assert [wire[0] for wire in first] == [RUN, "/mission", TREE, NODES, EVENTS]
+    assert [wire[0] for wire in first] == [RUN, AREAS, "/mission", TREE, NODES, EVENTS]
     assert (first[0][1], first[0][2]["world"], "run_id" in first[0][2]) == (None, "yard", False)  # type: ignore[index, operator]
     assert follower.poll() == []
     writer.write(EVENTS, 1, {"kind": "x"})
@@ -159,6 +161,39 @@ def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
     follower = RunFollower(tmp_path)
     assert follower.poll() == []
     assert "is no MCAP" in follower.problems[0]
+
+
+# --- areas ---------------------------------------------------------------------------------------------------------------
+
+
+def world_file(path: Path, zones: object) -> str:
+    path.write_text(yaml.safe_dump({"name": "w", "radio_zones": zones}), encoding="utf-8")
+    return str(path)
+
+
+def test_zones_of_every_shape_and_the_fence_are_told(tmp_path: Path) -> None:
+    box = {"name": HOSTILE, "quality": "degraded", "box": {"low": [0, 0, 0], "high": [1, 2, 3]}}
+    cylinder = {"name": "mast", "quality": "good", "cylinder": {"at": [1, 2], "radius_m": 5, "z": [0, 20]}}
+    sphere = {"name": "jammer", "quality": "critical", "sphere": {"at": [4, 5, 6], "radius_m": 8}}
+    world = world_file(tmp_path / "w.yaml", [box, cylinder, sphere])
+    (tmp_path / "run.json").write_text(json.dumps({"scenario": "mapping", "world": world}), encoding="utf-8")
+    follower = RunFollower(tmp_path)
+    areas = {wire[0]: wire[2] for wire in follower.poll()}[AREAS]
+    assert areas == {"fence": FENCE, "radio": [box, cylinder, sphere]}
+    assert follower.poll() == []
+    assert areas_of("")["radio"] == areas_of("/not/here.yaml")["radio"] == []
+
+
+@pytest.mark.parametrize(
+    "zones",
+    [3, ["a"], [{}], [{"name": "a", "quality": "good"}], [{"name": "a", "quality": "good", "box": {"low": [1], "high": [1, 2, 3]}}]],
+)
+def test_zones_that_make_no_sense_are_told(tmp_path: Path, zones: object) -> None:
+    world = world_file(tmp_path / "w.yaml", zones)
+    (tmp_path / "run.json").write_text(json.dumps({"scenario": "mapping", "world": world}), encoding="utf-8")
+    follower = RunFollower(tmp_path)
+    assert [wire[0] for wire in follower.poll()] == [RUN]
+    assert follower.problems[0].startswith("run.json: ")
 
 
 # --- the page ------------------------------------------------------------------------------------------------------------

@@ -29,7 +29,7 @@ class MapView {
     new ResizeObserver(() => this.run && this.draw(this.run, this.t, true)).observe(this.canvas);
     const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
     const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
-    byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
+    byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
   }
 
   turn(view) {
@@ -74,7 +74,7 @@ class MapView {
     if (!width) return;
     const sized = this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio);
     if (sized) for (const canvas of [this.canvas, this.cloud]) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
-    const facts = [run.facts["/map"], run.facts["/world"], run.facts["/route"]];
+    const facts = [run.facts["/map"], run.facts["/world"], run.facts["/route"], run.facts["/areas"]];
     const changed = facts.some((fact, index) => fact !== this.facts?.[index]);
     if (facts[0] !== this.facts?.[0]) this.points = unpack(facts[0]);
     this.facts = facts;
@@ -96,6 +96,7 @@ class MapView {
       corners[1][axis] = Math.max(corners[1][axis], Math.ceil(value) + 1);
     });
     for (const place of this.run.facts["/route"] ?? []) stretchBy(...place);
+    for (const [ring] of (this.run.facts["/areas"]?.radio ?? []).map(rings)) for (const place of ring) stretchBy(...place);
     for (const place of this.run.path.v) stretchBy(...place);
     for (let at = 0; at < (this.points?.length ?? 0); at += 30) stretchBy(this.points[at], this.points[at + 1], this.points[at + 2]);
     if (corners[0][0] === Infinity) stretchBy(0, 0, 0);
@@ -155,6 +156,7 @@ class MapView {
       pen.lineTo(...this.project(x2, y2, z2));
     }
     pen.stroke();
+    this.areas(pen);
     this.line(pen, this.run.facts["/route"] ?? [], "--route", 1.6, [6, 5]);
     for (const place of this.run.facts["/route"] ?? []) this.dot(pen, place, "--route", 3);
   }
@@ -189,6 +191,47 @@ class MapView {
       pen.fillText(`${y} m`, ...this.project(x1, y, 0));
     }
     pen.stroke();
+  }
+
+  /** Radio zones, filled from below to above, with their names; and the fence. */
+  areas(pen) {
+    const { radio = [], fence } = this.run.facts["/areas"] ?? {};
+    this.named = [];
+    for (const zone of radio) {
+      const [colour, dashes] = RADIO[zone.quality];
+      const outlines = rings(zone);
+      pen.fillStyle = this.colour(colour);
+      pen.globalAlpha = 0.1;
+      pen.beginPath();
+      last(outlines).forEach((place, index) => pen[index ? "lineTo" : "moveTo"](...this.project(...place)));
+      pen.fill();
+      pen.globalAlpha = 1;
+      this.cage(pen, outlines, colour, dashes);
+      this.name(pen, `${zone.name}: radio ${zone.quality}`, last(outlines), colour);
+    }
+    if (fence) this.cage(pen, fence.z.map((z) => circle([0, 0], fence.radius_m, z)), "--ink", [1, 4]);
+  }
+
+  /** Rings above one another; in 3D also what joins them. */
+  cage(pen, outlines, colour, dashes) {
+    for (const ring of outlines) this.line(pen, [...ring, ring[0]], colour, 1.3, dashes);
+    if (this.view.pitch === ABOVE.pitch) return;
+    const step = Math.max(1, outlines[0].length / 4);
+    for (let at = 0; at < outlines[0].length; at += step) this.line(pen, outlines.map((ring) => ring[at]), colour, 1, dashes);
+  }
+
+  /** Writes a name at the corner of a ring that is highest on the screen, within the picture and below other names. */
+  name(pen, text, ring, colour) {
+    const [u, v] = ring.map((place) => this.project(...place)).reduce((best, pixel) => (pixel[1] < best[1] ? pixel : best));
+    pen.font = "11px system-ui, sans-serif";
+    const width = pen.measureText(text).width;
+    const x = Math.max(2, Math.min(u, this.size[0] - width - 2));
+    let y = Math.max(12, v - 4);
+    while (this.named.some((one) => Math.abs(one.y - y) < 13 && x < one.x + one.width && one.x < x + width)) y += 13;
+    this.named.push({ x, y, width });
+    [pen.strokeStyle, pen.fillStyle, pen.lineWidth] = [this.colour("--card"), this.colour(colour), 3];
+    pen.strokeText(text, x, y);
+    pen.fillText(text, x, y);
   }
 
   line(pen, places, colour, width, dashes = []) {
@@ -268,11 +311,35 @@ class MapView {
     const ahead = this.obstacle();
     const parts = [index < 0 ? "Nothing is recorded of the vehicle's place." : `Vehicle at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
     if (ahead) parts.push(`Obstacle ${Number.isFinite(ahead.distance) ? `${fixed(ahead.distance, 1)} m ` : ""}ahead (${ahead.name}).`);
+    const place = index < 0 ? null : path.v[index];
+    const { radio = [], fence } = this.run.facts["/areas"] ?? {};
+    const zone = place && radio.find((one) => holds(one, place)); // the first that is listed counts
+    if (zone) parts.push(`In the radio zone “${zone.name}”: ${zone.quality}.`);
+    if (fence) parts.push(`Fence: ${fixed(fence.radius_m, 0)} m around home${place ? `, ${fixed(fence.radius_m - Math.hypot(place[0], place[1]), 1)} m away` : ""}.`);
     if (map) parts.push(`Map: ${map.of} points, ${map.count} drawn${this.run.facts["/summary"] ? ", as it was at the end" : ""}.`);
     const text = parts.join(" ");
     setText(byId("map-words"), text);
     this.canvas.setAttribute("aria-label", `Map. ${text}`);
   }
+}
+
+const RADIO = { good: ["--good", []], degraded: ["--fair", [7, 4]], critical: ["--bad", [7, 3, 2, 3]] };
+
+const circle = ([x, y], radius, z) => Array.from({ length: 48 }, (_, index) => [x + radius * Math.cos((index * Math.PI) / 24), y + radius * Math.sin((index * Math.PI) / 24), z]);
+
+/** The outlines of a zone, from below to above. */
+function rings({ box, cylinder, sphere }) {
+  if (box) return [box.low[2], box.high[2]].map((z) => [[box.low[0], box.low[1], z], [box.high[0], box.low[1], z], [box.high[0], box.high[1], z], [box.low[0], box.high[1], z]]);
+  if (cylinder) return cylinder.z.map((z) => circle(cylinder.at, cylinder.radius_m, z));
+  return [-0.7, 0, 0.7].map((share) => circle(sphere.at, sphere.radius_m * Math.sqrt(1 - share * share), sphere.at[2] + share * sphere.radius_m));
+}
+
+/** Whether a place lies in a zone, its surface included. */
+function holds({ box, cylinder, sphere }, place) {
+  const away = (at) => Math.hypot(...at.map((value, axis) => value - place[axis]));
+  if (box) return place.every((value, axis) => box.low[axis] <= value && value <= box.high[axis]);
+  if (cylinder) return away(cylinder.at) <= cylinder.radius_m && cylinder.z[0] <= place[2] && place[2] <= cylinder.z[1];
+  return away(sphere.at) <= sphere.radius_m;
 }
 
 function unpack(map) {

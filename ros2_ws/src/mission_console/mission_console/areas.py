@@ -1,0 +1,55 @@
+"""What the map shows of the space to fly in: the world's radio zones, and the fence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from alula_common.flight_limits import FLIGHT_LIMITS
+
+QUALITIES = ("good", "degraded", "critical")
+FENCE = {"radius_m": FLIGHT_LIMITS.fence_radius_m, "z": [FLIGHT_LIMITS.fence_floor_m, FLIGHT_LIMITS.fence_height_m]}
+"""Where the guidance takes targets: an upright cylinder about home, heights above home."""
+MAX_ZONES = 100
+
+
+def areas_of(world: str) -> dict[str, Any]:
+    """Return the zones of a world file and the fence: ``{fence, radio: [{name, quality, box|cylinder|sphere}]}``; frame map, metres.
+
+    A world that is not there, as in a run that was flown elsewhere, has no zones.
+
+    Raises:
+        ValueError: the file is no world.
+        OSError: it can't be read.
+    """
+    path = Path(world)
+    return {"fence": FENCE, "radio": list(_zones(path)) if world and path.is_file() else []}
+
+
+def _zones(path: Path) -> Iterator[dict[str, Any]]:
+    try:
+        world = yaml.safe_load(path.read_text(encoding="utf-8"))
+        for zone in (world.get("radio_zones") or [])[:MAX_ZONES]:
+            quality = str(zone["quality"])
+            yield {"name": str(zone["name"]), "quality": quality if quality in QUALITIES else "critical", **_volume(zone)}
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+        raise ValueError(f"radio_zones of {path.name} can't be read: {error}") from error
+
+
+def _volume(zone: Mapping[str, Any]) -> dict[str, Any]:
+    if "box" in zone:
+        return {"box": {corner: _numbers(zone["box"][corner], 3) for corner in ("low", "high")}}
+    if "cylinder" in zone:
+        cylinder = zone["cylinder"]
+        return {"cylinder": {"at": _numbers(cylinder["at"], 2), "radius_m": float(cylinder["radius_m"]), "z": _numbers(cylinder["z"], 2)}}
+    return {"sphere": {"at": _numbers(zone["sphere"]["at"], 3), "radius_m": float(zone["sphere"]["radius_m"])}}
+
+
+def _numbers(values: Any, count: int) -> list[float]:
+    numbers = [float(value) for value in values]
+    if len(numbers) != count:
+        raise ValueError(f"{numbers} are not {count} numbers")
+    return numbers
