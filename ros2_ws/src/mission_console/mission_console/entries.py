@@ -38,20 +38,26 @@ NODES = "/nodes"
 Wire = tuple[str, float | None, object]
 """An entry as the page gets it."""
 
+Shape = tuple[int, str, str, str]
+"""Of a node of the tree: depth, kind, name, skill."""
+
 DATA_PERIOD_S = 0.2
 """Samples of one data are thinned to this."""
 
 
 def written(entry: Wire) -> str:
     """Return an entry as JSON; what JSON does not have (NaN, infinities) becomes null."""
-    return json.dumps(strict(list(entry)), allow_nan=False, separators=(",", ":"))
+    try:
+        return json.dumps(entry, allow_nan=False, separators=(",", ":"))
+    except ValueError:  # next to none has such numbers, and looking for them takes as long as writing
+        return json.dumps(strict(list(entry)), allow_nan=False, separators=(",", ":"))
 
 
 class Converter:
     """Turns the entries of a record into those of the page."""
 
     def __init__(self) -> None:
-        self._shape: list[tuple[int, str, str, str]] = []
+        self._shape: list[Shape] = []
         self._nodes: list[tuple[str, str]] = []
         self._sampled_s: dict[tuple[object, object], float] = {}
         self._start: object = None
@@ -79,8 +85,9 @@ class Converter:
         return True
 
     def _tree(self, t_s: float, view: Mapping[str, Any]) -> Iterator[Wire]:
-        rows = list(_rows(view, 0))
-        shape, nodes = [row for row, _ in rows], [node for _, node in rows]
+        shape: list[Shape] = []
+        nodes: list[tuple[str, str]] = []
+        _flatten(view, 0, shape, nodes)
         if shape != self._shape:
             self._shape, self._nodes = shape, [("INVALID", "")] * len(shape)
             yield TREE, t_s, shape
@@ -90,11 +97,16 @@ class Converter:
             yield NODES, t_s, changed
 
 
-def _rows(view: Mapping[str, Any], depth: int) -> Iterator[tuple[tuple[int, str, str, str], tuple[str, str]]]:
-    """Yield of each node, top to bottom, (depth, kind, name, skill) and (status, message)."""
-    words = {key: str(view.get(key) or "") for key in ("kind", "name", "skill", "status", "message")}
-    yield (depth, words["kind"], words["name"], words["skill"]), (words["status"] or "INVALID", words["message"])
-    children = view.get("children")
+def _flatten(view: Mapping[str, Any], depth: int, shape: list[Shape], nodes: list[tuple[str, str]]) -> None:
+    """Add of each node, top to bottom, its shape, and (status, message)."""
+    get = view.get
+    shape.append((depth, _word(get("kind")), _word(get("name")), _word(get("skill"))))
+    nodes.append((_word(get("status")) or "INVALID", _word(get("message"))))
+    children = get("children")
     for child in children if isinstance(children, list | tuple) else ():
         if isinstance(child, Mapping):
-            yield from _rows(child, depth + 1)
+            _flatten(child, depth + 1, shape, nodes)
+
+
+def _word(value: object) -> str:
+    return value if isinstance(value, str) else str(value or "")
