@@ -19,12 +19,17 @@ class ExecutionState(Enum):
     TERMINATED = "TERMINATED"
     FAILED = "FAILED"
 
-    active: bool
-    """Whether the execution has started and not ended."""
-    terminal: bool
-    """Whether nothing follows."""
+    @property
+    def terminal(self) -> bool:
+        """Tell whether nothing follows."""
+        return self._value_ not in _OPEN
 
-    def __init__(self, name: str) -> None:
-        # Attributes and no properties: each leaf of a tree asks at each tick.
-        self.active = name in {"RUNNING", "PAUSED", "INTERRUPTING"}
-        self.terminal = not (self.active or name == "REQUESTED")
+    @property
+    def active(self) -> bool:
+        """Tell whether the execution has started and not ended."""
+        return self._value_ in _ACTIVE
+
+
+# By value, whose hash is at hand: each leaf of a tree asks at each tick.
+_ACTIVE = frozenset({"RUNNING", "PAUSED", "INTERRUPTING"})
+_OPEN = _ACTIVE | {"REQUESTED"}
