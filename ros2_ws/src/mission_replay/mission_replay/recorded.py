@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from alula_common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, REPORTS, TICKS, TREE, Entry, RecordError, RecordFollower
+from run_analysis.tree import path_to
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, read_event
 
@@ -124,7 +125,7 @@ class Recorded:
                 resources[f"{entry.value['skillset']}.{entry.value['resource']}"] = str(entry.value["to_state"])
             elif entry.topic == BLACKBOARD and not passed:
                 blackboard |= entry.value
-        return Knowledge(resources, blackboard, path_to(tree, f"{decision.skillset}.{decision.skill}"))
+        return Knowledge(resources, blackboard, " > ".join(path_to(tree, f"{decision.skillset}.{decision.skill}")))
 
 
 def load(path: Path) -> Recorded:
@@ -155,22 +156,6 @@ def load(path: Path) -> Recorded:
 def event_of(entry: Entry) -> EngineEvent:
     """Return the event of an entry of ``/events``; raises ValueError."""
     return read_event(entry.value)
-
-
-def path_to(tree: Mapping[str, Any], skill: str) -> str:
-    """Return the names of the nodes from the root to the leaf of a skill that is at work or was last, empty where there is none."""
-    found: dict[str, str] = {}
-
-    def walk(node: Mapping[str, Any], names: tuple[str, ...]) -> None:
-        names = (*names, str(node.get("name", "")))
-        if node.get("skill") == skill and node.get("status") != "INVALID":
-            found.setdefault(str(node.get("status")), " > ".join(names))
-        for child in node.get("children", ()):
-            walk(child, names)
-
-    if tree:
-        walk(tree, ())
-    return found.get("RUNNING", next(iter(found.values()), ""))
 
 
 def _check(entries: Iterable[Entry]) -> None:

@@ -15,8 +15,9 @@ from typing import Any
 
 from alula_common.record import OPERATOR, TICKS, Entry
 from mission_replay.comparison import Comparison, Difference
-from mission_replay.recorded import Decision, Knowledge, Recorded, path_to
+from mission_replay.recorded import Decision, Knowledge, Recorded
 from mission_replay.vehicle import Vehicle
+from run_analysis.tree import path_to
 from skill_missions.director import Director, End, Outcome
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
@@ -227,4 +228,4 @@ class Replay:
             for resource, status in managers.engine.resources.items()
         }
         blackboard = to_plain(self.director.blackboard.values())
-        return Knowledge(resources, blackboard, path_to(self.director.view().as_dict(), skill))
+        return Knowledge(resources, blackboard, " > ".join(path_to(self.director.view().as_dict(), skill)))

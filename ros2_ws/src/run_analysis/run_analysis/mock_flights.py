@@ -10,6 +10,7 @@ from pathlib import Path
 from alula_common.faults import FaultError, FaultRequest
 from alula_common.scenarios import Scenario, ScenarioError, load_scenario
 from run_analysis.errors import AnalysisError
+from run_analysis.tree import Places, tip_of
 from skill_missions.director import End
 from skill_missions.mocked import MockedMission
 from skill_model.model import Skillset
@@ -31,6 +32,8 @@ class Flown:
     open: Sequence[str]
     faults: dict[str, float] = field(default_factory=dict)
     """When each fault came, seconds of mission clock; those that came to nothing are missing."""
+    places: Places = field(default_factory=Places)
+    """Where in the tree its executions were started."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,8 @@ class MockFlights:
         plan = plan_of(self.scenario, Route(list(self.waypoints)))
         mission = MockedMission(self.skillsets, self.behaviour, plan, faults=faults, seed=seed)
         end = mission.run()
-        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.play.faults))
+        places = Places(mission.places, tip_of(mission.director.view().as_dict()))
+        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.play.faults), places)
 
 
 def load_flights(name: str, behaviour: Sequence[Path] = ()) -> MockFlights:

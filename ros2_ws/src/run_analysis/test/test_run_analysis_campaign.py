@@ -12,6 +12,7 @@ from dataclasses import asdict
 
 import pytest
 
+from alula_common.record import read_record
 from run_analysis.campaign.__main__ import main
 from run_analysis.campaign.coverage import cover, is_troubled, processes
 from run_analysis.campaign.failures import ARROW, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
@@ -21,7 +22,11 @@ from run_analysis.campaign.table import ROWS, Table
 from run_analysis.campaign.telling import as_page, as_text
 from run_analysis.errors import AnalysisError
 from run_analysis.mock_flights import load_flights
+from run_analysis.tree import Places, places_in, tip_of
+from skill_missions.mocked import MockedMission
 from uav_missions.mock_flight import drone
+from uav_missions.plan import plan_of
+from uav_missions.route import Route
 
 DRAWN = """
 scenarios: [mapping, inspection]
@@ -103,16 +108,47 @@ def test_the_ways_to_fail_are_those_of_the_models():
     assert {"mission", "navigation", "ros_bridge", "uav_guidance"} <= set(processes())
 
 
-def test_a_failure_is_answered_by_what_the_mission_starts_next_and_one_that_nothing_hangs_on_by_nothing():
-    flights = load_flights("mapping")
-    known = ways_to_fail(flights.skillsets)
-    arrow, broken = failures_in(flights.fly(Flight(0, "mapping", 0, ("zed@30",)).requests).events, known)
-    assert (arrow.way, arrow.answered_by) == (Way(ARROW, "perception.zed_status OK -> BROKEN"), "perception.lidar_depthmap")
-    assert (broken.way, broken.answered_by) == (Way(INVARIANT, "perception.zed_depthmap zed_ok"), "perception.lidar_depthmap")
-    assert 0.0 < broken.after_s < 0.2
-    (unused,) = failures_in(flights.fly(Flight(0, "mapping", 0, ("lidar@30",)).requests).events, known)
+def failures_of(scenario, *faults):
+    flights = load_flights(scenario)
+    flown = flights.fly(Flight(0, scenario, 0, faults).requests)
+    return failures_in(flown.events, ways_to_fail(flights.skillsets), flown.places)
+
+
+def test_a_failure_is_answered_by_the_branch_of_the_tree_that_takes_over():
+    arrow, broken = failures_of("mapping", "zed@30")
+    assert (arrow.way, arrow.answered_by) == (Way(ARROW, "perception.zed_status OK -> BROKEN"), "LiDAR navigation")
+    assert (broken.way, broken.answered_by) == (Way(INVARIANT, "perception.zed_depthmap zed_ok"), "LiDAR navigation")
+    assert (broken.skill, 0.0 < broken.after_s < 0.2) == ("perception.lidar_depthmap", True)
+    *_, lost = failures_of("inspection", "radio@30")
+    assert (lost.way.name, lost.answered_by, lost.skill) == ("video.stream enough_frames", "the video was lost", "navigation.hover")
+
+
+def test_a_failure_after_which_nothing_is_started_is_answered_by_where_the_tree_ends_and_one_that_broke_nothing_by_nothing():
+    taken, *broken = failures_of("mapping", "pilot@20")
+    assert {(one.answered_by, one.skill, one.after_s) for one in (taken, *broken)} == {("given up", "no skill", None)}
+    (unused,) = failures_of("mapping", "lidar@30")
     assert (unused.way.name, unused.answered_by, unused.after_s) == ("perception.lidar_status OK -> BROKEN", "not in use", None)
     assert isinstance(unused, Failure)
+
+
+def test_a_record_tells_the_same_places_in_the_tree_as_the_flight(tmp_path):
+    flights = load_flights("mapping")
+    plan = plan_of(flights.scenario, Route(list(flights.waypoints)))
+    faults = Flight(0, "mapping", 0, ("zed@10", "lidar@25")).requests
+    mission = MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, out=tmp_path)
+    mission.run()
+    places = places_in(read_record(tmp_path))
+    assert places == Places(mission.places, tip_of(mission.director.view().as_dict()))
+    assert len(places.started) > 10
+    assert {path[0] for path in places.started.values()} == {"mapping mission"}
+
+
+def test_the_branch_that_answers_is_the_first_node_that_leads_elsewhere():
+    places = Places(
+        {"a": ("root", "fly", "zed", "leg"), "b": ("root", "fly", "lidar", "leg"), "c": ("root", "fly", "zed", "leg")}, ("root", "end")
+    )
+    assert (places.answer("a", "b"), places.answer("a", "c"), places.answer("a", None)) == ("lidar", "zed", "end")
+    assert (places.answer("a", "?"), places.answer("?", "a"), Places().answer("a", None)) == ("", "", "")
 
 
 def row(number=0, **other):
@@ -122,10 +158,10 @@ def row(number=0, **other):
 
 def test_the_coverage_counts_answers_and_keeps_the_worst():
     way, never = Way(INVARIANT, "a.b c"), Way(RESULT, "a.b BAD")
-    failure = {"kind": way.kind, "name": way.name, "at_s": 3.0, "answered_by": "a.hover", "after_s": 0.5}
+    failure = {"kind": way.kind, "name": way.name, "at_s": 3.0, "answered_by": "fall back", "skill": "a.hover", "after_s": 0.5}
     rows = [
         row(0, failures=[failure]),
-        row(1, failures=[{**failure, "after_s": 0.7}, {**failure, "answered_by": "a.land", "after_s": 0.1}], min_clearance_m=0.4),
+        row(1, failures=[{**failure, "after_s": 0.7}, {**failure, "answered_by": "come down", "after_s": 0.1}], min_clearance_m=0.4),
         row(2, died=["mission"], outcome="given_up", conforms=False),
     ]
     coverage = cover(rows, [way, never])
@@ -134,7 +170,7 @@ def test_the_coverage_counts_answers_and_keeps_the_worst():
         "kind": INVARIANT,
         "name": "a.b c",
         "times": 3,
-        "answers": {"a.hover": 2, "a.land": 1},
+        "answers": {"fall back": 2, "come down": 1},
         "outcomes": {"degraded": 3},
         "worst_recovery_s": 0.7,
         "worst_clearance_m": 0.4,
@@ -143,7 +179,7 @@ def test_the_coverage_counts_answers_and_keeps_the_worst():
     assert told["outcomes"] == {"degraded": 2, "given_up": 1}
     text, page = as_text(coverage), as_page(coverage, "a < b")
     assert "never tried (1):\n  result: a.b BAD" in text
-    assert "2 a.hover, 1 a.land" in text
+    assert "2 fall back, 1 come down" in text
     assert "<title>a &lt; b</title>" in page
     assert page.count("<tr>") == 3
 

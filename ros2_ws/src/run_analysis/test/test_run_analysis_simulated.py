@@ -42,5 +42,5 @@ def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_f
     found = (row["outcome"], row["landed"], row["collisions"], row["min_clearance_m"], row["open"], row["died"], row["conforms"])
     assert found == ("degraded", True, 0, 1.2, ["b"], ["zed_depth"], True)
     answers = {failure["name"]: failure["answered_by"] for failure in row["failures"]}
-    assert answers["perception.zed_status OK -> BROKEN"] == "perception.lidar_depthmap"
+    assert answers["perception.zed_status OK -> BROKEN"] == "LiDAR navigation"
     assert (failed["outcome"], failed["reason"], failed["events"], failed["failures"]) == ("not_started", "no free domain", 0, [])

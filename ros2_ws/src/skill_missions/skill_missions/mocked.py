@@ -8,11 +8,14 @@ from pathlib import Path
 
 from alula_common.faults import FaultRequest
 from skill_missions.director import Director, End, Outcome
+from skill_missions.leaves import SkillLeaf
 from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
 from skill_missions.skillset import MissionClient
+from skill_missions.treeview import path_of
+from skill_model.execution_state import ExecutionState
 from skill_model.model import Skillset
-from skill_runtime.core.events import EngineEvent
+from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.local import LocalWorld
 from skill_runtime.mock import Behaviour, Play, mock_world
 
@@ -52,6 +55,8 @@ class MockedMission:
         self.play: Play
         self.world, self.play = mock_world(skillsets, behaviour, seed=seed, latency_s=latency_s)
         self.events: list[EngineEvent] = []
+        self.places: dict[str, tuple[str, ...]] = {}
+        """Where in the tree each execution was started, by its id: the names of the nodes from the root down."""
         self.wall_s = 0.0
         for fault in faults:
             self.play.fail(fault)
@@ -62,6 +67,7 @@ class MockedMission:
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         clients = {skillset.name: MissionClient(self.world.client(skillset.name), self._wake, record) for skillset in skillsets}
         mission, blackboard = plan.make(clients, clock_ns, plan.parameters)
+        self._leaves = [(node, path_of(node)) for node in mission.root.iterate() if isinstance(node, SkillLeaf)]
         self.director = Director(mission, blackboard)
         self.world.on_event(self._on_event)
 
@@ -136,6 +142,8 @@ class MockedMission:
 
     def _on_event(self, _skillset: str, event: EngineEvent) -> None:
         self.events.append(event)
+        if isinstance(event, ExecutionEvent) and event.state is ExecutionState.REQUESTED:
+            self.places[event.id] = next((path for leaf, path in self._leaves if leaf.handle and leaf.handle.id == event.id), ())
         if self._record is not None:
             self._record.event(event)
         self._wake()

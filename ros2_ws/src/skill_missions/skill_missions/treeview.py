@@ -58,6 +58,12 @@ def kind_of(node: Behaviour) -> str:
     return next((kind for cls, kind in KINDS if isinstance(node, cls)), "action")
 
 
+def path_of(node: Behaviour) -> tuple[str, ...]:
+    """Return the names of the nodes from the root down to one."""
+    above = () if node.parent is None else path_of(node.parent)
+    return (*above, str(node.name))
+
+
 class _Memory:
     """What one node last was; ``left``: while it was running, by a tick that did not come to it."""
 

@@ -17,7 +17,7 @@ Row = Mapping[str, Any]
 
 @dataclass
 class Cover:
-    """What became of one way to fail. ``answers`` counts the skills that were started next; clearance is of whole flights."""
+    """What became of one way to fail. ``answers`` counts the branches that answered; clearance is of whole flights."""
 
     way: Way
     answers: Counter[str] = field(default_factory=Counter)

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from run_analysis.tree import Places
 from skill_model.conditions import NO_DATA, judge
 from skill_model.execution_state import ExecutionState as S
 from skill_model.model import Invariant, Resource, ResourceIs, Result, ResultKind, Skillset, Transition, atoms
@@ -35,13 +36,15 @@ class Failure:
 
     Attributes:
         at_s: when, seconds of mission clock.
-        answered_by: the skill that started next, ``skillset.skill``.
-        after_s: how long after the failure it ran; None: nobody answered.
+        answered_by: the branch of the tree that took over (see ``Places.answer``); the skill's name where that is not known.
+        skill: the skill that started next, ``skillset.skill``.
+        after_s: how long after the failure it ran; None: none was started.
     """
 
     way: Way
     at_s: float
     answered_by: str = NOBODY
+    skill: str = NOBODY
     after_s: float | None = None
 
 
@@ -90,11 +93,11 @@ def _arrow(skillset: str, resource: str, source: str, target: str) -> str:
 # --- in a flight --------------------------------------------------------------------------------------------------------
 
 
-def failures_in(events: Sequence[EngineEvent], known: Iterable[Way]) -> list[Failure]:
-    """Return the failures of a flight in the order of time, each with what the mission started next."""
+def failures_in(events: Sequence[EngineEvent], known: Iterable[Way], places: Places) -> list[Failure]:
+    """Return the failures of a flight in the order of time, each with the branch of the tree and the skill that followed."""
     ways = set(known)
     told = [(at, way) for at, event in enumerate(events) for way in _ways_of(event) if way in ways]
-    return [_answered(way, events, at) for at, way in told]
+    return [_answered(way, events, at, places) for at, way in told]
 
 
 def _ways_of(event: EngineEvent) -> Iterator[Way]:
@@ -107,33 +110,43 @@ def _ways_of(event: EngineEvent) -> Iterator[Way]:
         yield Way(INVARIANT, f"{event.skillset}.{event.skill} {event.result}")
 
 
-def _answered(way: Way, events: Sequence[EngineEvent], at: int) -> Failure:
+def _answered(way: Way, events: Sequence[EngineEvent], at: int, places: Places) -> Failure:
     """Return a failure with the first skill that was asked for and ran after it."""
-    begun_s = events[at].stamp_s
-    if way.kind == ARROW and not _broke_something(events, at):
-        return Failure(way, begun_s, NO_NEED)
+    begun_s, failed = events[at].stamp_s, _failed(events, at)
+    if failed is None:
+        return Failure(way, begun_s, NO_NEED, NO_NEED)
+    started = _started(events[at + 1 :])
+    branch = places.answer(failed, None if started is None else started.id)
+    if started is None:
+        return Failure(way, begun_s, branch or NOBODY)
+    skill = f"{started.skillset}.{started.skill}"
+    return Failure(way, begun_s, branch or skill, skill, started.stamp_s - begun_s)
+
+
+def _started(events: Iterable[EngineEvent]) -> ExecutionEvent | None:
+    """Return the start of the first execution that was asked for and ran."""
     requested: set[str] = set()
-    for event in events[at + 1 :]:
-        if not isinstance(event, ExecutionEvent):
-            continue
-        if event.state is S.REQUESTED:
+    for event in events:
+        if isinstance(event, ExecutionEvent) and event.state is S.REQUESTED:
             requested.add(event.id)
-        elif event.state is S.RUNNING and event.id in requested:
-            return Failure(way, begun_s, f"{event.skillset}.{event.skill}", event.stamp_s - begun_s)
-    return Failure(way, begun_s)
+        elif isinstance(event, ExecutionEvent) and event.state is S.RUNNING and event.id in requested:
+            return event
+    return None
 
 
-def _broke_something(events: Sequence[EngineEvent], at: int) -> bool:
-    """Tell whether the step of a transition ended an execution: what it breaks comes next in its skillset."""
+def _failed(events: Sequence[EngineEvent], at: int) -> str | None:
+    """Return the id of the execution that failed; of a transition, what it broke, which comes next in its skillset, None: nothing."""
     first = events[at]
+    if isinstance(first, ExecutionEvent):
+        return first.id
     for event in events[at + 1 :]:
         if event.skillset != first.skillset:
             continue
         if isinstance(event, ExecutionEvent):
-            return event.state is S.RESOURCE_INVARIANT_VIOLATED
+            return event.id if event.state is S.RESOURCE_INVARIANT_VIOLATED else None
         if event.cause == _EXTERN:
-            return False
-    return False
+            return None
+    return None
 
 
 def as_dict(failure: Failure, origin_s: float) -> Mapping[str, object]:
@@ -144,5 +157,6 @@ def as_dict(failure: Failure, origin_s: float) -> Mapping[str, object]:
         "name": failure.way.name,
         "at_s": round(failure.at_s - origin_s, 6),
         "answered_by": failure.answered_by,
+        "skill": failure.skill,
         "after_s": after_s,
     }

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from alula_common.record import RecordError, read_record
 from run_analysis.campaign.failures import Way, as_dict, failures_in, ways_to_fail
 from run_analysis.campaign.plan import SIMULATOR, Flight
 from run_analysis.conformance import Monitor
@@ -17,6 +18,7 @@ from run_analysis.errors import AnalysisError
 from run_analysis.mock_flights import MockFlights, load_flights
 from run_analysis.models import models_of
 from run_analysis.run import Run, load_run, origin_of
+from run_analysis.tree import Places, places_in
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 
 Row = dict[str, Any]
@@ -42,7 +44,7 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
     landed = _landed(flown.events)
     found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
     found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": []}
-    return _row(flight, found, flown.events, monitor, ways)
+    return _row(flight, found, flown.events, monitor, ways, flown.places)
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
@@ -61,11 +63,13 @@ def _landed(events: Sequence[EngineEvent]) -> bool | None:
     return flight_status == "ON_GROUND" or (None if taken else False)
 
 
-def _row(flight: Flight, found: Mapping[str, Any], events: Sequence[EngineEvent], monitor: Monitor, ways: Sequence[Way]) -> Row:
+def _row(
+    flight: Flight, found: Mapping[str, Any], events: Sequence[EngineEvent], monitor: Monitor, ways: Sequence[Way], places: Places
+) -> Row:
     """Return a row; ``found`` is how the flight went besides its events."""
     for event in events:
         monitor.take(event)
-    failures = failures_in(events, ways)
+    failures = failures_in(events, ways, places)
     return {
         "flight": flight.number,
         "scenario": flight.scenario,
@@ -95,14 +99,15 @@ def _simulated(flight: Flight, out: Path) -> Row:
     done = subprocess.run([*words, "--out", str(folder)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        run = load_run(folder)
-    except (OSError, ValueError, AnalysisError):
+        run, places = load_run(folder), places_in(read_record(folder))
+    except (OSError, ValueError, AnalysisError, RecordError):
         said = (done.stderr.strip() or done.stdout.strip()).splitlines()
         summary, run = {"outcome": "not_started", "reason": said[-1] if said else ""}, Run(folder, ())
+        places = Places()
     names = dict.fromkeys(event.skillset for event in run.events)
     ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
     found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
     found |= {"problems": summary.get("problems") or [], "died": [one["name"] for one in summary.get("died") or ()]}
     models = models_of(names)
-    return _row(flight, found, run.events, Monitor(models), ways_to_fail(models))
+    return _row(flight, found, run.events, Monitor(models), ways_to_fail(models), places)
