@@ -22,10 +22,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import psutil
+from radio_link.kernel import KernelError
+from radio_link.kernel import check as check_kernel
+from radio_link.kernel import remove as remove_namespaces
+from radio_link.netem import Radio
 
 from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
-from alula_common.scenarios import load_scenario, scenario_names
+from alula_common.scenarios import Scenario, load_scenario, scenario_names
 from alula_common.shared_memory import sweep_shared_memory
 from alula_common.signals import Interrupts
 from alula_flight.beside import page_beside
@@ -64,6 +68,7 @@ class Arguments(argparse.Namespace):
     console: bool
     record: str
     monitor: bool
+    netem: bool
     behaviour: list[Path]
 
 
@@ -99,6 +104,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--record", choices=["functional", "sensors"], default="functional", help="sensors: functional.bag also holds raw measurements"
     )
+    parser.add_argument(
+        "--netem", action="store_true", help="let the kernel be the radio: namespaces, tbf and netem, as root, in real time"
+    )
     parser.add_argument("--monitor", action="store_true", help="hold every event of the skillsets against the models, while it flies")
     return parser
 
@@ -113,6 +121,7 @@ def parse(arguments: list[str]) -> RunSpec:
         raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to 1000")
     check_autopilot(given)
     check_mock(given)
+    check_netem(given, scenario)
     return RunSpec(
         scenario=given.scenario,
         out_dir=str(run_folder(given.out, given.scenario)),
@@ -131,6 +140,7 @@ def parse(arguments: list[str]) -> RunSpec:
         console=given.console,
         record=given.record,
         monitor=given.monitor,
+        netem=given.netem,
         behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
     )
 
@@ -159,6 +169,20 @@ def check_mock(given: Arguments) -> None:
         raise RequestError("--console: a flight over mocks is over in a moment; look at its report.html")
     if given.mock and given.rate is not None:
         raise RequestError("--mock flies in virtual time, which no --rate limits; leave it out")
+
+
+def check_netem(given: Arguments, scenario: Scenario) -> None:
+    """Refuse a kernel's radio where there is no radio, where time is not the wall's, and where the kernel can't."""
+    if not given.netem:
+        return
+    if "radio" not in dict(scenario.faults):
+        raise RequestError(f"--netem: the scenario {given.scenario} has no radio; leave it out")
+    if given.mock or given.rate not in {None, 1.0}:
+        raise RequestError(f"--netem shapes in real time: leave out {'--mock' if given.mock else f'--rate {given.rate:g}'}")
+    try:
+        check_kernel()
+    except KernelError as error:
+        raise RequestError(f"--netem: {error}") from None
 
 
 def run_folder(wanted: Path | None, scenario: str) -> Path:
@@ -232,6 +256,8 @@ class Front:
             end_run(self._spec.run_id, patience_s=0.0 if self._interrupts.at_once else PATIENCE_S)
             supervisor.wait()
             sweep_shared_memory()
+            if self._spec.netem:
+                remove_namespaces(Radio(self._spec.radio_port))
         return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
 
     def _land(self) -> None:

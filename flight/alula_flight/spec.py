@@ -77,6 +77,7 @@ class RunSpec:
     ``record``: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
     ``console``: whether the operator's page is served beside the flight.
     ``monitor``: every event is held against the models.
+    ``netem``: the kernel is the radio.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
     """
 
@@ -98,6 +99,7 @@ class RunSpec:
     monitor: bool = False
     behaviour: tuple[str, ...] = ()
     console: bool = False
+    netem: bool = False
 
     @property
     def simulated(self) -> bool:
@@ -113,6 +115,11 @@ class RunSpec:
         """Read what `save` wrote."""
         values = json.loads(path.read_text(encoding="utf-8"))
         return cls(**{**values, "faults": tuple(values["faults"]), "behaviour": tuple(values.get("behaviour", ()))})
+
+    @property
+    def radio_port(self) -> int:
+        """Return the first of the radio's UDP ports."""
+        return RADIO_PORT + RADIO_PORTS * self.domain
 
     @property
     def process_faults(self) -> list[ProcessFault]:
@@ -140,7 +147,9 @@ class RunSpec:
         if self.imperfections != "off":
             arguments.append(f"imperfections:={self.imperfections}")
         if scenario.faults:
-            arguments += [f"radio_faults:={','.join(radio)}", f"radio_port:={RADIO_PORT + RADIO_PORTS * self.domain}"]
+            arguments += [f"radio_faults:={','.join(radio)}", f"radio_port:={self.radio_port}"]
+        if self.netem:
+            arguments.append("netem:=true")
         if self.autopilot is not None:
             vehicle = {"": "simulate:=false", "simulated": "vehicle:=ardupilot"}.get(self.sensors, f"vehicle:={self.sensors}")
             arguments += [vehicle, f"autopilot:={self.autopilot}"]

@@ -22,5 +22,6 @@ class RadioSettings:
     station_north_m: float = -2.0
     station_height_m: float = 2.0
     faults: str = ""  # as radio@40-55,control@60: seconds after lift-off
-    seed: int = 0
+    netem: bool = False  # the kernel is the radio, by network namespaces, tbf and netem, in real time; needs root
+    seed: int = 0  # of the chance of the emulation here; the kernel has its own
     log_path: str = ""  # file for a line of JSON whenever the radio changes; empty: none
