@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from alula_testing.stories import EXAMPLES
+
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -61,6 +63,17 @@ def test_skillset_with_a_syntax_error_shows_where(tmp_path: Path) -> None:
     assert f"{broken}:4:" in said
     assert "SHUT -> -> OPEN" in said
     assert "^" in said
+
+
+@pytest.mark.parametrize("world", ["virtual", "ros2", "ros1"])
+def test_a_story_of_any_model_plays_in_each_world(tmp_path: Path, world: str) -> None:
+    model = tmp_path / "lamp.rl"
+    model.write_text(EXAMPLES["ALU503"], encoding="utf-8")
+    done = alula("check", "--play", "1", "--over", world, "--json", str(model))
+    assert done.returncode == 0, done.stderr
+    played = json.loads(done.stdout)
+    assert played["agrees"]
+    assert len(played["steps"]) == 4
 
 
 def test_models_of_the_drone_have_no_errors() -> None:

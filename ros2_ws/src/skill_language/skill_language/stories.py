@@ -5,12 +5,16 @@ A step can be told (``text``), written as JSON, and played: whoever does the sam
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from types import SimpleNamespace
+from typing import Any
 
 Value = float | str | bool
 Path = tuple[str, ...]
 """The name of a data and, where its type has fields, of the field: ``("battery", "level")``."""
+Values = Mapping[Path, Value]
 
 
 class StepKind(Enum):
@@ -19,7 +23,7 @@ class StepKind(Enum):
     INITIALLY = "initially"
     EXTERN = "extern"
     OUTSIDE = "outside"
-    """An arrow that is not extern and that nothing in the model takes (see ``prove.outside``)."""
+    """An arrow that is not extern and that nothing in the model takes (see ``outside``)."""
     EVENT = "event"
     START = "start"
     RESULT = "result"
@@ -45,6 +49,11 @@ class Execution:
 
     skill: str
     number: int
+
+    @staticmethod
+    def from_json(plain: Mapping[str, Any]) -> Execution:
+        """Return the execution that a step's JSON names."""
+        return Execution(plain["skill"], plain["execution"])
 
 
 @dataclass(frozen=True)
@@ -96,6 +105,24 @@ class StoryStep:
             "loop": self.loop,
         }
 
+    @staticmethod
+    def from_json(plain: Mapping[str, Any]) -> StoryStep:
+        """Return the step that ``as_json`` was made of; its values are believed."""
+        return StoryStep(
+            StepKind(plain["kind"]),
+            plain["text"],
+            subject=tuple(plain["subject"]),
+            execution=Execution.from_json(plain) if plain["skill"] else None,
+            changes=tuple(StateChange(one["resource"], one["from"], one["to"]) for one in plain["changes"]),
+            ended=tuple(Ended(Execution.from_json(one), one["state"], one["name"]) for one in plain["ended"]),
+            refused=plain["refused"],
+            data=tuple((tuple(path.split(".")), value) for path, value in plain["data"].items()),
+            time_s=plain["time_s"],
+            states=tuple(plain["states"].items()),
+            running=tuple(Execution.from_json(one) for one in plain["running"]),
+            loop=plain["loop"],
+        )
+
 
 @dataclass(frozen=True)
 class Story:
@@ -115,3 +142,19 @@ class Story:
 
 
 NO_STORY = Story()
+
+
+def messages(values: Values) -> dict[str, object]:
+    """Return each data's value as a message: the value itself, or an object with the fields."""
+    found: dict[str, object] = {}
+    for (name, *fields), value in values.items():
+        if not fields:
+            found[name] = value
+            continue
+        message: Any = found.setdefault(name, SimpleNamespace())
+        for part in fields[:-1]:
+            if not hasattr(message, part):
+                setattr(message, part, SimpleNamespace())
+            message = getattr(message, part)
+        setattr(message, fields[-1], value)
+    return found

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from skill_language.outside import Arrow
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
 from skill_model.conditions import whatever_the_data
@@ -32,9 +33,6 @@ from skill_model.model import (
     Skillset,
     atoms,
 )
-
-Arrow = tuple[str, str, str]
-"""Resource, source and target."""
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from skill_language.errors import Severity
+from skill_language.outside import Arrow, opened, untaken
 from skill_language.prove import explicit, symbolic
-from skill_language.prove.abstract import Arrow, without_data
+from skill_language.prove.abstract import without_data
 from skill_language.prove.finding import Finding, strictly
 from skill_language.prove.limits import Deadline, OutOfTimeError
 from skill_language.prove.local import Suspect, local_checks
-from skill_language.prove.outside import opened, untaken
 from skill_model.model import Skillset
 
 MOST_SITUATIONS = 2000

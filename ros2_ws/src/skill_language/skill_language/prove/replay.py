@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from skill_language.prove import words
 from skill_language.prove.steps import Key, Move, State, World
-from skill_language.prove.witness import States, Values, Wish, Witness, data_atoms, fallen, messages
-from skill_language.stories import Ended, Execution, Path, StateChange, StepKind, StoryStep, Value
+from skill_language.prove.witness import States, Wish, Witness, data_atoms, fallen
+from skill_language.stories import Ended, Execution, Path, StateChange, StepKind, StoryStep, Value, Values, messages
 from skill_model import semantics
 from skill_model.conditions import judge
 from skill_model.deadlines import nanoseconds, waits

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 from skill_language.prove.limits import OutOfTimeError
 from skill_language.prove.solver import Solver
-from skill_language.stories import Path, Value
+from skill_language.stories import Path, Values
 from skill_model.model import DataIs, Expression, Invariant, Not, Skillset, atoms
 
 States = Mapping[str, str]
-Values = Mapping[Path, Value]
 
 
 @dataclass(frozen=True)
@@ -57,19 +54,3 @@ def path_of(atom: DataIs) -> Path:
 def fallen(invariant: Invariant) -> Expression | None:
     """Return the condition of a value that falls through the threshold of an invariant that must recover, None for others."""
     return Not(invariant.condition) if invariant.hold is not None and invariant.hold.hysteresis is not None else None
-
-
-def messages(values: Values) -> dict[str, object]:
-    """Return each data's value as a message: the value itself, or an object with the fields."""
-    found: dict[str, object] = {}
-    for (name, *fields), value in values.items():
-        if not fields:
-            found[name] = value
-            continue
-        message: Any = found.setdefault(name, SimpleNamespace())
-        for part in fields[:-1]:
-            if not hasattr(message, part):
-                setattr(message, part, SimpleNamespace())
-            message = getattr(message, part)
-        setattr(message, fields[-1], value)
-    return found

@@ -62,6 +62,10 @@ class LocalManagers:
         """Give a data a new value; raise KeyError when the model has no such data."""
         self.data.receive(name, value)
 
+    def update_data(self, name: str, value: object | None) -> None:
+        """Have conditions see a value of a data, or None: there is no fresh one any more."""
+        self._managers.update_data(name, value)
+
     def on_step(self, callback: Callable[[Sequence[EngineEvent]], None]) -> None:
         """Have ``callback(events)`` called at each step, within it: clients hear of it later."""
         self._managers.on_step.append(callback)

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from skill_language.prove.abstract import Arrow
 from skill_model.model import Effect, Resource, Skillset
+
+Arrow = tuple[str, str, str]
+"""Resource, source and target."""
 
 
 def untaken(skillset: Skillset) -> frozenset[Arrow]:
