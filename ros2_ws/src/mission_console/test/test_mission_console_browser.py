@@ -351,6 +351,21 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
     assert done == ["pause live", "resume live"]
 
 
+def test_a_sample_moves_figures_and_map_and_leaves_the_timeline_of_a_long_run(browser: Any, tmp_path: Path) -> None:
+    page = Page(browser, make_report(tmp_path))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    page.run("window.drawn = document.querySelector('#timeline svg')")
+    sample = "['/data', {}, {{skillset: 'navigation', data: 'guidance_state', value: {{position_enu_m: {{x: {}, y: 1, z: 9}}}}}}]"
+    page.run(f"alula.take([{sample.format('alula.run.end + 0.05', 61)}])")
+    page.wait("document.querySelector('#map-words').textContent.includes('east 61.0 m')")
+    assert "height9 m" in page.text("#charts figcaption")
+    assert page.run("document.querySelector('#timeline svg') === window.drawn")
+    page.run(f"alula.take([{sample.format('alula.run.end + 5', 62)}])")  # wider than a pixel or two: all is drawn to scale again
+    page.wait("document.querySelector('#map-words').textContent.includes('east 62.0 m')")
+    assert page.run("document.querySelector('#timeline svg') !== window.drawn")
+    assert page.complaints() == []
+
+
 BY_HAND = {
     "problems": [],
     "skillsets": [

@@ -24,9 +24,10 @@ class FiguresView {
       byId("charts").replaceChildren(...[...this.charts.values()].map(({ figure }) => figure));
       if (!names.length) byId("charts").append(el("p", { class: "hint" }, "The record holds no figures: a flight over mocks measures nothing."));
     }
-    if (this.count !== run.count) this.offer();
+    if (run.data.size !== this.offeredOf || this.news !== run.news) this.offer();
+    [this.offeredOf, this.news] = [run.data.size, run.news];
+    if (this.end === undefined || this.end > run.end || outgrown(run, this.end)) this.end = run.end;
     for (const [name, chart] of this.charts) this.update(name, chart);
-    this.count = run.count;
   }
 
   names() {
@@ -50,18 +51,24 @@ class FiguresView {
   /** Times and values of a figure. */
   series(name) {
     const { path, data } = this.run;
-    if (name === "height") return { t: path.t, v: path.v.map((place) => place[2]), unit: "m" };
-    if (name === "ground speed") {
-      const speed = path.v.map((place, index) => {
-        const before = Math.max(0, index - 2);
-        const dt = path.t[index] - path.t[before];
-        return dt > 0 ? Math.hypot(place[0] - path.v[before][0], place[1] - path.v[before][1]) / dt : 0;
-      });
-      return { t: path.t, v: speed, unit: "m/s" };
-    }
+    if (name === "height") return { t: path.t, v: this.grown(path).heights, unit: "m" };
+    if (name === "ground speed") return { t: path.t, v: this.grown(path).speeds, unit: "m/s" };
     const [skillset, sample, ...field] = name.split(".");
     const samples = data.get(`${skillset}.${sample}`);
     return { t: samples.t, v: samples.columns.get(field.join(".")), unit: unitOf(name) };
+  }
+
+  /** Heights and speeds of the path; each place is looked at once, as paths only grow. */
+  grown(path) {
+    if (this.known?.path !== path) this.known = { path, heights: [], speeds: [] };
+    const { heights, speeds } = this.known;
+    for (let index = heights.length; index < path.v.length; index += 1) {
+      const [place, before] = [path.v[index], Math.max(0, index - 2)];
+      const dt = path.t[index] - path.t[before];
+      heights.push(place[2]);
+      speeds.push(dt > 0 ? Math.hypot(place[0] - path.v[before][0], place[1] - path.v[before][1]) / dt : 0);
+    }
+    return this.known;
   }
 
   frame(name) {
@@ -73,13 +80,13 @@ class FiguresView {
       const share = ((event.clientX - box.left) / box.width - CHART.left / CHART.width) / (1 - CHART.left / CHART.width);
       this.choose(this.run.begin + share * (this.run.end - this.run.begin));
     });
-    return { figure, drawing, value, count: -1, cursor: svg("line", { y1: 4, y2: CHART.height - CHART.bottom, stroke: "var(--ink)", "stroke-width": 1.2 }) };
+    return { figure, drawing, value, end: null, cursor: svg("line", { y1: 4, y2: CHART.height - CHART.bottom, stroke: "var(--ink)", "stroke-width": 1.2 }) };
   }
 
   update(name, chart) {
     const { t, v, unit } = this.series(name);
-    if (chart.count !== this.run.count) this.curve(chart, t, v, unit);
-    chart.count = this.run.count;
+    if (chart.end !== this.end || chart.first !== t[0]) this.curve(chart, t, v, unit);
+    [chart.end, chart.first] = [this.end, t[0]];
     const index = indexAt(t, this.t);
     const value = index < 0 ? null : v[index];
     setText(chart.value, typeof value === "number" ? `${short(Number(fixed(value, 2)))} ${unit}` : "–");
@@ -89,7 +96,7 @@ class FiguresView {
   }
 
   x(t) {
-    const span = Math.max(this.run.end - this.run.begin, 1e-6);
+    const span = Math.max(this.end - this.run.begin, 1e-6);
     return CHART.left + ((t - this.run.begin) / span) * (CHART.width - CHART.left - 2);
   }
 
@@ -117,7 +124,7 @@ class FiguresView {
       text(CHART.left - 4, 12, tidy(high)),
       text(CHART.left - 4, CHART.height - CHART.bottom + 2, `${tidy(low)} ${unit}`),
       text(CHART.left, CHART.height - 2, seconds(this.run.begin - zero, 0), "start"),
-      text(CHART.width - 2, CHART.height - 2, seconds(this.run.end - zero, 0)),
+      text(CHART.width - 2, CHART.height - 2, seconds(this.end - zero, 0)),
       chart.cursor,
     );
   }

@@ -40,6 +40,7 @@ function newRun() {
     begin: null, // first and last moment, seconds of mission clock
     end: null,
     count: 0,
+    news: 0, // entries other than samples: what the words and the bars are made of
     facts: {}, // topic -> value, of the whole run
     mission: newTrack(),
     start: newTrack(), // [[needed, otherwise]]: what the mission needs to start, in its words; otherwise is empty where it is met
@@ -109,6 +110,7 @@ const FOLDERS = {
 /** Adds one entry to what is known. */
 function fold(run, [topic, t, value]) {
   run.count += 1;
+  if (topic !== "/data" && topic !== "/path") run.news += 1;
   if (t === null) {
     run.facts[topic] = value;
     return run;
@@ -188,6 +190,9 @@ function* leaves(value, path) {
   if (typeof value !== "object") yield [path, value];
   else for (const [name, part] of Object.entries(value)) if (name !== "header" && !/^[A-Z_]+$/.test(name)) yield* leaves(part, path ? `${path}.${name}` : name);
 }
+
+/** Whether a drawing in time that was made up to `end` has to be made again: a step of less than a pixel or two is not seen. */
+const outgrown = (run, end) => run.end - end > 0.002 * (run.end - run.begin);
 
 // --- what follows from it ------------------------------------------------------------------------------------------------
 

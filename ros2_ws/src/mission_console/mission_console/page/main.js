@@ -31,8 +31,8 @@ function show() {
 }
 
 function showStory() {
-  if (showStory.count === run.count) return;
-  showStory.count = run.count;
+  if (showStory.news === run.news) return;
+  showStory.news = run.news;
   const { text, tone, reason } = headline(run);
   setText(byId("headline"), text);
   setText(byId("reason"), reason);
@@ -86,7 +86,7 @@ function showMoments(t) {
   const body = byId("moments").querySelector("tbody");
   const first = Math.max(0, Math.min(upTo - SHOWN_MOMENTS / 2, run.moments.length - SHOWN_MOMENTS));
   const zero = origin(run);
-  const key = `${run.count} ${first} ${zero}`;
+  const key = `${run.moments.length} ${first} ${zero}`;
   if (body.shown !== key) {
     body.shown = key;
     body.replaceChildren(...run.moments.slice(first, first + SHOWN_MOMENTS).map((entry) => el("tr", { class: entry.bad ? "bad" : "", onclick: () => choose(entry.t) }, el("td", {}, el("button", { type: "button" }, seconds(entry.t - zero, 2))), el("td", {}, entry.kind), el("td", {}, entry.text))));
@@ -248,8 +248,8 @@ class Link {
 function clear() {
   Object.assign(run, newRun());
   cursor = null;
-  showStory.count = -1;
-  for (const view of views) view.count = -1;
+  showStory.news = -1;
+  for (const view of views) view.news = -1;
 }
 
 const record = byId("record").textContent.trim();

@@ -26,7 +26,10 @@ class MapView {
       this.enlarge(event.deltaY > 0 ? 0.85 : 1.18);
     }, { passive: false });
     this.canvas.addEventListener("keydown", (event) => this.key(event));
-    new ResizeObserver(() => this.run && this.draw(this.run, this.t, true)).observe(this.canvas);
+    new ResizeObserver(([{ contentRect }]) => {
+      this.size = [contentRect.width, contentRect.height];
+      if (this.run) this.draw(this.run, this.t, true);
+    }).observe(this.canvas);
     const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
     const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
     byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
@@ -70,7 +73,8 @@ class MapView {
   draw(run, t, redrawn = false) {
     [this.run, this.t] = [run, t];
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    this.size ??= [this.canvas.clientWidth, this.canvas.clientHeight]; // asking at each drawing would have the browser lay out the page each time
+    const [width, height] = this.size;
     if (!width) return;
     const sized = this.canvas.width !== Math.round(width * ratio) || this.canvas.height !== Math.round(height * ratio);
     if (sized) for (const canvas of [this.canvas, this.cloud]) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
@@ -78,8 +82,7 @@ class MapView {
     const changed = facts.some((fact, index) => fact !== this.facts?.[index]);
     if (facts[0] !== this.facts?.[0]) this.points = unpack(facts[0]);
     this.facts = facts;
-    this.size = [width, height];
-    const box = this.box();
+    const box = this.box(changed);
     if (sized || redrawn || changed || String(box) !== String(this.boxed)) {
       this.boxed = box;
       this.fit(box);
@@ -89,16 +92,21 @@ class MapView {
     this.tell();
   }
 
-  box() {
-    const corners = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  /** What is to be seen: it only grows with the path, so each place is looked at once. */
+  box(changed) {
+    const { path } = this.run;
+    if (changed || this.boxedPath !== path) [this.corners, this.boxedPath, this.boxedPlaces] = [[[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]], path, 0];
+    const { corners } = this;
     const stretchBy = (x, y, z) => [x, y, z].forEach((value, axis) => {
       corners[0][axis] = Math.min(corners[0][axis], Math.floor(value) - 1);
       corners[1][axis] = Math.max(corners[1][axis], Math.ceil(value) + 1);
     });
-    for (const place of this.run.facts["/route"] ?? []) stretchBy(...place);
-    for (const [ring] of (this.run.facts["/areas"]?.radio ?? []).map(rings)) for (const place of ring) stretchBy(...place);
-    for (const place of this.run.path.v) stretchBy(...place);
-    for (let at = 0; at < (this.points?.length ?? 0); at += 30) stretchBy(this.points[at], this.points[at + 1], this.points[at + 2]);
+    if (!this.boxedPlaces) {
+      for (const place of this.run.facts["/route"] ?? []) stretchBy(...place);
+      for (const [ring] of (this.run.facts["/areas"]?.radio ?? []).map(rings)) for (const place of ring) stretchBy(...place);
+      for (let at = 0; at < (this.points?.length ?? 0); at += 30) stretchBy(this.points[at], this.points[at + 1], this.points[at + 2]);
+    }
+    for (; this.boxedPlaces < path.v.length; this.boxedPlaces += 1) stretchBy(...path.v[this.boxedPlaces]);
     if (corners[0][0] === Infinity) stretchBy(0, 0, 0);
     return [...corners[0], ...corners[1]];
   }
@@ -260,9 +268,9 @@ class MapView {
     const { path } = this.run;
     const index = indexAt(path.t, this.t);
     pen.globalAlpha = 0.3;
-    this.line(pen, path.v, "--path", 1.5);
+    this.line(pen, thin(path.v, path.v.length), "--path", 1.5);
     pen.globalAlpha = 1;
-    this.line(pen, path.v.slice(0, index + 1), "--path", 2.6);
+    this.line(pen, thin(path.v, index + 1), "--path", 2.6);
     for (const entry of marks(this.run).filter(({ kind }) => kind === "failure")) {
       const where = indexAt(path.t, entry.t);
       if (where < 0) continue;
@@ -321,6 +329,15 @@ class MapView {
     setText(byId("map-words"), text);
     this.canvas.setAttribute("aria-label", `Map. ${text}`);
   }
+}
+
+const MAX_PLACES = 3000;
+
+/** The first places of a path, at most so many, the last one among them. */
+function thin(places, count) {
+  const step = Math.ceil(count / MAX_PLACES);
+  if (step <= 1) return places.slice(0, count);
+  return [...Array.from({ length: Math.floor(count / step) }, (_, index) => places[index * step]), places[count - 1]];
 }
 
 const RADIO = { good: ["--good", []], degraded: ["--fair", [7, 4]], critical: ["--bad", [7, 3, 2, 3]] };

@@ -11,6 +11,7 @@ class TimelineView {
   constructor(choose) {
     this.box = byId("timeline");
     this.choose = choose;
+    this.built = [0, 1]; // what is drawn
     this.window = null; // [from, to], seconds of mission clock; null: the whole run, growing
     byId("zoom-in").addEventListener("click", () => this.zoom(0.5));
     byId("zoom-out").addEventListener("click", () => this.zoom(2));
@@ -45,7 +46,7 @@ class TimelineView {
   }
 
   draw(run, t, whole = false) {
-    const stale = whole || this.count !== run.count || this.run !== run;
+    const stale = whole || this.news !== run.news || this.run !== run || outgrown(run, this.end);
     [this.run, this.t] = [run, t];
     if (stale) this.build();
     const x = this.x(t);
@@ -55,17 +56,17 @@ class TimelineView {
   }
 
   x(t) {
-    const [from, to] = this.span();
+    const [from, to] = this.built;
     return this.left + ((t - from) / (to - from)) * (this.width - this.left - 6);
   }
 
   timeAt(clientX) {
-    const [from, to] = this.span();
+    const [from, to] = this.built;
     return from + ((clientX - this.box.getBoundingClientRect().left - this.left) / (this.width - this.left - 6)) * (to - from);
   }
 
   build() {
-    this.count = this.run.count;
+    [this.news, this.end, this.built] = [this.run.news, this.run.end, this.span()];
     this.width = Math.max(this.box.clientWidth, 260);
     this.left = this.width < 560 ? 104 : 170;
     const moments = marks(this.run);

@@ -43,7 +43,10 @@ class TreeView {
       setText(parts.state, MARKS[status] ?? words(status));
       setText(parts.why, status === "INVALID" ? "" : [status === "RUNNING" && since !== null ? seconds(t - since) : "", message].filter(Boolean).join("  "));
     });
-    for (const node of tree.nodes) this.rows[node.index].hidden = !this.visible(node);
+    for (const node of tree.nodes) {
+      const hidden = !this.visible(node);
+      if (this.rows[node.index].hidden !== hidden) this.rows[node.index].hidden = hidden;
+    }
     this.box.setAttribute("aria-label", running.length ? `Behaviour tree; running: ${running.map(({ name }) => name).join(", ")}` : "Behaviour tree");
     if (this.chosen !== null) this.detail(tree.nodes[this.chosen]);
   }
