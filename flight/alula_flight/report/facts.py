@@ -20,15 +20,17 @@ class Death(TypedDict):
 class RunFacts:
     """One run. ``faults`` as on the command line (``zed@30``); ``mission_exit`` None: the mission did not end by itself.
 
-    ``mock``: flown over mocks, so there is neither a bag nor a world nor a map, and no bridge.
+    ``mock``: flown in virtual time, over mocks or from a record, so there is neither a bag nor a world nor a map, and no bridge.
+    ``replay_of``: the run whose decisions were made again. ``seed`` None: not known, of a replay.
     ``conformance``: what a monitor says of the events; None without one.
     """
 
     scenario: str
-    seed: int
+    seed: int | None
     out_dir: Path
     faults: Sequence[str]
     died: Sequence[Death]
     mission_exit: int | None
     mock: bool = False
+    replay_of: str = ""
     conformance: Mapping[str, object] | None = None

@@ -168,4 +168,6 @@ def _compare(folder: Path, account: Account, problems: Problems, *, mapped: bool
 
 def _title(facts: RunFacts) -> str:
     failing = f", failing {', '.join(facts.faults)}" if facts.faults else ""
+    if facts.replay_of:
+        return f"{facts.scenario}{failing}, replay of {facts.replay_of}"
     return f"{facts.scenario}, seed {facts.seed}{failing}{', over mocks' if facts.mock else ''}"

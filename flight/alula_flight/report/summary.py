@@ -89,7 +89,7 @@ class Summary(TypedDict):
     outcome: str | None
     reason: str | None
     landed: bool | None
-    seed: int
+    seed: int | None
     duration_s: float | None
     collisions: int | None
     min_clearance_m: float | None
@@ -124,7 +124,9 @@ def read_outcome(facts: RunFacts, problems: Problems) -> tuple[str | None, str |
             problems.note(f"mission.json names no outcome that is known: {outcome}")
             outcome = None
     if outcome == "running":
-        problems.note("the mission's process ended before the mission did")
+        problems.note(
+            "the replay stopped before the mission's end" if facts.replay_of else "the mission's process ended before the mission did"
+        )
     return outcome, reason or None
 
 

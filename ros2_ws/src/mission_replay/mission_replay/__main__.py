@@ -13,10 +13,12 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from alula_common.files import write_json, write_text
+from alula_common.faults import parse_fault
+from alula_common.files import write_text
 from alula_common.record import FILE, Entry
 from mission_replay.again import bag_of, is_perception, perceive
 from mission_replay.asked import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
+from mission_replay.kept import make_folder, make_report, same, trace_of, write_out
 from mission_replay.recorded import Recorded, ReplayError, load
 from mission_replay.replay import Replay, Result
 from mission_replay.vehicle import RecordedSkills, Vehicle
@@ -26,8 +28,6 @@ from run_analysis.run import load_run
 from skill_missions.record import MissionRecord
 from skill_model.model import Skillset
 from skill_runtime.mock import Behaviour
-from uav_missions.plan import write_route
-from uav_missions.route import Route
 
 SAME, OTHERWISE, CANNOT_REPLAY = 0, 1, 2
 
@@ -53,7 +53,7 @@ def parse(words: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--on", action="store_true", help="go on over mocks after the first difference")
     parser.add_argument("--rate", type=float, default=0.0, help="mission clock a second at most (default 0: no limit)")
-    parser.add_argument("--out", type=Path, help="folder for the replay's own record")
+    parser.add_argument("--out", type=Path, help="folder for the replay's own record, summary, pictures and report")
     parser.add_argument("--expect", type=Path, metavar="FILE", help="hold the replay against expectations; they decide how it ends")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="with --expect: write the results as JUnit XML, too")
     parser.add_argument("--json", action="store_true", help="decisions and difference as JSON, a line each")
@@ -102,25 +102,10 @@ def vehicle_at(
     return functions, entries_of(recorded, bag, functions.topics)
 
 
-def make_folder(out: Path) -> None:
-    """Make the folder of a replay; raises ReplayError where there is something in it."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()):
-            raise ReplayError(f"--out {out}: is not empty; choose another, a replay never overwrites")
-    except OSError as error:
-        raise ReplayError(f"--out {out}: {error.strerror}") from error
-
-
 def zero_of(recorded: Recorded) -> float:
     """Return what times count from: lift-off, or the record's beginning where there was none."""
     lift_off_s = recorded.mission.get("lift_off_s")
     return float(lift_off_s) if isinstance(lift_off_s, int | float) else min(entry.stamp_s for entry in recorded.entries)
-
-
-def trace_of(result: Result, zero_s: float) -> list[dict[str, object]]:
-    """Return the decisions as they are written; the same replay gives the same, byte for byte."""
-    return [{**vars(decision), "t_s": round(decision.t_s - zero_s, 6)} for decision in result.decisions]
 
 
 def verdict(recorded: Recorded, result: Result, zero_s: float) -> list[str]:
@@ -138,24 +123,6 @@ def verdict(recorded: Recorded, result: Result, zero_s: float) -> list[str]:
     return lines
 
 
-def same(recorded: Recorded, result: Result) -> bool:
-    """Tell whether all went as it did then."""
-    ended_alike = result.end is None or not recorded.outcome or result.end.outcome.value == recorded.outcome
-    return result.difference is None and ended_alike
-
-
-def write_out(out: Path, recorded: Recorded, result: Result, zero_s: float) -> None:
-    """Write what is not in the replay's own record: the trace and the verdict."""
-    write_text(out / "trace.jsonl", "".join(json.dumps(line) + "\n" for line in trace_of(result, zero_s)))
-    route = recorded.mission.get("route")
-    if isinstance(route, list):
-        write_route(out, Route([(x, y, z) for x, y, z in route]))
-    difference = None if result.difference is None else result.difference.as_dict()
-    write_json(
-        out / "replay.json", {"of": str(recorded.path), "same": same(recorded, result), "difference": difference, "notes": result.notes}
-    )
-
-
 def replay(options: argparse.Namespace) -> int:
     """Replay as asked and tell; return the exit code; raises ReplayError."""
     if options.depth == "sensors" and options.run.suffix == ".bag" and not options.run.with_name(FILE).exists():
@@ -165,7 +132,10 @@ def replay(options: argparse.Namespace) -> int:
     result = prepare(recorded, options).run()
     zero_s = zero_of(recorded)
     if options.out is not None:
-        write_out(options.out, recorded, result, zero_s)
+        requests = [parse_fault(text) for text in options.failed] if options.depth == "sensors" else []
+        write_out(options.out, recorded, result, zero_s, {one.what: zero_s + (one.begin_s or 0.0) for one in requests})
+    if options.kept:
+        make_report(options.out, recorded, options.failed)
     for line, decision in zip(trace_of(result, zero_s), result.decisions, strict=True):
         text = json.dumps(line) if options.json else f"{decision.t_s - zero_s:9.2f} s  {decision.words()}"
         sys.stdout.write(f"{text}\n")
@@ -207,7 +177,7 @@ def main(words: Sequence[str] | None = None) -> int:
     options = parse(sys.argv[1:] if words is None else words)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            options.folder = Path(folder)
+            options.folder, options.kept, options.failed = Path(folder), options.out is not None, tuple(options.fail)
             if options.expect is not None and options.out is None:  # expectations are held against a record
                 options.out = options.folder / "replay"
             return replay(options)

@@ -34,12 +34,19 @@ LIMIT_S = 3600.0
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a replay: its decisions, the first difference, and how it ended, None where it was stopped before."""
+    """What came of a replay: its decisions, the first difference, and how it ended, None where it was stopped before.
+
+    ``faults``: what failed that had not, and when; seconds of mission clock, as ``lift_off_s``, which is known with a record only.
+    """
 
     decisions: Sequence[Decision]
     difference: Difference | None
     end: End | None
     notes: Sequence[str]
+    simulated_s: float
+    wall_s: float
+    lift_off_s: float | None
+    faults: Mapping[str, float]
 
 
 class ReplayClient(MissionClient):
@@ -117,7 +124,9 @@ class Replay:
             end = self.director.end or End(Outcome.RUNNING)
             self._record.finish(end, self.director, self._world.now_s)
         notes = [*self._world.errors, *self.vehicle.stage.notes]
-        return Result(self.decisions, self._comparison.difference, self.director.end, notes)
+        wall_s, lift_off_s = time.monotonic() - begun, None if self._record is None else self._record.departure_s
+        told = (self._world.now_s, wall_s, lift_off_s, dict(self.vehicle.play.faults))
+        return Result(self.decisions, self._comparison.difference, self.director.end, notes, *told)
 
     # --- what the record says ----------------------------------------------------------------------------------------
 
