@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import shutil
@@ -47,6 +48,19 @@ def test_the_real_hooks_decide_as_they_did(name, tmp_path, capsys):
         # The same ends by the same results: hooks saw the same reports of the functional layer.
         assert mission(out)["outcome"] == mission(RECORDINGS / name)["outcome"]
     assert len(traces) == 1
+
+
+def test_replays_at_once_at_any_rate_and_under_load_are_the_same_bytes(monkeypatch, capsys):
+    pytest.importorskip("uav_msgs")
+    monkeypatch.syspath_prepend(str(RECORDINGS))
+    repeat = importlib.import_module("repeat")
+    words = [str(RECORDINGS / "mapping-zed"), "--rate", "20", "--rate", "35", "--rate", "50", "--from", "skills", "--from", "functional"]
+    assert repeat.main(words) == SAME
+    told = capsys.readouterr().out.splitlines()
+    assert [line.partition(" (")[0] for line in told] == [
+        f"mapping-zed from {depth}: 3 of 3 traces are equal" for depth in ("skills", "functional")
+    ]
+    assert all(line.endswith("3 decide as recorded") for line in told)
 
 
 @pytest.mark.parametrize("depth", ["skills", "functional"])
