@@ -79,3 +79,24 @@ def test_tcp_that_is_not_there_yet_and_goes_away():
                 wait_until(lambda mode=mode: ear.modes[-1:] == [mode], timeout_s=5.0, what="a heartbeat")
     assert ear.modes == [4, 5]
     ear.link.close()
+
+
+def test_a_message_that_can_not_be_dealt_with_does_not_end_the_link(peer):
+    heard: list[int] = []
+    connected = threading.Semaphore(0)
+
+    def take(message: object) -> None:
+        heard.append(message.custom_mode)
+        if message.custom_mode == 1:
+            raise ZeroDivisionError
+
+    link = Link(f"udpout:127.0.0.1:{peer.getsockname()[1]}", 57600, on_message=take, on_connect=connected.release)
+    link.start()
+    assert connected.acquire(timeout=5.0)
+    link.send(heartbeat_message())
+    _, address = peer.recvfrom(300)
+    # What was cut short takes its missing bytes from the one behind it; both are lost.
+    for data in (frame(AUTOPILOT, 1), frame(AUTOPILOT, 2)[:-4], frame(AUTOPILOT, 3), frame(AUTOPILOT, 4)):
+        peer.sendto(data, address)
+    wait_until(lambda: heard == [1, 4], timeout_s=5.0, what="a message behind those that raised and that were cut short")
+    link.close()

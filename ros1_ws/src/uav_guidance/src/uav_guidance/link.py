@@ -95,7 +95,13 @@ class Link:
             data = self._port.recv(4096)
             for message in (self._mav.parse_buffer(data) if data else None) or ():
                 if from_autopilot_to_us(message):
-                    self._on_message(message)
+                    self._take(message)
+
+    def _take(self, message: Any) -> None:
+        try:
+            self._on_message(message)
+        except Exception:  # one message must not end the link
+            log.exception("a message of the autopilot is left out: %s", message)
 
     @staticmethod
     def _closed() -> None:

@@ -55,8 +55,13 @@ class ObstacleWatch:
         self._last_in_way_s: float | None = None
 
     def see(self, sighting: Sighting, now_s: float) -> None:
-        """Take a sensor's verdict; one that is no newer than the last one, or of the future, is none."""
+        """Take a sensor's verdict; one that is no newer than the last one, or of the future, is none.
+
+        Something that is seen at no distance may be anywhere: the way can't be judged by that.
+        """
         last = self._heard.get(sighting.source)
+        if sighting.detected and not math.isfinite(sighting.distance_m):
+            sighting = replace(sighting, detected=False, unknown=True, distance_m=math.inf)
         if not sighting.stamp_s <= now_s + self.settings.watch_age_s:
             sighting = replace(sighting, stamp_s=-math.inf)
         if last is None or sighting.stamp_s > last.sighting.stamp_s or now_s < last.arrival_s:
@@ -72,7 +77,7 @@ class ObstacleWatch:
 
     def nearest_m(self, now_s: float) -> float:
         """Return the distance to the nearest obstacle ahead; infinite when there is none or nobody watches."""
-        return min((s.distance_m for s in self._fresh(now_s) if _seen(s)), default=math.inf)
+        return min((s.distance_m for s in self._fresh(now_s) if s.detected), default=math.inf)
 
     def unwatched(self, now_s: float) -> bool:
         """Return whether somebody has watched in this flight, and nobody who watches now can judge the way."""
@@ -80,7 +85,7 @@ class ObstacleWatch:
 
     def blocked(self, way: Way, now_s: float) -> bool:
         """Return whether to hold: something is in the way, or was until less than half a second ago, or nobody watches."""
-        if any(_seen(sighting) and self._in_way(sighting, way) for sighting in self._fresh(now_s)):
+        if any(sighting.detected and self._in_way(sighting, way) for sighting in self._fresh(now_s)):
             self._last_in_way_s = now_s
         elif self._last_in_way_s is not None and now_s - self._last_in_way_s >= self.settings.obstacle_clear_s:
             self._last_in_way_s = None
@@ -102,10 +107,6 @@ class ObstacleWatch:
             return False
         needed_m = braking_distance(way.speed_m_s, settings.max_accel_m_s2) + settings.obstacle_clearance_m
         return sighting.distance_m < max(settings.obstacle_stop_m, needed_m) and not _aside(sighting, way)
-
-
-def _seen(sighting: Sighting) -> bool:
-    return sighting.detected and not math.isnan(sighting.distance_m)
 
 
 def _aside(sighting: Sighting, way: Way) -> bool:

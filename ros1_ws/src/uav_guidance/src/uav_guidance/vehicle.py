@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
@@ -166,8 +167,19 @@ _CHANGES: dict[str, Callable[[Vehicle, Any, float], Vehicle]] = {
     "GPS_GLOBAL_ORIGIN": _global_origin,
 }
 
+_NUMBERS = {
+    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+    "ATTITUDE": ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed"),
+    "HOME_POSITION": ("x", "y", "z"),
+}
+"""The fields that are floats, and used."""
+
 
 def updated(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
-    """Return the snapshot after a MAVLink message of the autopilot; the same one if the message says nothing about it."""
+    """Return the snapshot after a MAVLink message of the autopilot; the same one if the message says nothing about it.
+
+    A message with a number that is none says nothing: an estimator that has diverged must not become a setpoint.
+    """
     change = _CHANGES.get(message.get_type())
-    return vehicle if change is None else change(vehicle, message, now_s)
+    numbers = (getattr(message, name) for name in _NUMBERS.get(message.get_type(), ()))
+    return vehicle if change is None or not all(map(math.isfinite, numbers)) else change(vehicle, message, now_s)
