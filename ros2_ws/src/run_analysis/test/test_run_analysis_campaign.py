@@ -11,6 +11,7 @@ from collections import Counter
 from dataclasses import asdict
 
 import pytest
+from run_analysis_mocks import fly_recorded
 
 from alula_common.record import read_record
 from run_analysis.campaign.__main__ import main
@@ -23,10 +24,7 @@ from run_analysis.campaign.telling import as_page, as_text
 from run_analysis.errors import AnalysisError
 from run_analysis.mock_flights import load_flights
 from run_analysis.tree import Places, places_in, tip_of
-from skill_missions.mocked import MockedMission
 from uav_missions.mock_flight import drone
-from uav_missions.plan import plan_of
-from uav_missions.route import Route
 
 DRAWN = """
 scenarios: [mapping, inspection]
@@ -132,11 +130,7 @@ def test_a_failure_after_which_nothing_is_started_is_answered_by_where_the_tree_
 
 
 def test_a_record_tells_the_same_places_in_the_tree_as_the_flight(tmp_path):
-    flights = load_flights("mapping")
-    plan = plan_of(flights.scenario, Route(list(flights.waypoints)))
-    faults = Flight(0, "mapping", 0, ("zed@10", "lidar@25")).requests
-    mission = MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, out=tmp_path)
-    mission.run()
+    mission = fly_recorded(tmp_path, "zed@10", "lidar@25")
     places = places_in(read_record(tmp_path))
     assert places == Places(mission.places, tip_of(mission.director.view().as_dict()))
     assert len(places.started) > 10

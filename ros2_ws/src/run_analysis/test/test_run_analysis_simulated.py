@@ -1,4 +1,4 @@
-"""A campaign over the simulator, with recorded flights in its place: what is asked of ``fly``, and what its folders become."""
+"""A campaign over the simulator, with a recorded flight in its place: what is asked of ``fly``, and what its folders become."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import os
 from pathlib import Path
 
 import pytest
+from run_analysis_mocks import fly_recorded
 
 from run_analysis.campaign.flying import fly
-from run_analysis.campaign.plan import SIMULATOR, Flight
+from run_analysis.campaign.plan import SIMULATOR, Flight, load_campaign
 
-ROOT = Path(os.environ["ALULA_ROOT"])
+CAMPAIGN = Path(os.environ["ALULA_ROOT"]) / "tests/campaigns/uav-simulator.yaml"
 SUMMARY = """{"outcome": "degraded", "reason": "zed", "landed": true, "collisions": 0, "min_clearance_m": 1.2, "problems": [],
  "skills": [{"id": "a", "end_s": 3.0}, {"id": "b", "end_s": null}], "died": [{"name": "zed_depth"}]}"""
 FLY = """#!/bin/sh
@@ -26,8 +27,10 @@ def recorded_flights(tmp_path, monkeypatch):
     (tmp_path / "alula").write_text(FLY, encoding="utf-8")
     (tmp_path / "alula").chmod(0o755)
     (tmp_path / "summary.json").write_text(SUMMARY, encoding="utf-8")
+    (tmp_path / "recorded").mkdir()
+    fly_recorded(tmp_path / "recorded", "zed@6")
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
-    monkeypatch.setenv("RECORDING", str(ROOT / "tests" / "recordings" / "mapping-zed"))
+    monkeypatch.setenv("RECORDING", str(tmp_path / "recorded"))
     return tmp_path
 
 
@@ -44,3 +47,10 @@ def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_f
     answers = {failure["name"]: failure["answered_by"] for failure in row["failures"]}
     assert answers["perception.zed_status OK -> BROKEN"] == "LiDAR navigation"
     assert (failed["outcome"], failed["reason"], failed["events"], failed["failures"]) == ("not_started", "no free domain", 0, [])
+
+
+def test_the_campaign_of_thirty_flights_is_of_both_scenarios_and_of_failures_that_the_simulator_has():
+    campaign = load_campaign(CAMPAIGN)
+    assert (campaign.over, campaign.at_once, len(campaign.flights)) == (SIMULATOR, 1, 30)
+    assert [flight.scenario for flight in campaign.flights].count("inspection") == 15
+    assert {len(flight.faults) for flight in campaign.flights} == {0, 1, 2}

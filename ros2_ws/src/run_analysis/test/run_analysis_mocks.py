@@ -1,0 +1,20 @@
+"""Mock flights that leave their record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from run_analysis.campaign.plan import Flight
+from run_analysis.mock_flights import load_flights
+from skill_missions.mocked import MockedMission
+from uav_missions.plan import plan_of
+from uav_missions.route import Route
+
+
+def fly_recorded(out: Path, *faults: str) -> MockedMission:
+    """Map the yard over mocks; ``out`` is the run's folder, which is there."""
+    flights = load_flights("mapping")
+    plan, requests = plan_of(flights.scenario, Route(list(flights.waypoints))), Flight(0, "mapping", 0, faults).requests
+    mission = MockedMission(flights.skillsets, flights.behaviour, plan, faults=requests, out=out)
+    mission.run()
+    return mission
