@@ -21,6 +21,7 @@ from typing import Any
 from alula_common.processes import end_run
 from alula_common.scenarios import load_scenario
 from alula_common.signals import on_end_signal
+from alula_flight.album import Album
 from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
 from alula_flight.process_faults import ProcessFaults, Started
 from alula_flight.spec import RunSpec
@@ -153,6 +154,7 @@ class Supervisor:
         on_end_signal(self._end_asked)
         rospy.init_node("alula_supervisor", disable_signals=True)
         self._clock.listen()
+        Album(Path(self._spec.out_dir)).listen()
         self._faults = ProcessFaults(self._spec.process_faults, functools.partial(process_of, launch.pm), Path(self._spec.out_dir))
         self._faults.listen()
         return launch

@@ -35,6 +35,11 @@ HEALTH = "/health"
 NODES = "/nodes"
 """Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""
 
+PICTURE = "/picture"
+"""A small picture of a camera: ``{camera, jpeg}``, base64; ``depth``: from yellow, near, to violet, 20 m and more; ``screen``: received."""
+PICTURES_FILE = "pictures.jsonl"
+"""Where a flight writes them, a line each, with ``stamp_s``."""
+
 Wire = tuple[str, float | None, object]
 """An entry as the page gets it."""
 

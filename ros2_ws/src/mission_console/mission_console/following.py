@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from alula_common.record import FILE, Entry, RecordError, RecordFollower
+from alula_common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
+from mission_console import journal
 from mission_console.areas import areas_of
 from mission_console.clouds import CloudError, packed, read_points
-from mission_console.entries import AREAS, MAP, ROUTE, RUN, SUMMARY, Converter, Wire
-from mission_console.journal import JournalFollower
+from mission_console.entries import AREAS, MAP, PICTURE, PICTURES_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
+from mission_console.lines import LinesFollower
 
 
 class RunFollower:
@@ -23,7 +24,7 @@ class RunFollower:
         self.behind = False
         self._converter = Converter()
         self._record = RecordFollower(folder / FILE)
-        self._journal = JournalFollower(folder)
+        self._lines = [LinesFollower(folder / journal.FILE, OPERATOR), LinesFollower(folder / PICTURES_FILE, PICTURE)]
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
@@ -59,7 +60,7 @@ class RunFollower:
         try:
             entries += self._record.poll(limit)
             self.behind = limit is not None and len(entries) >= limit
-            entries += self._journal.poll()
+            entries += [entry for lines in self._lines for entry in lines.poll()]
         except (RecordError, OSError) as error:
             self._note(str(error))
         if self._record.broken:

@@ -6,16 +6,19 @@ import base64
 import gzip
 import hashlib
 import html
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from alula_common.files import write_text
-from mission_console.entries import Wire, written
+from mission_console.entries import PICTURE, Wire, written
 from mission_console.following import RunFollower
 
 REPORT = "report.html"
 PARTS = Path(__file__).parent / "page"
-PROGRAM = ("dom", "fold", "story", "tree", "timeline", "map", "figures", "operator", "hands", "main")
+MAX_PICTURES = 400
+"""In a report: 3 MB of it at most."""
+PROGRAM = ("dom", "fold", "story", "tree", "timeline", "map", "figures", "pictures", "operator", "hands", "main")
 """Files of the program, in the order in which they need each other."""
 
 
@@ -48,8 +51,23 @@ def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> None
     Raises:
         OSError: it can't be written.
     """
-    entries = [*RunFollower(folder).poll(), *more]
+    entries = few_pictures([*RunFollower(folder).poll(), *more])
     write_text(folder / REPORT, make_page(title=title, entries=sorted(entries, key=lambda entry: (entry[1] is not None, entry[1] or 0.0))))
+
+
+def few_pictures(entries: list[Wire]) -> list[Wire]:
+    """Return the entries with at most so many pictures, evenly in time, that the report stays a file to send around."""
+    step = -(-sum(topic == PICTURE for topic, _, _ in entries) // MAX_PICTURES)
+    cameras: Counter[str] = Counter()
+
+    def kept(entry: Wire) -> bool:
+        if entry[0] != PICTURE or step <= 1:
+            return True
+        camera = str(entry[2].get("camera")) if isinstance(entry[2], Mapping) else ""
+        cameras[camera] += 1
+        return cameras[camera] % step == 1
+
+    return [entry for entry in entries if kept(entry)]
 
 
 def _part(name: str) -> str:

@@ -152,6 +152,39 @@ def test_the_map_shows_zones_of_the_radio_and_the_fence(browser: Any, tmp_path: 
     assert page.complaints() == []
 
 
+def test_pictures_and_the_figures_of_the_video_move_with_the_slider(browser: Any, tmp_path: Path) -> None:
+    browser.get("about:blank")
+    jpegs = browser.execute_script(
+        "return ['#300', '#0c0'].map((colour) => { const canvas = document.createElement('canvas'); const pen = canvas.getContext('2d');"
+        "pen.fillStyle = colour; pen.fillRect(0, 0, 300, 150); return canvas.toDataURL('image/jpeg').split(',')[1]; })"
+    )
+    lines = [
+        json.dumps({"stamp_s": LIFT_OFF_S + t_s, "camera": camera, "jpeg": jpeg})
+        for t_s, jpeg in zip((10.0, 20.0), jpegs, strict=True)
+        for camera in ("depth", "screen", HOSTILE)
+    ]
+    lines.append(json.dumps({"stamp_s": LIFT_OFF_S + 11, "camera": "bad", "jpeg": "x' onerror='alert(1)"}))
+    (tmp_path / "pictures.jsonl").write_text("\n".join(lines) + "\n", encoding="ascii")
+    value = {"fps": 17.0, "quality": 0.93, "bit_rate_bps": 1.2e6, "delay_s": 0.21, "loss": 0.015}
+    received = (LIFT_OFF_S + 9.0, "/data", {"skillset": "video", "data": "picture", "value": value, "stamp_s": 1.0})
+    page = Page(browser, make_report(tmp_path, sorted([*failing_story(), received], key=lambda entry: entry[0])))
+    page.wait("document.querySelectorAll('#pictures img[src]').length === 3")
+    page.choose(5.0)
+    assert page.text("#pictures figcaption b") == "no picture yet | no picture yet | no picture yet"
+    assert page.run("document.querySelectorAll('#pictures img[src]').length") == 0
+    page.choose(10.5)
+    assert page.text("#pictures figcaption b").startswith("10.0 s | 10.0 s")
+    assert "17 1/s, 0.93 SSIM, 1200 kbit/s, 0.21 s delay, 1.5 % lost" in page.text("#pictures .hint")
+    page.wait("document.querySelector('#pictures img').naturalWidth === 300")
+    early = page.run("document.querySelector('#pictures img').src")
+    page.choose(19.9)
+    assert "10.0 s, 10 s old" in page.text("#pictures figcaption b")
+    page.choose(21.0)
+    assert page.run("document.querySelector('#pictures img').src") != early
+    assert page.run("document.querySelector('#pictures img').alt").startswith("depth camera: near is yellow")
+    assert page.complaints() == []
+
+
 def test_keys_go_from_event_to_event(browser: Any, tmp_path: Path) -> None:
     from selenium.webdriver.common.keys import Keys
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import os
 import re
 from pathlib import Path
 
@@ -17,11 +18,11 @@ from mission_console_records import HOSTILE, failing_story, tree, write_map, wri
 from alula_common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
 from mission_console.areas import FENCE, areas_of
 from mission_console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
-from mission_console.entries import AREAS, MAP, NODES, ROUTE, RUN, Converter
+from mission_console.entries import AREAS, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
 from mission_console.feed import CHUNK_BYTES, Feed, Place, place_of
 from mission_console.following import RunFollower
 from mission_console.journal import note
-from mission_console.page import REPORT, make_page, write_report
+from mission_console.page import MAX_PICTURES, REPORT, make_page, write_report
 
 
 def entry(topic: str, t_s: float, value: dict[str, object]) -> Entry:
@@ -194,6 +195,36 @@ def test_zones_that_make_no_sense_are_told(tmp_path: Path, zones: object) -> Non
     follower = RunFollower(tmp_path)
     assert [wire[0] for wire in follower.poll()] == [RUN]
     assert follower.problems[0].startswith("run.json: ")
+
+
+# --- pictures ------------------------------------------------------------------------------------------------------------
+
+
+def add_pictures(folder: Path, count: int, cameras: tuple[str, ...] = ("depth", "screen")) -> None:
+    with (folder / PICTURES_FILE).open("a", encoding="ascii") as file:
+        for number in range(count):
+            for camera in cameras:
+                file.write(json.dumps({"stamp_s": number, "camera": camera, "jpeg": base64.b64encode(os.urandom(6000)).decode()}) + "\n")
+
+
+def test_pictures_are_followed_while_they_come(tmp_path: Path) -> None:
+    follower = RunFollower(tmp_path)
+    add_pictures(tmp_path, 2)
+    (tmp_path / PICTURES_FILE).open("a").write('{"stamp_s": 3, "cam')
+    assert [(wire[0], wire[1]) for wire in follower.poll()] == [(PICTURE, 0.0)] * 2 + [(PICTURE, 1.0)] * 2
+    assert follower.poll() == []
+
+
+def test_a_report_holds_some_pictures_of_each_camera_and_stays_small(tmp_path: Path) -> None:
+    add_pictures(tmp_path, 1500)
+    write_report(tmp_path, title="long")
+    page = (tmp_path / REPORT).read_text(encoding="utf-8")
+    shown = [(entry[1], entry[2]["camera"]) for entry in record_inside(page) if entry[0] == PICTURE]  # type: ignore[call-overload, index]
+    for camera in ("depth", "screen"):
+        times = [t_s for t_s, name in shown if name == camera]
+        assert 150 < len(times) <= MAX_PICTURES / 2
+        assert np.diff(times).max() == np.diff(times).min()  # type: ignore[arg-type]
+    assert len(page) < 10e6
 
 
 # --- the page ------------------------------------------------------------------------------------------------------------

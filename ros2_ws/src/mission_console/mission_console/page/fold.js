@@ -54,6 +54,7 @@ function newRun() {
     told: false, // whether the path comes from the run's other recordings
     faults: [],
     health: new Map(),
+    pictures: new Map(), // camera -> track of JPEGs, base64
     decisions: [],
     operator: [],
     moments: [], // what the list of events shows: {t, kind, text, bad}
@@ -99,6 +100,12 @@ const FOLDERS = {
       push(run.blackboard.get(name), t, value);
     }
   },
+  "/picture": (run, t, { camera, jpeg }) => {
+    if (typeof jpeg !== "string" || !/^[A-Za-z0-9+/]+=*$/.test(jpeg)) return;
+    const name = String(camera);
+    if (!run.pictures.has(name)) run.pictures.set(name, newTrack());
+    push(run.pictures.get(name), t, jpeg);
+  },
   "/decisions": (run, t, value) => run.decisions.push({ t, ...value }),
   "/operator": (run, t, value) => {
     if (value.by === "mission" && ["pause", "paused", "resume", "abort"].includes(value.command)) push(run.held, t, /^pause/.test(value.command) ? String(value.reason ?? "") : null);
@@ -107,10 +114,12 @@ const FOLDERS = {
   },
 };
 
+const SAMPLES = new Set(["/data", "/path", "/picture"]);
+
 /** Adds one entry to what is known. */
 function fold(run, [topic, t, value]) {
   run.count += 1;
-  if (topic !== "/data" && topic !== "/path") run.news += 1;
+  if (!SAMPLES.has(topic)) run.news += 1;
   if (t === null) {
     run.facts[topic] = value;
     return run;

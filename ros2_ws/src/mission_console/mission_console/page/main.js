@@ -10,7 +10,7 @@ const choose = (t) => {
   cursor = t === null || (run.end !== null && t >= run.end - 0.01) ? null : Math.max(t, run.begin ?? 0);
   draw();
 };
-const views = [new TimelineView(choose), new TreeView(choose), new MapView(), new FiguresView(choose)];
+const views = [new TimelineView(choose), new TreeView(choose), new MapView(), new PicturesView(), new FiguresView(choose)];
 
 /** Asks for a drawing with the next picture of the screen; many changes in between are one. */
 function draw() {

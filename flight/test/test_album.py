@@ -1,0 +1,81 @@
+"""Pictures of a flight: what they show, how many they are, and what is written of a camera on ROS."""
+
+from __future__ import annotations
+
+import base64
+import json
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+from alula_flight.album import CAMERAS, DEPTH_M, WIDTH_PX, Album, depth_picture, period_s, pixels_of, thumbnail
+
+
+def image(pixels: np.ndarray, encoding: str) -> SimpleNamespace:
+    return SimpleNamespace(height=pixels.shape[0], width=pixels.shape[1], encoding=encoding, data=pixels.tobytes())
+
+
+def test_near_is_bright_and_what_was_not_measured_is_black() -> None:
+    metres = np.array([[0.5, 10.0, DEPTH_M, 60.0], [np.nan, np.inf, 0.0, -1.0]], np.float32)
+    picture = depth_picture(metres)
+    bright = picture.astype(int).sum(axis=2)
+    assert bright[0, 0] > bright[0, 1] > bright[0, 2] == bright[0, 3] > 0
+    assert (bright[1] == 0).all()
+
+
+@pytest.mark.parametrize("encoding", ["rgb8", "bgr8", "mono8"])
+def test_a_thumbnail_shows_the_picture_small(encoding: str) -> None:
+    red = np.zeros((360, 640, 3), np.uint8)
+    red[..., 0 if encoding == "rgb8" else 2] = 200
+    red = red[..., 2] if encoding == "mono8" else red
+    jpeg = thumbnail(pixels_of(image(red, encoding)))
+    back = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert back.shape == (WIDTH_PX * 9 // 16, WIDTH_PX, 3)
+    expected = (200, 200, 200) if encoding == "mono8" else (0, 0, 200)
+    assert np.abs(back.reshape(-1, 3).mean(axis=0) - expected).max() < 4
+    assert len(jpeg) < 10_000
+
+
+@pytest.mark.parametrize(("encoding", "cut"), [("yuv422", 0), ("rgb8", 5), ("32FC1", 3)])
+def test_images_that_make_no_sense_are_refused(encoding: str, cut: int) -> None:
+    bad = image(np.zeros((4, 4, 3), np.uint8), encoding)
+    bad.data = bad.data[: len(bad.data) - cut]
+    with pytest.raises(ValueError, match=r"encoding|reshape|size"):
+        pixels_of(bad)
+
+
+def test_pictures_of_hours_are_not_many_more() -> None:
+    def count(duration_s: float) -> int:
+        t_s, pictures = 0.0, 0
+        while t_s < duration_s:
+            t_s, pictures = t_s + period_s(t_s), pictures + 1
+        return pictures
+
+    assert count(180.0) == 180
+    assert count(4 * 3600.0) < 1600
+
+
+def test_a_camera_is_followed_from_when_it_publishes(ros_master: str, tmp_path: Path) -> None:
+    import rospy
+    from sensor_msgs.msg import Image
+
+    Album(tmp_path).listen()
+    publisher = rospy.Publisher(CAMERAS["depth"], Image, queue_size=1)
+    metres = np.full((36, 64), 5.0, np.float32)
+    message = Image(height=36, width=64, encoding="32FC1", step=256, data=metres.tobytes())
+    path, end = tmp_path / "pictures.jsonl", time.monotonic() + 60.0
+    connected: list[int] = []
+    while (not path.exists() or path.read_text().count("\n") < 2) and time.monotonic() < end:
+        message.header.stamp = rospy.Time.now()
+        publisher.publish(message)
+        connected.append(publisher.get_num_connections())
+        rospy.sleep(0.02)
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [line["camera"] for line in lines] == ["depth"] * 2
+    assert lines[1]["stamp_s"] - lines[0]["stamp_s"] >= 0.9
+    assert base64.b64decode(lines[0]["jpeg"])[:2] == b"\xff\xd8"
+    assert 0 in connected[connected.index(1) :], "it listens for one image at a time"

@@ -1,0 +1,34 @@
+"""Files of JSON lines in a run's folder, read while they grow or afterwards."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from alula_common.record import Entry
+
+
+class LinesFollower:
+    """Reads the lines of a file as entries of a topic; each line has ``stamp_s``, seconds of mission clock."""
+
+    def __init__(self, path: Path, topic: str) -> None:
+        self._path = path
+        self._topic = topic
+        self._offset = 0
+
+    def poll(self) -> list[Entry]:
+        """Return what came since the last call; half a line waits for its other half, what makes no sense is left out."""
+        if not self._path.is_file():
+            return []
+        with self._path.open("rb") as file:
+            file.seek(self._offset)
+            whole, end, _ = file.read().rpartition(b"\n")
+        self._offset += len(whole) + len(end)
+        return [entry for line in whole.splitlines() for entry in self._entries(line)]
+
+    def _entries(self, line: bytes) -> list[Entry]:
+        try:
+            value = json.loads(line)
+            return [Entry(self._topic, round(float(value["stamp_s"]) * 1e9), value)]
+        except (ValueError, KeyError, TypeError, OverflowError):
+            return []

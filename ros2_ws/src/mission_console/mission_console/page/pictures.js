@@ -1,0 +1,55 @@
+// What the cameras showed at the moment: the depth image, and the inspection's video as it was received, with its figures.
+
+const CAMERAS = { depth: "depth camera: near is yellow, 20 m and more violet, black was not measured", screen: "the telepilot's screen: the video as it was received" };
+const SCREEN_FIGURES = [["fps", "1/s", 0], ["quality", "SSIM", 2], ["bit_rate_bps", "kbit/s", 0, 1e-3], ["delay_s", "s delay", 2], ["loss", "% lost", 1, 100]];
+const OLD_S = 3;
+
+class PicturesView {
+  constructor() {
+    this.box = byId("pictures");
+    this.figures = new Map();
+  }
+
+  draw(run, t) {
+    [this.run, this.t] = [run, t];
+    this.box.closest("section").hidden = !run.pictures.size;
+    for (const camera of run.pictures.keys()) if (!this.figures.has(camera)) this.frame(camera);
+    for (const [camera, figure] of this.figures) this.update(camera, figure);
+  }
+
+  frame(camera) {
+    const image = el("img", { alt: "", width: 512, height: 288 });
+    const [when, numbers] = [el("b", {}), el("p", { class: "hint" })];
+    this.box.append(el("figure", {}, el("figcaption", {}, el("span", {}, CAMERAS[camera] ?? camera), when), image, numbers));
+    this.figures.set(camera, { image, when, numbers, shown: null });
+  }
+
+  update(camera, figure) {
+    const track = this.run.pictures.get(camera) ?? newTrack();
+    const index = indexAt(track.t, this.t);
+    const jpeg = index < 0 ? null : track.v[index];
+    if (figure.shown !== jpeg) {
+      figure.shown = jpeg;
+      if (jpeg) figure.image.src = `data:image/jpeg;base64,${jpeg}`;
+      else figure.image.removeAttribute("src");
+    }
+    const age = index < 0 ? null : this.t - track.t[index];
+    figure.image.classList.toggle("old", age !== null && age > OLD_S);
+    const said = age === null ? "no picture yet" : `${seconds(track.t[index] - origin(this.run))}${age > OLD_S ? `, ${seconds(age, 0)} old` : ""}`;
+    setText(figure.when, said);
+    const numbers = camera === "screen" ? this.numbers() : "";
+    setText(figure.numbers, numbers);
+    figure.image.alt = `${CAMERAS[camera] ?? camera}; picture of ${said}. ${numbers}`;
+  }
+
+  /** The figures of the received video at the moment. */
+  numbers() {
+    const samples = this.run.data.get("video.picture");
+    const index = samples ? indexAt(samples.t, this.t) : -1;
+    if (index < 0) return "";
+    return SCREEN_FIGURES.flatMap(([name, unit, digits, factor = 1]) => {
+      const value = samples.columns.get(name)?.[index];
+      return typeof value === "number" ? [`${fixed(factor * value, digits)} ${unit}`] : [];
+    }).join(", ");
+  }
+}
