@@ -12,10 +12,12 @@ import pytest
 
 from alula_common.record import DECISIONS, FILE, MISSION, read_record
 from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
+from uav_missions import mapping
 
-RECORDINGS = Path(os.environ["ALULA_ROOT"]) / "tests" / "recordings"
+ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
+RECORDINGS = ALULA_ROOT / "tests" / "recordings"
 FLIGHTS = sorted(path.parent.name for path in RECORDINGS.glob("*/skills.mcap"))
-OTHERS = Path(os.environ["ALULA_ROOT"]).parent / "shared" / "data" / "bags"
+OTHERS = ALULA_ROOT.parent / "shared" / "data" / "bags"
 
 
 def decided(run: Path) -> list[tuple]:
@@ -73,6 +75,45 @@ def test_a_failure_that_was_not_flown_is_decided_as_the_one_that_was(depth, tmp_
     assert (changed["outcome"], changed["reason"].split(" (")[0]) == (then["outcome"], then["reason"].split(" (")[0])
     difference = json.loads((tmp_path / "changed/replay.json").read_text())["difference"]
     assert (difference["now"]["kind"], difference["now"]["skill"]) == ("interrupt", "goto_straight")
+
+
+WRONG_ORDER = """
+from uav_missions import mapping
+
+
+class LidarFirst(mapping.MappingMission):
+    def _map_the_area(self):
+        self._zed_navigation, self._lidar_navigation = self._lidar_navigation, self._zed_navigation
+        return super()._map_the_area()
+
+
+mapping.MappingMission = LidarFirst
+plan = mapping.plan
+"""
+
+
+@pytest.mark.parametrize("depth", ["skills", "functional"])
+def test_a_tree_with_its_branches_in_the_wrong_order_is_told(depth, tmp_path, capsys, monkeypatch):
+    pytest.importorskip("uav_msgs")
+    monkeypatch.setattr(mapping, "MappingMission", mapping.MappingMission)  # put back afterwards
+    (tmp_path / "tree.py").write_text(WRONG_ORDER)
+    assert main([str(RECORDINGS / "mapping"), "--from", depth, "--tree", str(tmp_path / "tree.py")]) == OTHERWISE
+    said = capsys.readouterr().err
+    assert "then: start perception.zed_depthmap at 2." in said
+    assert "now:  start perception.lidar_depthmap at 2." in said
+
+
+@pytest.mark.parametrize("depth", ["skills", "functional"])
+def test_a_weakened_invariant_is_told(depth, tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    text = (ALULA_ROOT / "skillsets/uav/perception.skill").read_text()
+    weak = text.replace("zed_ok: resource = (zed_status == OK)", "zed_ok: resource = (zed_status != UNKNOWN)")
+    assert weak != text
+    (tmp_path / "perception.skill").write_text(weak)
+    assert main([str(RECORDINGS / "mapping-zed"), "--from", depth, "--model", str(tmp_path / "perception.skill")]) == OTHERWISE
+    said = capsys.readouterr().err
+    assert "then: interrupt navigation.goto_straight at 6." in said
+    assert "now:  nothing" in said
 
 
 @pytest.mark.parametrize("content", [b"", b"#ROSBAG V2.0\n", b"#ROSBAG V2.0\n" + b"\xff" * 4000, "cut", None])

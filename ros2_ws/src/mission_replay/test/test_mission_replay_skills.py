@@ -148,41 +148,6 @@ def test_the_lost_radio_ends_an_inspection_as_it_does_in_flight(tmp_path):
     assert ending(tmp_path / "changed") == ending(failed)
 
 
-WRONG_ORDER = """
-from uav_missions import mapping
-
-
-class LidarFirst(mapping.MappingMission):
-    def _map_the_area(self):
-        self._zed_navigation, self._lidar_navigation = self._lidar_navigation, self._zed_navigation
-        return super()._map_the_area()
-
-
-mapping.MappingMission = LidarFirst
-plan = mapping.plan
-"""
-
-
-def test_a_tree_with_its_branches_in_the_wrong_order_is_told(nominal, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(mapping, "MappingMission", mapping.MappingMission)  # put back afterwards
-    (tmp_path / "tree.py").write_text(WRONG_ORDER)
-    assert main([str(nominal), "--tree", str(tmp_path / "tree.py")]) == OTHERWISE
-    said = capsys.readouterr().err
-    assert "then: start perception.zed_depthmap at 2." in said
-    assert "now:  start perception.lidar_depthmap at 2." in said
-
-
-def test_a_weakened_invariant_is_told(zed_dead, tmp_path, capsys):
-    text = (ALULA_ROOT / "skillsets/uav/perception.skill").read_text()
-    weak = text.replace("zed_ok: resource = (zed_status == OK)", "zed_ok: resource = (zed_status != UNKNOWN)")
-    assert weak != text
-    (tmp_path / "perception.skill").write_text(weak)
-    assert main([str(zed_dead), "--model", str(tmp_path / "perception.skill")]) == OTHERWISE
-    said = capsys.readouterr().err
-    assert "then: interrupt navigation.goto_straight" in said
-    assert "now:  nothing" in said
-
-
 def test_expectations_of_a_replay_hold_for_the_next_and_not_for_another(nominal, tmp_path, capsys):
     assert main([str(nominal), "--out", str(tmp_path / "again")]) == SAME
     capsys.readouterr()
