@@ -178,6 +178,6 @@ def _words(act: str, one: Watched, asked: Mapping[str, Any]) -> str:
     root = one.root.strip("/").replace("/", ".")
     if act == "transition":
         return f"transition {root}.{asked.get('resource')} to {asked.get('to')}"
-    texts = asked.get("texts") if act == "start" else None
-    inputs = [f"{name} {json.dumps(text) if ' ' in text else text}" for name, text in texts.items()] if isinstance(texts, dict) else []
+    texts = [(field.name, asked["texts"][field.name]) for field in _fields(one, str(asked.get("skill")))] if act == "start" else []
+    inputs = [f"{name} {json.dumps(text) if ' ' in text else text}" for name, text in texts]
     return ", ".join([f"{act} {root}.{asked.get('skill')}", *inputs])

@@ -70,6 +70,7 @@ class Console:
         self._starting = asyncio.Lock()
         self._commands = commands.Commands()
         self._by_hand: dict[Path, str] = {}
+        self._answering: set[asyncio.Task[None]] = set()
 
     @contextlib.asynccontextmanager
     async def open(self) -> Any:
@@ -235,8 +236,10 @@ class Console:
             viewer.run = str(asked["watch"])[:200]
         elif "hands" in asked:
             viewer.hands = asked["hands"] is True
-        else:
-            await self._answer_command(viewer, str(asked.get("command")), asked)
+        else:  # beside one another: a skill that is slow to answer must not keep its operator from landing
+            answering = asyncio.create_task(self._answer_command(viewer, str(asked.get("command")), asked))
+            self._answering.add(answering)
+            answering.add_done_callback(self._answering.discard)
 
     async def _answer_command(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> None:
         try:
@@ -244,7 +247,8 @@ class Console:
         except (acts.ActError, NoRunError, OSError, KeyError) as error:
             answer = f"refused: {error}"
         started = viewer.run if command == "start" else ""
-        await viewer.connection.send(json.dumps({"answer": answer, "command": command, "started": started}))
+        with contextlib.suppress(ConnectionClosed):
+            await viewer.connection.send(json.dumps({"answer": answer, "command": command, "started": started}))
 
     async def _do(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> str:
         run = self._run_of(viewer)

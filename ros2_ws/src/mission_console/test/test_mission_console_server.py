@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import threading
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from typing import Any
 
 import pytest
 from mission_console_records import failing_story, write_record
-from mission_console_serving import Bench, answer_to, heard, serve
+from mission_console_serving import WAIT_S, Bench, answer_to, heard, serve
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -103,6 +104,23 @@ def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatc
     acts_done = [json.loads(line) for line in (folder / "operator.jsonl").read_text().splitlines()]
     assert [(act["command"], act["by"]) for act in acts_done] == [("take", "two"), ("abort", "two")]
     assert acts_done[1]["stamp_s"] == pytest.approx(73.0)
+
+
+def test_an_act_that_waits_keeps_no_other_from_being_done(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, landed = make_run(), threading.Event()
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+    monkeypatch.setattr(acts, "pause", lambda _run: "paused" if landed.wait(WAIT_S) else "nothing came")
+    monkeypatch.setattr(acts, "abort", lambda _run: landed.set() or "landing")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: message.get("status", {}).get("commands") is True)
+        for command in ("pause", "abort"):
+            await viewer.send(json.dumps({"command": command, "run": "run"}))
+        answers = {(await heard(viewer, lambda message: "answer" in message))["answer"] for _ in range(2)}
+        assert answers == {"paused", "landing"}
+
+    serve(play, fixed=folder)
 
 
 def test_a_run_that_is_over_is_not_commanded(make_run: Callable[..., Path]) -> None:

@@ -4,7 +4,7 @@
 class HandsView {
   constructor(send, armed) {
     [this.send, this.armed] = [send, armed];
-    [this.root, this.skill, this.texts, this.shown] = ["", "", new Map(), null];
+    [this.root, this.skill, this.texts, this.shown, this.may] = ["", "", new Map(), null, false];
     this.box = byId("hands");
     this.box.hidden = false;
     this.box.addEventListener("toggle", () => this.look());
@@ -57,7 +57,7 @@ class HandsView {
     this.showForm(one);
     this.showResources(one);
     rewrite(this.data, (one?.data ?? []).map(({ name, value, age_s: age, stale }) => [name, value, age, stale]), ([name, value, age, stale]) => el("li", { class: stale ? "stale" : "" }, el("b", {}, name), ` ${age === null ? "" : `${seconds(age)} ago${stale ? ", stale" : ""}`}`, el("p", {}, value)));
-    this.enable(this.may);
+    this.enableButtons();
   }
 
   showSkills(one) {
@@ -148,12 +148,26 @@ class HandsView {
     });
   }
 
-  /** Switches the acts on for who commands; what a skill's state forbids stays off. */
+  /** Switches the acts on for who commands a run that is under way. */
   enable(may) {
+    if (may === this.may) return;
     this.may = may;
-    for (const button of this.resources.querySelectorAll("button")) button.disabled = !may;
+    this.draw();
+  }
+
+  /** What was known belongs to another run, or to one that is over. */
+  forget() {
+    if (!this.hands) return;
+    [this.hands, this.run] = [null, ""];
+    rewrite(this.tabs, [], () => null);
+    this.draw();
+  }
+
+  /** What a skill's state forbids stays off. */
+  enableButtons() {
+    for (const button of this.resources.querySelectorAll("button")) button.disabled = !this.may;
     if (!this.form.firstChild) return;
-    for (const button of [this.starts, this.asks]) button.disabled = !may;
-    for (const button of [this.interrupts, this.pauses, this.resumes]) button.disabled = !may || !this.running;
+    for (const button of [this.starts, this.asks]) button.disabled = !this.may;
+    for (const button of [this.interrupts, this.pauses, this.resumes]) button.disabled = !this.may || !this.running;
   }
 }

@@ -225,6 +225,7 @@ class Link {
       if (this.run && said.status.run !== this.run && !said.status.runs.includes(this.run)) this.run = "";
       this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null);
     }
+    if (said.status && (!said.status.live || this.hands.run !== said.status.run)) this.hands.forget();
     if (said.hands && said.hands.run === this.status?.run) this.hands.show(said.hands);
     this.judge();
   }
