@@ -136,7 +136,7 @@ byId("next").addEventListener("click", () => step(1));
 byId("play").addEventListener("click", play);
 byId("latest").addEventListener("click", () => choose(null));
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA|BUTTON)$/.test(event.target.tagName)) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA|BUTTON|SUMMARY|A)$/.test(event.target.tagName)) return;
   const acts = { n: () => step(1), p: () => step(-1), " ": play, Home: () => choose(run.begin), End: () => choose(null) };
   const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
   if (!act) return;
