@@ -146,9 +146,9 @@ class RecordedFunctions(Vehicle):
                 self._calls.setdefault(call.service, deque()).append(call)
         for skillset in skillsets:
             for resource in skillset.resources:
-                self.play.on_state(skillset.name, resource.name, resource.initial)
+                self.robot.on_state(skillset.name, resource.name, resource.initial)
             self._serve(skillset)
-        self.world.clock.soon(self.play.begin)
+        self.world.clock.soon(self.robot.begin)
 
     @property
     def topics(self) -> set[str]:
@@ -160,7 +160,7 @@ class RecordedFunctions(Vehicle):
         node = BagNode(self.world.clock, self._called, self._subscribers, lambda: self._silent)
         real = importlib.import_module(f"uav_skills.{name}").make_hooks(node)
         actions = importlib.import_module(f"{name}_interfaces.action")
-        mocks = self.play.hooks_of(skillset, ShadowSkill)
+        mocks = self.robot.hooks_of(skillset, ShadowSkill)
         hooks = {
             skill: SwitchedSkill(self, f"{name}.{skill}", real[skill], mock, getattr(actions, _camel(skill)).Goal)
             for skill, mock in mocks.items()
@@ -169,7 +169,7 @@ class RecordedFunctions(Vehicle):
         self._skills += hooks.values()
         managers = self.world.serve(skillset, hooks)
         managers.on_step(functools.partial(_tell_ends, hooks))
-        managers.on_step(functools.partial(follow, self.play, name))
+        managers.on_step(functools.partial(follow, self.robot, name))
         for data, (topic, _) in importlib.import_module(f"{name}_managers.model").DATA_TOPICS.items():
             self._subscribers.setdefault(topic, []).append(functools.partial(self._on_data, managers, data))
 
@@ -227,12 +227,12 @@ class RecordedFunctions(Vehicle):
         if service == ["transition"] and skillset in self.world.managers and (call["response"] or {}).get("accepted"):
             place = (skillset, str(call["request"]["resource"]))
             if not self._diverged or place not in self.caused:
-                self.play.take({place: str(call["request"]["to"])})
+                self.robot.take({place: str(call["request"]["to"])})
 
     def _on_data(self, managers: LocalManagers, data: str, message: object) -> None:
-        if self.play.holds(managers.skillset.name):
-            self.stage.mocked.add(managers.skillset.name)
-        if managers.alive and managers.skillset.name not in self.stage.mocked:
+        if self.robot.holds(managers.skillset.name):
+            self.host.mocked.add(managers.skillset.name)
+        if managers.alive and managers.skillset.name not in self.host.mocked:
             managers.publish(data, message)
 
 

@@ -123,9 +123,9 @@ class Replay:
         if self._record is not None:
             end = self.director.end or End(Outcome.RUNNING)
             self._record.finish(end, self.director, self._world.now_s)
-        notes = [*self._world.errors, *self.vehicle.stage.notes]
+        notes = [*self._world.errors, *self.vehicle.host.notes]
         wall_s, lift_off_s = time.monotonic() - begun, None if self._record is None else self._record.departure_s
-        told = (self._world.now_s, wall_s, lift_off_s, dict(self.vehicle.play.faults))
+        told = (self._world.now_s, wall_s, lift_off_s, dict(self.vehicle.robot.faults))
         return Result(self.decisions, self._comparison.difference, self.director.end, notes, *told)
 
     # --- what the record says ----------------------------------------------------------------------------------------

@@ -16,16 +16,16 @@ from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.core.execution import Execution
 from skill_runtime.handle import SkillHandle
 from skill_runtime.local import LocalWorld
-from skill_runtime.mock import NEVER, Behaviour, Choice, Ending, LocalStage, MockSkill, Play, Rule, serve_play
+from skill_runtime.mock import NEVER, Behaviour, Choice, Ending, LocalMockHost, MockRobot, MockSkill, Rule, serve_robot
 
 
 class ReplayedSkill(MockSkill):
     """The hooks of one skill: a call that was recorded is answered by the record, any other one by the mock's rules."""
 
     def __init__(
-        self, vehicle: RecordedSkills, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
+        self, vehicle: RecordedSkills, robot: MockRobot, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
     ) -> None:
-        super().__init__(play, skillset, skill, rules, chance)
+        super().__init__(robot, skillset, skill, rules, chance)
         self._vehicle = vehicle
 
     def choose(self, inputs: object) -> Choice:
@@ -56,8 +56,8 @@ class ReplayedSkill(MockSkill):
         return False if self._vehicle.stops_later(execution.id) else None
 
 
-class ReplayStage(LocalStage):
-    """The play's stage: mocks give the data of a skillset only where the record's are no longer true."""
+class ReplayHost(LocalMockHost):
+    """The mock robot's host: mocks give the data of a skillset only where the record's are no longer true."""
 
     def __init__(self, world: LocalWorld) -> None:
         super().__init__(world)
@@ -75,7 +75,7 @@ class ReplayStage(LocalStage):
 
 
 class Vehicle:
-    """What there is at every depth: a world, the mocks' play, and which execution is which of the record.
+    """What there is at every depth: a world, the mock robot, and which execution is which of the record.
 
     Args:
         behaviour: of the mocks; what it has happen by the clock is left out, as the record tells it.
@@ -84,8 +84,8 @@ class Vehicle:
 
     def __init__(self, behaviour: Behaviour, *, start_s: float) -> None:
         self.world = LocalWorld(start_s=start_s)
-        self.stage = ReplayStage(self.world)
-        self.play = Play(replace(behaviour, timeline=()), self.stage)
+        self.host = ReplayHost(self.world)
+        self.robot = MockRobot(replace(behaviour, timeline=()), self.host)
         self.handles: dict[str, SkillHandle] = {}
         self.differs: Callable[[str], None] = lambda _: None
         """Is told, in words, what was not done then, below the decisions of the tree."""
@@ -97,7 +97,7 @@ class Vehicle:
 
     def fail(self, request: FaultRequest) -> None:
         """Have a fault happen that was not recorded; raises SkillRuntimeError where there is none."""
-        self.play.fail(request)
+        self.robot.fail(request)
 
     def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
         """Take note of a request; ``then``: the same one in the record, None where there is none."""
@@ -113,7 +113,7 @@ class Vehicle:
 
     def over(self) -> None:
         """Take note that the record has no more to say."""
-        self.stage.mocked |= set(self.world.managers)
+        self.host.mocked |= set(self.world.managers)
 
 
 class RecordedSkills(Vehicle):
@@ -136,10 +136,10 @@ class RecordedSkills(Vehicle):
         self._running: dict[str, tuple[Execution, MockSkill]] = {}
         self._progress: dict[str, float] = {}
         self._passed: set[str] = set()
-        serve_play(self.world, self.play, skillsets, self._make_skill)
+        serve_robot(self.world, self.robot, skillsets, self._make_skill)
 
-    def _make_skill(self, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
-        return ReplayedSkill(self, play, skillset, skill, rules, chance)
+    def _make_skill(self, robot: MockRobot, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
+        return ReplayedSkill(self, robot, skillset, skill, rules, chance)
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
@@ -213,13 +213,13 @@ class RecordedSkills(Vehicle):
         place = (event.skillset, event.resource)
         if diverged and place in self.caused and not self._explained(event.skillset):
             return
-        self.play.take({place: event.to_state})
+        self.robot.take({place: event.to_state})
 
     def sample(self, skillset: str, data: str, value: object) -> None:
         """Have a data arrive, unless a fault that was not recorded makes it untrue."""
-        if self.play.holds(skillset):
-            self.stage.mocked.add(skillset)
-        self.stage.publish_recorded(skillset, data, value)
+        if self.robot.holds(skillset):
+            self.host.mocked.add(skillset)
+        self.host.publish_recorded(skillset, data, value)
 
     # --- inside ------------------------------------------------------------------------------------------------------
 

@@ -63,7 +63,7 @@ class MockFlights:
         mission = MockedMission(self.skillsets, self.behaviour, plan, faults=faults, seed=seed)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
-        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.play.faults), places)
+        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)
 
 
 def load_flights(name: str, behaviour: Sequence[Path] = ()) -> MockFlights:

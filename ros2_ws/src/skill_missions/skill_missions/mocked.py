@@ -17,7 +17,7 @@ from skill_model.execution_state import ExecutionState
 from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
 from skill_runtime.local import LocalWorld
-from skill_runtime.mock import Behaviour, Play, mock_world
+from skill_runtime.mock import Behaviour, MockRobot, mock_world
 
 TICK_PERIOD_S = 0.1
 LATENCY_S = 0.005
@@ -52,14 +52,14 @@ class MockedMission:
         latency_s: float = LATENCY_S,
     ) -> None:
         self.world: LocalWorld
-        self.play: Play
-        self.world, self.play = mock_world(skillsets, behaviour, seed=seed, latency_s=latency_s)
+        self.robot: MockRobot
+        self.world, self.robot = mock_world(skillsets, behaviour, seed=seed, latency_s=latency_s)
         self.events: list[EngineEvent] = []
         self.places: dict[str, tuple[str, ...]] = {}
         """Where in the tree each execution was started, by its id: the names of the nodes from the root down."""
         self.wall_s = 0.0
         for fault in faults:
-            self.play.fail(fault)
+            self.robot.fail(fault)
         self._tick_period_s = tick_period_s
         self._due = False
         self._abort_reasons: list[str] = []
@@ -107,7 +107,7 @@ class MockedMission:
     @property
     def notes(self) -> list[str]:
         """Return what went wrong in the mocks themselves."""
-        return [*self.world.errors, *self.play.stage.notes]
+        return [*self.world.errors, *self.robot.host.notes]
 
     # --- ticks -------------------------------------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ class Mocked:
     """A mocked skillset that is ready to fly, and its client."""
 
     def __init__(self, behaviour: Behaviour | None = None, *, skillset=FLYING, seed: int = 0, authority: bool = True) -> None:
-        self.world, self.play = mock_world([skillset], behaviour, seed=seed)
+        self.world, self.robot = mock_world([skillset], behaviour, seed=seed)
         self.client = self.world.client(skillset.name)
         assert self.client.wait_ready(0.0)
         if authority:
@@ -181,12 +181,12 @@ def test_who_is_stopped_half_way_leaves_the_memory_half_way(read):
     mocked = Mocked(behaviour)
     handle = mocked.client.start("takeoff", height=4.0)
     mocked.world.run_for(5.0)
-    assert mocked.play.value(Formula("at[0] + level"), {}) == 4.0
+    assert mocked.robot.value(Formula("at[0] + level"), {}) == 4.0
     handle.interrupt()
     mocked.world.run_for(5.0)
-    assert mocked.play.memory == {"at": [2.0, 5.0], "level": 2.0}
+    assert mocked.robot.memory == {"at": [2.0, 5.0], "level": 2.0}
     assert mocked.call(4.0) == (("TERMINATED", "DONE"), 10.0)
-    assert mocked.play.memory == {"at": [4.0, 10.0], "level": 3}
+    assert mocked.robot.memory == {"at": [4.0, 10.0], "level": 3}
 
 
 def test_the_timeline_counts_from_the_start_or_from_the_first_time_of_a_state(read):
@@ -203,57 +203,57 @@ def test_the_timeline_counts_from_the_start_or_from_the_first_time_of_a_state(re
     assert mocked.client.resources["sdk"] == "UNAVAILABLE"
     mocked.world.run_for(3.01)
     assert mocked.call() == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 3.0)
-    assert mocked.play.stage.notes == []
+    assert mocked.robot.host.notes == []
 
 
 def test_what_a_model_has_no_arrow_for_is_told(read):
     behaviour = read("timeline: [{after: 1, set: {flying.sdk: AVAILABLE}}, {after: 2, set: {flying.sdk: AVAILABLE}}]")
     mocked = Mocked(behaviour, authority=False)
     mocked.world.run_for(5.0)
-    assert mocked.play.stage.notes == []  # the state that it has already needs no arrow
+    assert mocked.robot.host.notes == []  # the state that it has already needs no arrow
     mocked.world.kill("flying")
-    mocked.play.take({("flying", "sdk"): "UNAVAILABLE"})
-    assert mocked.play.stage.notes == ["the mock can't have flying.sdk be UNAVAILABLE: the managers of flying are not there"]
+    mocked.robot.take({("flying", "sdk"): "UNAVAILABLE"})
+    assert mocked.robot.host.notes == ["the mock can't have flying.sdk be UNAVAILABLE: the managers of flying are not there"]
 
 
 def test_faults_wait_for_their_anchor_and_are_noticed_late(read):
     text = "faults: {pilot: {since: flying.axes USED, delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, early: {set: {flying.sdk: UNAVAILABLE}}}"
     behaviour = read(text + "\nskills: {flying.takeoff: {never: true}}")
     mocked = Mocked(behaviour)
-    mocked.play.fail(FaultRequest("pilot", begin_s=3.0))
+    mocked.robot.fail(FaultRequest("pilot", begin_s=3.0))
     mocked.world.run_for(10.0)
     assert mocked.client.resources["sdk"] == "AVAILABLE"
     assert mocked.call() == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 3.5)
-    assert mocked.play.faults == {"pilot": 13.0}
+    assert mocked.robot.faults == {"pilot": 13.0}
     mocked = Mocked(behaviour)
-    mocked.play.fail(FaultRequest("early", begin_s=2.0))
+    mocked.robot.fail(FaultRequest("early", begin_s=2.0))
     assert mocked.call() == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 2.0)
     with pytest.raises(SkillRuntimeError, match="no fault 'zed' in the behaviour; it has pilot, early"):
-        mocked.play.fail(FaultRequest("zed", begin_s=1.0))
+        mocked.robot.fail(FaultRequest("zed", begin_s=1.0))
 
 
 def test_a_fault_may_end_what_runs_of_a_skill(read):
     mocked = Mocked(read("skills: {flying.takeoff: {never: true}}", "faults: {rotor: {delay: 1, ends: {flying.takeoff: BLOCKED}}}"))
-    mocked.play.fail(FaultRequest("rotor", begin_s=3.0))
+    mocked.robot.fail(FaultRequest("rotor", begin_s=3.0))
     assert mocked.call() == (("TERMINATED", "BLOCKED"), 4.0)
     assert mocked.call(limit_s=10.0)[0][0] == "", "only what runs at that moment"
-    assert mocked.play.stage.notes == []
+    assert mocked.robot.host.notes == []
 
 
 def test_a_fault_with_an_end_gives_back_what_it_took(read):
     text = "faults: {pilot: {delay: 0.5, set: {flying.sdk: UNAVAILABLE}}, 'pilot:twice': {set: {flying.sdk: UNAVAILABLE}}}"
     mocked = Mocked(read(text))
-    mocked.play.fail(FaultRequest("pilot", "rudely", 2.0, 5.0))
+    mocked.robot.fail(FaultRequest("pilot", "rudely", 2.0, 5.0))
     mocked.world.run_for(2.6)
     assert mocked.client.resources["sdk"] == "UNAVAILABLE"
-    mocked.play.take({("flying", "sdk"): "AVAILABLE"})
+    mocked.robot.take({("flying", "sdk"): "AVAILABLE"})
     assert mocked.client.resources["sdk"] == "UNAVAILABLE", "a fault holds what it has taken"
     mocked.world.run_for(2.7)
     assert mocked.client.resources["sdk"] == "UNAVAILABLE", "its end is noticed late, too"
     mocked.world.run_for(0.3)
     assert mocked.client.resources["sdk"] == "AVAILABLE"
-    assert mocked.play.faults == {"pilot": 2.0}
-    assert mocked.play.stage.notes == []
+    assert mocked.robot.faults == {"pilot": 2.0}
+    assert mocked.robot.host.notes == []
     behaviour = read(text)
     assert behaviour.fault(FaultRequest("pilot", "twice"))[0] == "pilot:twice"
     assert behaviour.fault(FaultRequest("pilot", "once"))[0] == "pilot"

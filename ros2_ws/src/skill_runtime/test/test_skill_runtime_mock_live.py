@@ -170,7 +170,10 @@ def test_data_are_published_where_the_functional_layer_would(mock, call, tmp_pat
     ("arguments", "complaint"),
     [
         (["nowhere"], "nowhere"),
-        ([UAV, "--fail", "imu@3"], "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, radio, radio:degraded, control"),
+        (
+            [UAV, "--fail", "imu@3"],
+            "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, radio, radio:degraded, encoder, ground_station, control",
+        ),
         ([UAV, "--fail", "zed@soon"], "--fail: fault 'zed@soon': write WHAT, WHAT@SECONDS"),
         ([UAV, "--skillset", "flying"], "--skillset flying: uav has no such skillset; it has"),
         ([UAV, "--behaviour", "nowhere.yaml"], "nowhere.yaml: can't be read"),

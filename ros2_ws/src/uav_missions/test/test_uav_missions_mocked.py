@@ -150,7 +150,7 @@ def test_a_campaign_always_comes_to_an_end_and_down():
         assert mission.open_executions == [], seed
         assert set(ends(mission).values()) <= {1}, seed
         assert mission.world.errors == [], seed
-        assert mission.play.stage.notes == [], seed
+        assert mission.robot.host.notes == [], seed
     assert set(outcomes) == {Outcome.ACCOMPLISHED, Outcome.DEGRADED, Outcome.GIVEN_UP}
     assert min(outcomes.values()) > 5
 

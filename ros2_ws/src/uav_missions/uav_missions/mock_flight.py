@@ -68,7 +68,7 @@ def write_account(path: Path, mission: MockedMission, lift_off_s: float | None) 
         "wall_s": mission.wall_s,
         "factor": simulated_s / mission.wall_s,
         "lift_off_s": lift_off_s,
-        "faults": [{"sensor": name, "mode": "mock", "t_s": when_s} for name, when_s in mission.play.faults.items()],
+        "faults": [{"sensor": name, "mode": "mock", "t_s": when_s} for name, when_s in mission.robot.faults.items()],
         "notes": mission.notes,
     }
     write_json(path, content)

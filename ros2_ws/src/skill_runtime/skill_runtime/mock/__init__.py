@@ -1,13 +1,13 @@
 """Mocks: skills whose behaviour is a script, over the same managers and the same interface as the real ones."""
 
-from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, Fault, Happening, Rule, Value
+from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, MockFault, Rule, TimelineEvent, Value
 from skill_runtime.mock.errors import BehaviourError
 from skill_runtime.mock.formula import Formula, FormulaError
-from skill_runtime.mock.local_stage import LocalStage, follow, mock_world, serve_play
-from skill_runtime.mock.play import Play
+from skill_runtime.mock.host import MockHost
+from skill_runtime.mock.local_host import LocalMockHost, follow, mock_world, serve_robot
 from skill_runtime.mock.reading import load_behaviour
+from skill_runtime.mock.robot import MockRobot
 from skill_runtime.mock.skill import Choice, MockSkill
-from skill_runtime.mock.stage import Stage
 from skill_runtime.mock.starter import starter
 
 __all__ = [
@@ -18,19 +18,19 @@ __all__ = [
     "Choice",
     "DataScript",
     "Ending",
-    "Fault",
     "Formula",
     "FormulaError",
-    "Happening",
-    "LocalStage",
+    "LocalMockHost",
+    "MockFault",
+    "MockHost",
+    "MockRobot",
     "MockSkill",
-    "Play",
     "Rule",
-    "Stage",
+    "TimelineEvent",
     "Value",
     "follow",
     "load_behaviour",
     "mock_world",
-    "serve_play",
+    "serve_robot",
     "starter",
 ]

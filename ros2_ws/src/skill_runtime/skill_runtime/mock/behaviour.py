@@ -81,7 +81,7 @@ class Script:
 
 
 @dataclass(frozen=True)
-class Happening:
+class TimelineEvent:
     """Extern transitions by the clock: so many seconds after the start, or after a resource has first entered a state."""
 
     after_s: Value
@@ -91,7 +91,7 @@ class Happening:
 
 
 @dataclass(frozen=True)
-class Fault:
+class MockFault:
     """Something that a user can have fail: noticed ``delay`` seconds after it happened; its time counts from the ``anchor``.
 
     ``changes`` are what the robot does about it by itself, after it was noticed: a failsafe that lands, for instance. ``ends``: the skills
@@ -121,8 +121,8 @@ class Behaviour:
 
     memory: Mapping[str, object] = field(default_factory=dict)
     rules: Mapping[Place, tuple[Rule, ...]] = field(default_factory=dict)
-    timeline: tuple[Happening, ...] = ()
-    faults: Mapping[str, Fault] = field(default_factory=dict)
+    timeline: tuple[TimelineEvent, ...] = ()
+    faults: Mapping[str, MockFault] = field(default_factory=dict)
     data: Mapping[Place, DataScript] = field(default_factory=dict)
 
     def over(self, other: Behaviour) -> Behaviour:
@@ -136,7 +136,7 @@ class Behaviour:
             data={**other.data, **self.data},
         )
 
-    def fault(self, request: FaultRequest) -> tuple[str, Fault]:
+    def fault(self, request: FaultRequest) -> tuple[str, MockFault]:
         """Return the fault that a request means, with its name: the one for the way of failing, else the one for the thing.
 
         Raises:
@@ -160,7 +160,7 @@ class Behaviour:
             memory=self.memory,
             rules={place: tuple(map(trimmed, rules)) for place, rules in self.rules.items() if place[0] in skillsets},
             timeline=tuple(entry for entry in self.timeline if inside(entry.states, entry.anchor)),
-            faults={name: fault for name, fault in self.faults.items() if inside(fault.states, fault.anchor)},
+            faults={name: fault for name, fault in self.faults.items() if inside({**fault.states, **fault.ends}, fault.anchor)},
             data={place: script for place, script in self.data.items() if place[0] in skillsets},
         )
 

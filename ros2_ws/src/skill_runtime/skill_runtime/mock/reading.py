@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from alula_common.located_yaml import Located, choices, read_yaml
 from skill_model.model import Skill, Skillset
-from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, Fault, Happening, Place, Rule, Value
+from skill_runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, MockFault, Place, Rule, TimelineEvent, Value
 from skill_runtime.mock.errors import BehaviourError
 from skill_runtime.mock.formula import Formula, FormulaError
 
@@ -50,7 +50,7 @@ class _Reader:
         entries = {name: parts[name].entries(name) if name in parts else {} for name in ("skills", "faults", "data")}
         return Behaviour(
             rules=dict(self._skill(name, part) for name, part in entries["skills"].items()),
-            timeline=tuple(self._happening(part) for part in (parts["timeline"].elements() if "timeline" in parts else ())),
+            timeline=tuple(self._timeline_event(part) for part in (parts["timeline"].elements() if "timeline" in parts else ())),
             faults={name: self._fault(name, part) for name, part in entries["faults"].items()},
             data=dict(self._data(name, part) for name, part in entries["data"].items()),
         )
@@ -146,20 +146,20 @@ class _Reader:
         said = part.record("a change", ("after", "set"))
         return Change(self._duration(self._needed(part, said, "after"), known), self._states(self._needed(part, said, "set")))
 
-    def _happening(self, part: Located) -> Happening:
+    def _timeline_event(self, part: Located) -> TimelineEvent:
         said = part.record("an entry of the timeline", ("after", "since", "set"))
         anchor = self._anchor(said["since"]) if "since" in said else None
         after = self._duration(self._needed(part, said, "after"), self._memory)
-        return Happening(after, self._states(self._needed(part, said, "set")), anchor, part.place)
+        return TimelineEvent(after, self._states(self._needed(part, said, "set")), anchor, part.place)
 
-    def _fault(self, name: str, part: Located) -> Fault:
+    def _fault(self, name: str, part: Located) -> MockFault:
         said = part.record(f"the fault {name}", ("since", "delay", "set", "then", "ends"))
         anchor = self._anchor(said["since"]) if "since" in said else None
         delay = self._duration(said["delay"], self._memory) if "delay" in said else 0.0
         changes = tuple(self._change(change, self._memory) for change in said["then"].elements()) if "then" in said else ()
         ends = dict(self._ended(*entry) for entry in said["ends"].entries("`ends`").items()) if "ends" in said else {}
         states = {} if ends and "set" not in said else self._states(self._needed(part, said, "set"))
-        return Fault(states, delay, anchor, changes, ends, part.place)
+        return MockFault(states, delay, anchor, changes, ends, part.place)
 
     def _ended(self, name: str, part: Located) -> tuple[Place, str]:
         skillset, member = self._member(name, part, "skill")

@@ -17,8 +17,8 @@ from skill_runtime.mock.formula import FormulaError, coordinates
 
 if TYPE_CHECKING:
     from skill_runtime.core.execution import Execution
-    from skill_runtime.mock.play import Play
-    from skill_runtime.mock.stage import Appointment
+    from skill_runtime.mock.host import Appointment
+    from skill_runtime.mock.robot import MockRobot
 
 
 class MockCrashError(Exception):
@@ -54,10 +54,10 @@ class Run:
 
 
 class MockSkill(SkillHooks):
-    """One skill of the play; its hooks may be called in any thread."""
+    """One skill of a mock robot; its hooks may be called in any thread."""
 
-    def __init__(self, play: Play, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
-        self._play = play
+    def __init__(self, robot: MockRobot, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
+        self._play = robot
         self.place = skillset, skill.name
         self._inputs = [parameter.name for parameter in skill.inputs]
         self._rules = tuple(rules)
@@ -86,7 +86,7 @@ class MockSkill(SkillHooks):
         """Begin what was chosen."""
         choice = execution.inputs.choice if isinstance(execution.inputs, MockInputs) else self._unattached
         run = self._begin(execution, choice)
-        after = self._play.stage.after
+        after = self._play.host.after
         for change in choice.script.changes:
             when_s = max(0.0, self._play.number(change.after_s, run.names, self._chance))
             run.appointments.append(after(when_s, lambda states=change.states: self._play.take(states)))  # type: ignore[misc]
@@ -100,7 +100,7 @@ class MockSkill(SkillHooks):
         run = self._runs.get(execution.id)
         if run is None:
             return execution.progress
-        elapsed_s = self._play.stage.now_s - run.started_s
+        elapsed_s = self._play.host.now_s - run.started_s
         part = _part(elapsed_s, run.delay_s)
         said = run.choice.script.progress
         if isinstance(said, tuple):
@@ -127,9 +127,9 @@ class MockSkill(SkillHooks):
             execution.terminate(result, message)
 
     def move(self) -> None:
-        """Bring the memory up to date; called with the play's lock held."""
+        """Bring the memory up to date; called with the robot's lock held."""
         for run in self._runs.values():
-            self._move(run, _part(self._play.stage.now_s - run.started_s, run.delay_s))
+            self._move(run, _part(self._play.host.now_s - run.started_s, run.delay_s))
 
     def forget(self, execution_id: str) -> None:
         """Take note that somebody else has ended an execution: what it moves has got there, what was still to come does not come."""
@@ -163,12 +163,12 @@ class MockSkill(SkillHooks):
         return rule.when is None or bool(self._play.value(rule.when, names, self._chance))
 
     def _begin(self, execution: Execution, choice: Choice) -> Run:
-        play, names = self._play, self._names(execution.inputs)
-        delay_s = max(0.0, play.number(choice.script.delay, names, self._chance))
-        with play.lock:
-            targets = {name: play.value(value, names, self._chance) for name, value in choice.script.moves.items()}
-            moves = {name: (play.memory.get(name), _plain(target)) for name, target in targets.items()}
-            run = self._runs[execution.id] = Run(execution, choice, {**names, "delay": delay_s}, play.stage.now_s, delay_s, moves)
+        robot, names = self._play, self._names(execution.inputs)
+        delay_s = max(0.0, robot.number(choice.script.delay, names, self._chance))
+        with robot.lock:
+            targets = {name: robot.value(value, names, self._chance) for name, value in choice.script.moves.items()}
+            moves = {name: (robot.memory.get(name), _plain(target)) for name, target in targets.items()}
+            run = self._runs[execution.id] = Run(execution, choice, {**names, "delay": delay_s}, robot.host.now_s, delay_s, moves)
         return run
 
     def _finish(self, run: Run) -> None:

@@ -28,8 +28,8 @@ from skill_language.robot import Robot
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.managers import DataBindings
-from skill_runtime.mock import Behaviour, Play, load_behaviour, starter
-from skill_runtime.ros2.mock_stage import RosStage
+from skill_runtime.mock import Behaviour, MockRobot, load_behaviour, starter
+from skill_runtime.ros2.mock_host import RosMockHost
 from skill_runtime.ros2.node import SkillsetNode
 from skill_runtime.ros2.spin import ros2_arguments, spin_until
 
@@ -42,7 +42,7 @@ class MockRequestError(SkillRuntimeError):
 
 
 class Cast:
-    """The skillsets of a play, with what they are made of."""
+    """The skillsets of a mock robot, with what they are made of."""
 
     def __init__(self, bindings: Mapping[Skillset, DataBindings]) -> None:
         self.bindings = {skillset.name: topics for skillset, topics in bindings.items()}
@@ -51,30 +51,30 @@ class Cast:
 
 
 class MockNodes:
-    """The nodes of a play; ``spin`` serves them until it is told to stop. rclpy must be initialised."""
+    """The nodes of a mock robot; ``spin`` serves them until it is told to stop. rclpy must be initialised."""
 
     def __init__(self, cast: Cast, behaviour: Behaviour, *, seed: int = 0, faults: Sequence[FaultRequest] = ()) -> None:
         self.helper = Node("skill_mocks")
-        self.stage = RosStage(self.helper, cast.bindings)
-        self.play = Play(behaviour.of(frozenset(cast.interfaces)), self.stage, seed=seed)
+        self.host = RosMockHost(self.helper, cast.bindings)
+        self.robot = MockRobot(behaviour.of(frozenset(cast.interfaces)), self.host, seed=seed)
         for fault in faults:
-            self.play.fail(fault)
-        self.stage.watch(list(cast.interfaces), self.play.on_state)
+            self.robot.fail(fault)
+        self.host.watch(list(cast.interfaces), self.robot.on_state)
         for skillset in cast.skillsets:
             for resource in skillset.resources:
-                self.play.on_state(skillset.name, resource.name, resource.initial)
-            self.stage.nodes[skillset.name] = self._serve(cast, skillset)
-        self.stage.after(0.0, self.play.begin)
+                self.robot.on_state(skillset.name, resource.name, resource.initial)
+            self.host.nodes[skillset.name] = self._serve(cast, skillset)
+        self.host.after(0.0, self.robot.begin)
 
     def _serve(self, cast: Cast, skillset: Skillset) -> SkillsetNode:
-        hooks = self.play.hooks_of(skillset)
+        hooks = self.robot.hooks_of(skillset)
         return SkillsetNode(skillset, cast.interfaces[skillset.name], lambda _: hooks, data_bindings=cast.bindings[skillset.name])
 
     def spin(self, stop: threading.Event) -> None:
         """Serve until ``stop``, each skillset in a thread of its own; then end what runs and tell its callers."""
         executor = SingleThreadedExecutor()
         executor.add_node(self.helper)
-        threads = [threading.Thread(target=spin_until, args=(node, stop), name=name) for name, node in self.stage.nodes.items()]
+        threads = [threading.Thread(target=spin_until, args=(node, stop), name=name) for name, node in self.host.nodes.items()]
         for thread in threads:
             thread.start()
         try:
@@ -85,7 +85,7 @@ class MockNodes:
         for thread in threads:
             thread.join()
         executor.shutdown(timeout_sec=0)
-        for node in (*self.stage.nodes.values(), self.helper):
+        for node in (*self.host.nodes.values(), self.helper):
             node.destroy_node()
 
 

@@ -1,4 +1,4 @@
-"""What a play needs of the middleware that it is played on."""
+"""What a mock robot needs of the middleware that serves its skillsets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Appointment(Protocol):
         ...
 
 
-class Stage(Protocol):
+class MockHost(Protocol):
     """A clock that does jobs, and the functional layer's side of the skillsets; jobs may come from any thread."""
 
     @property

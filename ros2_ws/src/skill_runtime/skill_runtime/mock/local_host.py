@@ -1,4 +1,4 @@
-"""A play on the in-process middleware."""
+"""A mock robot on the in-process middleware."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.local import LocalWorld, Timer
 from skill_runtime.mock.behaviour import Behaviour
-from skill_runtime.mock.play import MakeSkill, Play
+from skill_runtime.mock.robot import MakeSkill, MockRobot
 from skill_runtime.mock.skill import MockSkill
 
 
-class LocalStage:
-    """The stage that a world is."""
+class LocalMockHost:
+    """A world as the host of a mock robot."""
 
     def __init__(self, world: LocalWorld) -> None:
         self._world = world
@@ -55,29 +55,29 @@ class LocalStage:
 
 def mock_world(
     skillsets: Iterable[Skillset], behaviour: Behaviour | None = None, *, seed: int = 0, start_s: float = 0.0, latency_s: float = 0.0
-) -> tuple[LocalWorld, Play]:
-    """Serve skillsets by mocks in one process; the play's clock begins with the first step of the world's."""
+) -> tuple[LocalWorld, MockRobot]:
+    """Serve skillsets by mocks in one process; the robot's time begins with the first step of the world's."""
     world = LocalWorld(start_s=start_s, latency_s=latency_s)
-    play = Play(behaviour or Behaviour(), LocalStage(world), seed=seed)
-    serve_play(world, play, skillsets)
-    return world, play
+    robot = MockRobot(behaviour or Behaviour(), LocalMockHost(world), seed=seed)
+    serve_robot(world, robot, skillsets)
+    return world, robot
 
 
-def serve_play(world: LocalWorld, play: Play, skillsets: Iterable[Skillset], make: MakeSkill = MockSkill) -> None:
-    """Serve skillsets by the mocks of a play whose stage is the world, and have it begin."""
+def serve_robot(world: LocalWorld, robot: MockRobot, skillsets: Iterable[Skillset], make: MakeSkill = MockSkill) -> None:
+    """Serve skillsets by the mocks of a robot whose host is the world, and have its timeline begin."""
     for skillset in skillsets:
         for resource in skillset.resources:
-            play.on_state(skillset.name, resource.name, resource.initial)
+            robot.on_state(skillset.name, resource.name, resource.initial)
         # At once, whatever the world's latency: the functional layer is nearer than any client.
-        world.serve(skillset, play.hooks_of(skillset, make)).on_step(functools.partial(follow, play, skillset.name))
-    world.clock.soon(play.begin)
+        world.serve(skillset, robot.hooks_of(skillset, make)).on_step(functools.partial(follow, robot, skillset.name))
+    world.clock.soon(robot.begin)
 
 
-def follow(play: Play, skillset: str, events: Sequence[EngineEvent]) -> None:
-    """Tell a play of the states that resources enter: to be called at each step."""
+def follow(robot: MockRobot, skillset: str, events: Sequence[EngineEvent]) -> None:
+    """Tell a mock robot of the states that resources enter: to be called at each step."""
     for event in events:
         if isinstance(event, TransitionEvent):
-            play.on_state(skillset, event.resource, event.to_state)
+            robot.on_state(skillset, event.resource, event.to_state)
 
 
 def _namespaces(value: object) -> object:

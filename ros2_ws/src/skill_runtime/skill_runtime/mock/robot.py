@@ -9,30 +9,30 @@ from collections.abc import Callable, Mapping, Sequence
 
 from alula_common.faults import FaultRequest
 from skill_model.model import Skill, Skillset
-from skill_runtime.mock.behaviour import Behaviour, DataScript, Fault, Place, Rule, Value
+from skill_runtime.mock.behaviour import Behaviour, DataScript, MockFault, Place, Rule, Value
 from skill_runtime.mock.formula import Formula, FormulaError
+from skill_runtime.mock.host import Job, MockHost
 from skill_runtime.mock.skill import MockSkill
-from skill_runtime.mock.stage import Job, Stage
 
-MakeSkill = Callable[["Play", str, Skill, Sequence[Rule], random.Random], MockSkill]
+MakeSkill = Callable[["MockRobot", str, Skill, Sequence[Rule], random.Random], MockSkill]
 
 
-class Play:
-    """One performance of a behaviour; the same seed makes the same one.
+class MockRobot:
+    """A robot whose skills, faults and data follow a behaviour; the same seed makes the same one.
 
     ``hooks_of`` gives the hooks for each skillset's managers; ``begin`` is to be called once all of them are there, ``on_state``
     at every state that a resource enters.
     """
 
-    def __init__(self, behaviour: Behaviour, stage: Stage, *, seed: int = 0) -> None:
+    def __init__(self, behaviour: Behaviour, host: MockHost, *, seed: int = 0) -> None:
         self.memory: dict[str, object] = dict(behaviour.memory)
         self.lock = threading.RLock()
-        self.stage = stage
+        self.host = host
         self.faults: dict[str, float] = {}
         """When which fault happened, seconds of mission clock."""
         self._behaviour = behaviour
         self._seed = seed
-        self._chance = random.Random(f"{seed} timeline")  # noqa: S311 - a play, not a secret
+        self._chance = random.Random(f"{seed} timeline")  # noqa: S311 - a mock, not a secret
         self._skills: list[MockSkill] = []
         self._resources: dict[str, tuple[str, ...]] = {}
         self._began_s = 0.0
@@ -55,10 +55,10 @@ class Play:
         return made
 
     def begin(self) -> None:
-        """Let the clock's part of the play begin."""
-        self._began_s = self.stage.now_s
-        for happening in self._behaviour.timeline:
-            self._schedule(happening.anchor, self.number(happening.after_s, {}), functools.partial(self.take, happening.states))
+        """Begin the timeline."""
+        self._began_s = self.host.now_s
+        for event in self._behaviour.timeline:
+            self._schedule(event.anchor, self.number(event.after_s, {}), functools.partial(self.take, event.states))
         for place, script in self._behaviour.data.items():
             self._do(0.0, functools.partial(self._publish, place, script))
 
@@ -81,7 +81,7 @@ class Play:
         entered = ((skillset, resource), state)
         if entered in self._entered_s:
             return
-        self._entered_s[entered] = self.stage.now_s
+        self._entered_s[entered] = self.host.now_s
         for delay_s, job in self._awaited.pop(entered, ()):
             self._do(delay_s, job)
 
@@ -95,11 +95,11 @@ class Play:
         """Have resources be in these states, as far as they are not."""
         for (skillset, resource), wanted in states.items():
             state = self._held.get((skillset, resource), wanted)
-            if self.stage.state(skillset, resource) == state:
+            if self.host.state(skillset, resource) == state:
                 continue
-            refusal = self.stage.transition(skillset, resource, state)
+            refusal = self.host.transition(skillset, resource, state)
             if refusal:
-                self.stage.note(f"the mock can't have {skillset}.{resource} be {state}: {refusal}")
+                self.host.note(f"the mock can't have {skillset}.{resource} be {state}: {refusal}")
 
     def number(self, value: Value, names: Mapping[str, object], chance: random.Random | None = None) -> float:
         """Return a value that is a number; raise FormulaError when it is none."""
@@ -130,30 +130,30 @@ class Play:
         if anchor is None:
             self._do(delay_s, job)
         elif anchor in self._entered_s:
-            self._do(self._entered_s[anchor] + delay_s - self.stage.now_s, job)
+            self._do(self._entered_s[anchor] + delay_s - self.host.now_s, job)
         else:
             self._awaited.setdefault(anchor, []).append((delay_s, job))
 
     def _do(self, delay_s: float, job: Job) -> None:
-        """Have a job done after a delay; a formula in it that has no value is told, and the play goes on."""
+        """Have a job done after a delay; a formula in it that has no value is told, and the robot goes on."""
 
         def safely() -> None:
             try:
                 job()
             except FormulaError as error:
-                self.stage.note(str(error))
+                self.host.note(str(error))
 
-        self.stage.after(max(0.0, delay_s), safely)
+        self.host.after(max(0.0, delay_s), safely)
 
-    def _break(self, name: str, fault: Fault) -> None:
-        self.faults.setdefault(name, self.stage.now_s)
+    def _break(self, name: str, fault: MockFault) -> None:
+        self.faults.setdefault(name, self.host.now_s)
         self._do(self.number(fault.delay, {}), lambda: self._hold(name, fault))
 
-    def _mend(self, name: str, fault: Fault) -> None:
+    def _mend(self, name: str, fault: MockFault) -> None:
         self._do(self.number(fault.delay, {}), lambda: self._release(name))
 
-    def _hold(self, name: str, fault: Fault) -> None:
-        self._before.setdefault(name, {place: self.stage.state(*place) for place in fault.states})
+    def _hold(self, name: str, fault: MockFault) -> None:
+        self._before.setdefault(name, {place: self.host.state(*place) for place in fault.states})
         self._held |= fault.states
         self.take(fault.states)
         for skill in self._skills:
@@ -170,11 +170,11 @@ class Play:
 
     def _publish(self, place: Place, script: DataScript) -> None:
         self._do(script.period_s, lambda: self._publish(place, script))
-        now_s = self.stage.now_s - self._began_s
+        now_s = self.host.now_s - self._began_s
         value = next((value for from_s, value in reversed(script.steps) if from_s <= now_s), None)
         if value is not None:
-            states = {resource: self.stage.state(place[0], resource) for resource in self._resources.get(place[0], ())}
-            self.stage.publish(*place, self._filled(value, {"t": now_s, **states}))
+            states = {resource: self.host.state(place[0], resource) for resource in self._resources.get(place[0], ())}
+            self.host.publish(*place, self._filled(value, {"t": now_s, **states}))
 
     def _filled(self, value: object, names: Mapping[str, object]) -> object:
         if isinstance(value, Mapping):

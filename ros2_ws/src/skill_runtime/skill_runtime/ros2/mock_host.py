@@ -1,4 +1,4 @@
-"""A play of mocks on ROS 2: real skillset nodes, the node's clock, and the functional layer's topics."""
+"""A mock robot on ROS 2: real skillset nodes, the node's clock, and the functional layer's topics."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from skill_runtime.ros2.node import SkillsetNode
 Job = Callable[[], None]
 
 
-class RosStage:
-    """The stage that a node is; ``nodes`` (the mocked skillsets) are added once they are made."""
+class RosMockHost:
+    """A node as the host of a mock robot; ``nodes`` (the mocked skillsets) are added once they are made."""
 
     def __init__(self, node: Node, bindings: Mapping[str, DataBindings]) -> None:
         self.nodes: dict[str, SkillsetNode] = {}
@@ -53,7 +53,7 @@ class RosStage:
         def attempt() -> None:
             try:
                 job()
-            except Exception as error:  # noqa: BLE001 - the play goes on
+            except Exception as error:  # noqa: BLE001 - the robot goes on
                 self.note(f"{type(error).__name__}: {error}")
 
         return self._alarms.after(delay_s, attempt)
