@@ -1,4 +1,4 @@
-"""``./alula bench video``: what the video costs, how late it is, how it takes a step in bandwidth, and how good it looks for its bits."""
+"""``./alula bench video``: cost, delay, a step in bandwidth, and which encoder looks best for its bits."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from fractions import Fraction
+from dataclasses import asdict
 from pathlib import Path
-from statistics import fmean, median
+from statistics import median
 
-import av
 import cv2
 import numpy as np
 from radio_link.channel import Condition
 from radio_link.conditions import Both
-from video_stream.encoder import PRESET, TUNE, Encoder
 from video_stream.rate import RateSettings
 
-from ground_station.quality import Rgb, grey, ssim
+from ground_station.codecs import compare, table
+from ground_station.quality import Rgb
 from ground_station.rehearsal import Rehearsal
 
 IDEAL = Both(Condition(rate_bps=1e9, delay_s=0.0, jitter_s=0.0), Condition(rate_bps=1e9, delay_s=0.0, jitter_s=0.0))
@@ -30,8 +29,7 @@ WIDE, NARROW = (
 )
 STEP_S, BACK_S, END_S = 5.0, 13.0, 20.0
 MIN_FPS, MIN_QUALITY = 8.0, 0.4  # the criteria of the inspection
-COMPARED_BPS = 1e6
-COMPARED_FRAMES = 100
+COMPARED_FRAMES = 120
 Camera = Callable[[int], Rgb]
 
 
@@ -88,50 +86,6 @@ def step(camera: Camera) -> dict[str, float]:
     }
 
 
-def compared(camera: Camera) -> dict[str, float]:
-    """Compare with the same encoder as its own program sets it (``-preset veryfast -tune zerolatency -b:v -maxrate``), at equal bits."""
-    images = [camera(number) for number in range(COMPARED_FRAMES)]
-    encoder = Encoder()
-    ours = [
-        encoder.encode(image, stamp_ns=n * 50_000_000, size=(640, 360), bit_rate_bps=COMPARED_BPS, fps=20.0)
-        for n, image in enumerate(images)
-    ]
-    from aiortc.codecs.h264 import h264_depayload
-
-    plain, plain_bytes = _plain(images)
-    data = [b"".join(map(h264_depayload, frame.payloads)) for frame in ours]
-    seconds = COMPARED_FRAMES / 20.0
-    return {
-        "ssim": _quality(images, data),
-        "ssim_of_ffmpeg_settings": _quality(images, plain),
-        "kbit_s": 8e-3 * sum(frame.size_bytes for frame in ours) / seconds,
-        "kbit_s_of_ffmpeg_settings": 8e-3 * plain_bytes / seconds,
-    }
-
-
-def _plain(images: Sequence[Rgb]) -> tuple[list[bytes], int]:
-    codec = av.VideoCodecContext.create("libx264", "w")
-    codec.width, codec.height, codec.pix_fmt = 640, 360, "yuv420p"
-    codec.framerate, codec.time_base = Fraction(20), Fraction(1, 20)
-    codec.bit_rate = round(COMPARED_BPS)
-    codec.options = {"preset": PRESET, "tune": TUNE, "maxrate": str(round(COMPARED_BPS)), "bufsize": str(round(COMPARED_BPS))}
-    data = []
-    for number, image in enumerate(images):
-        frame = av.VideoFrame.from_ndarray(image, format="rgb24").reformat(format="yuv420p")
-        frame.pts = number
-        data.append(b"".join(bytes(packet) for packet in codec.encode(frame)))
-    return data, sum(map(len, data))
-
-
-def _quality(images: Sequence[Rgb], data: Sequence[bytes]) -> float:
-    decoder = av.VideoCodecContext.create("h264", "r")
-    decoder.thread_count = 1
-    values = []
-    for image, each in zip(images, data, strict=True):
-        values += [ssim(grey(image), grey(frame.to_ndarray(format="rgb24"))) for frame in decoder.decode(av.Packet(each))]
-    return fmean(values)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(prog="alula bench video", description="Measure the telepilot's video, without a simulator.")
@@ -142,12 +96,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     camera = simulated_camera(options.world)
     for number in range(int(END_S * 20) + 1):
         camera(number)  # its pictures are made beforehand: they are not what is measured
-    figures = {"ideal": ideal(camera), "step": step(camera), "compared": compared(camera)}
+    figures = {"ideal": ideal(camera), "step": step(camera)}
     figures["settings"] = {"cores": float(os.cpu_count() or 0), "max_bps": RateSettings().max_bps}
+    codecs = compare([camera(number) for number in range(COMPARED_FRAMES)])
     for title, part in figures.items():
         sys.stdout.write(f"{title}\n" + "".join(f"  {name:36} {value:10.3f}\n" for name, value in part.items()))
+    sys.stdout.write(f"codecs\n{table(codecs)}")
     if options.json is not None:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        text = json.dumps({**figures, "codecs": [asdict(row) for row in codecs]}, indent=2)
+        options.json.write_text(text + "\n", encoding="utf-8")
     return 0
 
 

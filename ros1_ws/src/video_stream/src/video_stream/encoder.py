@@ -30,7 +30,8 @@ class Encoded:
 class Encoder:
     """Encodes RGB frames; begins again, with a key frame, when size or bit rate have changed enough."""
 
-    def __init__(self) -> None:
+    def __init__(self, preset: str = PRESET) -> None:
+        self._preset = preset
         self._packetizer = H264Encoder()
         self._codec: av.VideoCodecContext | None = None
         self._bit_rate_bps = 0.0
@@ -58,13 +59,13 @@ class Encoder:
         low, high = (1.0 - RETUNE_DOWN) * self._bit_rate_bps, (1.0 + RETUNE_UP) * self._bit_rate_bps
         changed = not low < bit_rate_bps < high
         if codec is None or changed or fps != self._fps or (codec.width, codec.height) != size:
-            codec = self._codec = _open(size, bit_rate_bps, fps)
+            codec = self._codec = _open(size, bit_rate_bps, fps, self._preset)
             self._bit_rate_bps, self._fps = bit_rate_bps, fps
             self.restarts += 1
         return codec
 
 
-def _open(size: tuple[int, int], bit_rate_bps: float, fps: float) -> av.VideoCodecContext:
+def _open(size: tuple[int, int], bit_rate_bps: float, fps: float, preset: str) -> av.VideoCodecContext:
     codec = av.VideoCodecContext.create("libx264", "w")
     codec.width, codec.height = size
     codec.pix_fmt = "yuv420p"
@@ -73,7 +74,7 @@ def _open(size: tuple[int, int], bit_rate_bps: float, fps: float) -> av.VideoCod
     codec.bit_rate = round(bit_rate_bps)
     codec.thread_count = 1
     codec.options = {
-        "preset": PRESET,
+        "preset": preset,
         "tune": TUNE,
         "profile": "main",
         "maxrate": str(round(bit_rate_bps)),
