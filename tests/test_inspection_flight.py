@@ -1,9 +1,9 @@
-"""The inspection through the whole stack: along a wall where the radio gets worse and worse, until the telepilot sees too little."""
+"""The inspection through the whole stack: a wall where the radio gets worse until the telepilot sees too little; processes that die."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,50 @@ def test_the_pictures_of_the_report_are_there(flight: Flight, summary: Summary) 
     del summary
     for name in ("video.svg", "timeline.svg", "tree.svg", "map.png", "video/sent.mkv", "video/received.mkv", "video/stream.sdp"):
         assert (flight.out / name).stat().st_size > 0, name
+
+
+@pytest.fixture
+def killed(tmp_path: Path) -> Iterator[Callable[[str], tuple[Flight, Summary]]]:
+    """Return what flies with a fault of a process, and lands."""
+    started: list[Flight] = []
+
+    def fly(fault: str) -> tuple[Flight, Summary]:
+        flight = start_flight(tmp_path / "run", "--rate", "0", "--world", str(WORLD), "--fail", fault, scenario="inspection")
+        started.append(flight)
+        flight.end()
+        assert (flight.summary["landed"], flight.summary["collisions"]) == (True, 0), flight.words()
+        return flight, flight.summary
+
+    yield fly
+    for flight in started:
+        flight.give_up()
+
+
+def test_a_killed_encoder_is_not_told_as_a_bad_radio(killed: Callable[[str], tuple[Flight, Summary]]) -> None:
+    flight, summary = killed("encoder@10")
+    stream = only(summary, "stream")
+    assert (stream["outcome"], stream["result"]) == ("TERMINATED", "LOST")
+    assert "video encoder" in stream["message"]
+    assert summary["outcome"] == "degraded"
+    assert summary["video"]["criterion"] is None
+    assert [(fault["sensor"], fault["mode"]) for fault in summary["injected"]] == [("encoder", "killed")]
+    assert [death["name"] for death in summary["died"]] == ["video_stream"], "it was not started again"
+    recovery = summary["recovery"]
+    assert recovery["failure_s"] == pytest.approx(10.0, abs=0.1)
+    assert recovery["fallback_running_s"] - recovery["failure_s"] < 2.5
+    assert "encoder failed at 10.0" in flight.words()
+
+
+def test_without_the_ground_station_the_criterion_goes_first_and_then_the_autopilot_flies_home(
+    killed: Callable[[str], tuple[Flight, Summary]],
+) -> None:
+    flight, summary = killed("ground_station@10")
+    assert only(summary, "stream")["result"] == "enough_frames"
+    assert only(summary, "stream")["end_s"] < 16.0
+    assert summary["outcome"] == "given_up"
+    assert "RTL" in summary["reason"]
+    assert [death["name"] for death in summary["died"]] == ["ground_station"]
+    assert "ground_station failed at 10.0" in flight.words()
 
 
 def similarities(frames: list[dict[str, Any]]) -> list[float]:
