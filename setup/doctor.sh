@@ -11,14 +11,15 @@ echo "machine"
 if command -v apt-get >/dev/null && command -v dpkg-query >/dev/null; then
   . /etc/os-release; good "Debian-like system" "${PRETTY_NAME:-}"
 else
-  bad "Debian-like system" "there is no apt-get" "use Debian 12, or the container in docker/"
+  bad "Debian-like system" "there is no apt-get" "use Debian 12 or 13, or a container (docs/containers.md)"
 fi
 [ "$(uname -m)" = x86_64 ] && good "processor" "x86_64, $(nproc) cores" || bad "processor" "$(uname -m)" "the ROS 2 wheels exist for x86_64 only"
 good "free disk" "$(df -Pm "$ALULA_ROOT" | awk 'NR==2{print $4}') MB; an installation takes about 3000 MB"
 
 echo "Debian packages"
-wanted=$(grep -vc '^#' "$ALULA_ROOT/setup/apt.txt")
-absent=$(comm -23 <(grep -v '^#' "$ALULA_ROOT/setup/apt.txt" | sort) \
+needed=$(awk -v sealed="$([ -f "$ALULA_STATE/sealed" ] && echo 1)" '/^# Only to build/ && sealed {exit} !/^#/' "$ALULA_ROOT/setup/apt.txt")
+wanted=$(wc -w <<<"$needed")
+absent=$(comm -23 <(sort <<<"$needed") \
   <(dpkg-query -W -f '${db:Status-Status} ${binary:Package}\n' 2>/dev/null | awk '$1=="installed"{sub(/:.*/,"",$2);print $2}' | sort))
 [ -z "$absent" ] && good "packages of setup/apt.txt" "all $wanted" || bad "packages of setup/apt.txt" "$(echo $absent)" "./alula setup (as root or with sudo)"
 

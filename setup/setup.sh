@@ -1,15 +1,24 @@
 #!/usr/bin/env bash
-# Installs and builds Alula, from a bare Debian 12 to a tree that flies. Idempotent: a step whose inputs have not changed is skipped.
-# Everything it makes lies in $ALULA_STATE (default: .alula in the checkout); the log is setup.log there.
+# Installs and builds Alula, from a bare Debian 12 or 13 to a tree that flies. Idempotent: a step whose inputs have not changed is skipped.
+# Everything it makes lies in $ALULA_STATE (default: .alula in the checkout); each step's log is log/STEP.log there.
 set -u
 ALULA_ROOT="$(cd "$(dirname "$(readlink -f "$0")")/.." && pwd)"
 ALULA_STATE="${ALULA_STATE:-$ALULA_ROOT/.alula}"
 export ALULA_ROOT ALULA_STATE
-log="$ALULA_STATE/setup.log"
+logs="$ALULA_STATE/log"
 disk_needed_mb=5000
 started=$SECONDS
 exec 1>&2     # standard output belongs to the results of the command that needs the set-up
-quiet=0; [ "${1:-}" = --quiet ] && quiet=1     # says nothing where nothing is to be done
+# usage: setup.sh [--quiet] [--runtime] [--only STEP[,STEP]...]
+quiet=0 runtime=() only=apt,venv1,venv2,generated,ros1,ros2
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --quiet) quiet=1 ;;                # says nothing where nothing is to be done
+    --runtime) runtime=(--runtime) ;;  # without what only builds and tests need
+    --only) only=$2; shift ;;
+  esac
+  shift
+done
 
 fail() { printf '\nalula setup: %s\n' "$1" >&2; [ -n "${2:-}" ] && printf '  to mend it: %s\n' "$2" >&2; exit 2; }
 
@@ -17,27 +26,31 @@ as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 
 # step NAME KEY FUNCTION TITLE: runs FUNCTION if KEY differs from the one it last succeeded with.
 step() {
-  local name=$1 key=$2 function=$3 title=$4 stamp="$ALULA_STATE/stamps/$1" begun=$SECONDS
+  local name=$1 key=$2 function=$3 title=$4 stamp="$ALULA_STATE/stamps/$1" log="$logs/$1.log" begun=$SECONDS
   [ "$(cat "$stamp" 2>/dev/null)" = "$key" ] && return 0
-  printf '  %-58s' "$title"
-  [ -t 1 ] || printf '\n'
-  printf '\n===== %s =====\n' "$title" >>"$log"
+  printf '  %-58s begins\n' "$title"
   rm -f "$stamp"
-  "$function" >>"$log" 2>&1 &
-  local worker=$!
-  while kill -0 $worker 2>/dev/null; do
-    [ -t 1 ] && printf '\r  %-58s %3d s' "$title" $((SECONDS - begun))
-    sleep 0.3
-  done
-  if wait $worker; then
-    [ -t 1 ] && printf '\r'
+  if "$function" >"$log" 2>&1; then
     printf '  %-58s %3d s  done\n' "$title" $((SECONDS - begun))
     printf '%s' "$key" >"$stamp"
   else
-    printf '\n'
-    local reason; reason=$(tac "$log" | sed '/^===== /q' | grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |.*: error ALU[0-9]+: |alula: )' | head -n 1)
+    local reason; reason=$(tac "$log" | grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |.*: error ALU[0-9]+: |alula: )' | head -n 1)
     fail "'$title' failed: ${reason:-see the log}" "the last lines of $log tell more; './alula setup' goes on where it stopped"
   fi
+}
+
+# run STEP: unless --only leaves it out.
+run() { [[ ",$only," != *",$1,"* ]] || "step_$1"; }
+
+# together STEP...: runs steps that do not need one another side by side; the set-up ends when all have, if one has failed.
+together() {
+  local name worker workers=() failed=0
+  set -m   # a process group each, which Ctrl-C ends
+  for name in "$@"; do run "$name" & workers+=($!); done
+  set +m
+  trap 'kill -- "${workers[@]/#/-}" 2>/dev/null; exit 130' INT TERM
+  for worker in "${workers[@]}"; do wait "$worker" || failed=1; done
+  [ $failed = 0 ] || exit 2
 }
 
 digest() { cat "$@" 2>/dev/null | sha256sum | cut -c1-16; }
@@ -53,7 +66,7 @@ model_digest() { # of the models and of what generates from them
 
 check_machine() {
   command -v apt-get >/dev/null && command -v dpkg-query >/dev/null ||
-    fail "this is not a Debian-like system: there is no apt-get" "use Debian 12, or the container in docker/"
+    fail "this is not a Debian-like system: there is no apt-get" "use Debian 12 or 13, or a container (docs/containers.md)"
   [ "$(uname -m)" = x86_64 ] || fail "the ROS 2 wheels exist for x86_64 only, this is $(uname -m)" "use an x86_64 machine"
   local free_mb; free_mb=$(df -Pm "$ALULA_STATE" | awk 'NR==2{print $4}')
   [ -x "$ALULA_STATE/venv2/bin/python" ] || [ "$free_mb" -ge $disk_needed_mb ] ||
@@ -61,7 +74,7 @@ check_machine() {
 }
 
 missing_packages() { # names of setup/apt.txt that dpkg does not have installed
-  local wanted; wanted=$(grep -v '^#' "$ALULA_ROOT/setup/apt.txt")
+  local wanted; wanted=$(awk -v runtime=${#runtime[@]} '/^# Only to build/ && runtime {exit} !/^#/' "$ALULA_ROOT/setup/apt.txt")
   comm -23 <(printf '%s\n' $wanted | sort) \
     <(dpkg-query -W -f '${db:Status-Status} ${binary:Package}\n' 2>/dev/null | awk '$1=="installed"{sub(/:.*/,"",$2);print $2}' | sort)
 }
@@ -71,7 +84,7 @@ install_packages() {
   [ -z "$missing" ] && return 0
   as_root apt-get update -q || return 1
   for name in $missing; do
-    apt-cache show "$name" >/dev/null 2>&1 || { echo "alula: Debian has no package '$name' here; is this Debian 12 (bookworm)?"; return 1; }
+    apt-cache show "$name" >/dev/null 2>&1 || { echo "alula: this system has no package '$name'; Debian 12 and 13 have it, and Ubuntu in 'universe'"; return 1; }
   done
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $missing
 }
@@ -82,10 +95,12 @@ make_venv() { # WORLD OPTIONS...
   # A virtual environment of the user's own must not leak into these two.
   local clean=(env -u VIRTUAL_ENV -u PYTHONPATH -u PYTHONHOME)
   local version='import sys; print(sys.version)'
+  /usr/bin/python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+    { echo "alula: $(/usr/bin/python3 --version) is too old: Alula needs Python 3.11, as Debian 12 and 13 and Ubuntu 24.04 have it"; return 1; }
   [ "$(head -n 1 "$venv/bin/pip" 2>/dev/null)" = "#!$venv/bin/python3" ] &&
     [ "$("${clean[@]}" "$venv/bin/python3" -c "$version" 2>/dev/null)" = "$(/usr/bin/python3 -c "$version")" ] ||
     { rm -rf "$venv" && "${clean[@]}" /usr/bin/python3 -m venv "$@" "$venv" || return 1; }
-  "${clean[@]}" "$venv/bin/python3" "$ALULA_ROOT/setup/sync_packages.py" "$ALULA_ROOT/setup/ros$world.txt"
+  "${clean[@]}" "$venv/bin/python3" "$ALULA_ROOT/setup/sync_packages.py" "$ALULA_ROOT/setup/ros$world.txt" "${runtime[@]}"
 }
 make_venv1() { make_venv 1 --system-site-packages; }
 make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup/repair_wheels.py"; }
@@ -119,8 +134,10 @@ build_ros1() {
     export ROS_LANG_DISABLE=gencpp:geneus:genlisp:gennodejs
     # catkin wants a CMakeLists.txt beside the packages; the workspace is linked so that the checkout stays clean.
     mkdir -p "$ALULA_STATE/ros1" && ln -sfn "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE/ros1/linked_src" || exit 1
-    # The interpreter of the environment goes into the shebangs of the nodes' relay scripts.
-    catkin_make -C "$ALULA_STATE/ros1" --source "$ALULA_STATE/ros1/src" -DPYTHON_EXECUTABLE="$ALULA_STATE/venv1/bin/python3" -DCATKIN_ENABLE_TESTING=OFF )
+    # The interpreter of the environment goes into the shebangs of the nodes' relay scripts; newer catkin looks for it under the second name.
+    local python="$ALULA_STATE/venv1/bin/python3"
+    catkin_make -C "$ALULA_STATE/ros1" --source "$ALULA_STATE/ros1/src" -DPYTHON_EXECUTABLE="$python" -DPython_EXECUTABLE="$python" \
+      -DCATKIN_ENABLE_TESTING=OFF )
 }
 
 prepare_ros1_sources() { # $ALULA_STATE/ros1/src holds links to the packages: catkin_make writes its toplevel file beside them
@@ -139,22 +156,36 @@ make_ros2() {
     python "$ALULA_ROOT/setup/build_ros2.py" )
 }
 
-mkdir -p "$ALULA_STATE/stamps" "$ALULA_STATE/ros2" 2>/dev/null || fail "can't write to $ALULA_STATE" "check its owner, or set ALULA_STATE to a folder of yours"
+if [ -f "$ALULA_STATE/sealed" ]; then   # an image that flies, without what builds
+  [ $quiet = 1 ] || cat "$ALULA_STATE/sealed"
+  exit 0
+fi
+mkdir -p "$ALULA_STATE/stamps" "$logs" "$ALULA_STATE/ros2" 2>/dev/null || fail "can't write to $ALULA_STATE" "check its owner, or set ALULA_STATE to a folder of yours"
 exec 9>"$ALULA_STATE/lock"
 command -v flock >/dev/null && { flock -n 9 || { echo "another setup of this checkout is running, waiting for it"; flock 9; }; }
 check_machine
-[ $quiet = 1 ] || echo "Alula setup (log: $log)"
+[ $quiet = 1 ] || echo "Alula setup (logs: $logs)"
 if [ -n "$(missing_packages)" ]; then
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null ||
     fail "Debian packages are missing ($(missing_packages | head -n 3 | paste -sd' ')...), and this is neither root nor is there sudo" "run './alula setup' once as root"
   rm -f "$ALULA_STATE/stamps/apt"
 fi
-step apt "$(digest "$ALULA_ROOT/setup/apt.txt")" install_packages "Debian packages (ROS 1, build tools)"
-step venv1 "$(digest "$ALULA_ROOT/setup/ros1.txt" "$ALULA_ROOT/setup/sync_packages.py")-$ALULA_STATE" make_venv1 "Python packages of the ROS 1 world"
-step venv2 "$(digest "$ALULA_ROOT/setup/ros2.txt" "$ALULA_ROOT/setup/repair_wheels.py" "$ALULA_ROOT/setup/sync_packages.py")-$ALULA_STATE" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
-step generated "$(model_digest)" \
-  generate "skillsets: interfaces, managers, bridge configuration"
+step_apt() { step apt "$(digest "$ALULA_ROOT/setup/apt.txt")${runtime[*]}" install_packages "Debian packages (ROS 1, build tools)"; }
+step_venv1() { step venv1 "$(digest "$ALULA_ROOT"/setup/{ros1.txt,sync_packages.py})-$ALULA_STATE${runtime[*]}" make_venv1 "Python packages of the ROS 1 world"; }
+step_venv2() {
+  step venv2 "$(digest "$ALULA_ROOT"/setup/{ros2.txt,repair_wheels.py,sync_packages.py})-$ALULA_STATE${runtime[*]}" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
+}
+step_generated() { step generated "$(model_digest)" generate "skillsets: interfaces, managers, bridge configuration"; }
+step_ros1() {
+  step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
+}
+step_ros2() {
+  local wheels; wheels=$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{build_ros2.py,interfaces.cmake,repair_wheels.py})
+  step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$wheels-$ALULA_STATE" make_ros2 "ROS 2 workspace (colcon build)"
+}
+run apt
+together venv1 venv2
+run generated
 [ ! -f "$ALULA_STATE/broken_robots" ] || tell_broken_robots
-step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
-step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{build_ros2.py,interfaces.cmake,repair_wheels.py})-$ALULA_STATE" make_ros2 "ROS 2 workspace (colcon build)"
+together ros1 ros2
 [ $quiet = 1 ] || echo "Alula is ready ($((SECONDS - started)) s)"

@@ -1,20 +1,25 @@
 """Make this interpreter's environment hold exactly the pinned packages of a file: install and uninstall the differences only.
 
-usage: python sync_packages.py REQUIREMENTS
+usage: python sync_packages.py REQUIREMENTS [--runtime]
 
+``--runtime`` leaves out the pins below the line ``# Only to build and to test``.
 A package counts as installed when its version is the pinned one and none of its files is missing. pip and setuptools stay.
 """
 
 from __future__ import annotations
 
+import csv
 import re
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Mapping
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
 KEPT = {"pip", "setuptools"}
+TOOLS = "# Only to build and to test"
+MARKER = re.compile(r'(?:python_version *(<|>=) *"(\d+)\.(\d+)")?')
 
 
 def normalized(name: str) -> str:
@@ -22,25 +27,42 @@ def normalized(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def read_pins(path: Path) -> dict[str, str]:
-    """Read ``name==version`` lines; comments start with ``#``."""
-    lines = (line.partition("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines())
-    pairs = (line.partition("==") for line in lines if line)
-    return {normalized(name): version for name, _, version in pairs}
+def applies(marker: str, python: tuple[int, int]) -> bool:
+    """Tell whether a pin is for this version of Python: ``python_version < "3.12"``, ``python_version >= "3.12"`` or nothing."""
+    match = MARKER.fullmatch(marker)
+    if match is None:
+        raise SystemExit(f"error: the condition '{marker}' of a pin is not known; write python_version < \"3.12\", or >=")
+    return match[1] is None or (python < (int(match[2]), int(match[3]))) == (match[1] == "<")
+
+
+def read_pins(path: Path, python: tuple[int, int] = sys.version_info[:2], *, runtime: bool = False) -> dict[str, str]:
+    """Read the lines ``name==version`` and ``name==version ; python_version < "3.12"``; comments start with ``#``."""
+    text = path.read_text(encoding="utf-8")
+    lines = (line.partition("#")[0].strip() for line in (text.partition(TOOLS)[0] if runtime else text).splitlines())
+    pins = (line.partition(";") for line in lines if line)
+    pairs = (pin.partition("==") for pin, _, marker in pins if applies(marker.strip(), python))
+    return {normalized(name): version.strip() for name, _, version in pairs}
 
 
 def whole(distribution: Distribution) -> bool:
-    """Tell whether all files that were installed are still there; compiled ones are made again when they are needed."""
-    return all(Path(str(distribution.locate_file(file))).exists() for file in distribution.files or () if file.suffix != ".pyc")
+    """Tell whether all files that pip recorded are still there; compiled ones are made again when they are needed."""
+    # Not by `files`: since Python 3.12 that leaves out what is missing.
+    recorded = (row[0] for row in csv.reader((distribution.read_text("RECORD") or "").splitlines()))
+    return all(Path(str(distribution.locate_file(file))).exists() for file in recorded if not file.endswith(".pyc"))
 
 
-def installed(*, own_only: bool) -> dict[str, Distribution]:
-    """Map names to what Python finds first; ``own_only``: in this environment, not in the system below it."""
-    places = [sysconfig.get_path("purelib")] if own_only else None
+def installed() -> dict[str, Distribution]:
+    """Map names to what Python finds first, in this environment and in the system below it."""
     found: dict[str, Distribution] = {}
-    for distribution in distributions(path=places) if places else distributions():
+    for distribution in distributions():
         found.setdefault(normalized(distribution.metadata["Name"]), distribution)
     return found
+
+
+def removable(pins: Mapping[str, str], site: Path) -> list[str]:
+    """Return the names of what pip has installed into a folder and no pin names; a wheel may also carry metadata of other names."""
+    own = (d for d in distributions(path=[str(site)]) if (d.read_text("INSTALLER") or "").strip() == "pip")
+    return sorted({normalized(d.metadata["Name"]) for d in own} - set(pins) - KEPT)
 
 
 def pip(*words: str) -> None:
@@ -50,13 +72,13 @@ def pip(*words: str) -> None:
         sys.exit(done.returncode)
 
 
-def sync(requirements: Path) -> None:
+def sync(requirements: Path, *, runtime: bool) -> None:
     """Remove what is not pinned, then install what is missing, damaged or of another version."""
-    pins = read_pins(requirements)
-    extra = sorted(set(installed(own_only=True)) - set(pins) - KEPT)
+    pins = read_pins(requirements, runtime=runtime)
+    extra = removable(pins, Path(sysconfig.get_path("purelib")))
     if extra:
         pip("uninstall", "--yes", *extra)
-    present = installed(own_only=False)
+    present = installed()
     wanted = [name for name, version in pins.items() if name not in present or present[name].version != version or not whole(present[name])]
     if wanted:
         damaged = ["--force-reinstall"] if any(name in present and present[name].version == pins[name] for name in wanted) else []
@@ -65,4 +87,4 @@ def sync(requirements: Path) -> None:
 
 
 if __name__ == "__main__":
-    sync(Path(sys.argv[1]))
+    sync(Path(sys.argv[1]), runtime="--runtime" in sys.argv[2:])
