@@ -159,7 +159,7 @@ def stage(ros_master, start_node, tmp_path):
     """Start the nodes with a tamperer on both ways; yield flight, processes and tamperers."""
     rospy.set_param("/use_sim_time", True)
     base = next(port for port in iter(free_port, None) if port < 60_000)
-    video = Tamperer(base, (base + 1, base + 2, base + 3, base + 4, base + 5))
+    video = Tamperer(base, (base + 1, base + 2, base + 3, base + 4, base + 5, base + 8))
     report = Tamperer(base + 2, (base, base + 3))
     done: dict[str, int] = {}
     note = lambda header, name: done.update({name: header.stamp.to_nsec()})  # noqa: E731
