@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -136,6 +137,14 @@ def test_without_a_ground_station_nobody_takes_off():
     mission = fly("radio")
     assert mission.end.outcome is Outcome.NOT_STARTED
     assert "ground station" in mission.end.reason
+
+
+def test_an_encoder_that_was_never_heard_of_is_named_and_not_the_radio_alone():
+    link = ("video", "link")
+    silent = replace(BEHAVIOUR, timeline=tuple(event for event in BEHAVIOUR.timeline if link not in event.states))
+    end = MockedMission(SKILLSETS, silent, plan(Route(ROUTE))).run()
+    assert end.outcome is Outcome.NOT_STARTED
+    assert "neither the video encoder nor the ground station" in end.reason
 
 
 def test_whatever_fails_whenever_it_comes_to_an_end():

@@ -112,11 +112,12 @@ class InspectionMission:
         """Return what the mission needs to start, met or not."""
         lidar = self._clients.perception.resources.get("lidar_status", "UNKNOWN")
         told = "nothing is known of the LiDAR" if lidar == "UNKNOWN" else "the LiDAR is broken, nothing would look ahead"
-        heard = self._clients.video.resources.get("link") == "UP"
+        link = self._clients.video.resources.get("link", "UNKNOWN")
+        silent = "neither the video encoder nor the ground station has been" if link == "UNKNOWN" else "the ground station is not"
         return [
             *conditions_of_flight(self._clients.navigation, vars(self._clients).values(), self._blackboard),
             condition("the LiDAR works", holds=lidar == "OK", otherwise=told + self._blackboard.because("perception.lidar_status")),
-            condition("the ground station is heard (link)", holds=heard, otherwise="the ground station is not heard of (link)"),
+            condition("the ground station is heard (link)", holds=link == "UP", otherwise=f"{silent} heard of (link)"),
         ]
 
     def stop_here(self) -> Behaviour:
