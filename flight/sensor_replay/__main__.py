@@ -34,6 +34,12 @@ NODES = {
 """The nodes that perceive: by package, the classes of node and settings in its module ``node``."""
 AGAIN = ("/perception/transition", "/mapping/transition")
 """Calls that the nodes make again."""
+MEASURED = {
+    "zed_status": ("/zed/left/image_raw", "/zed/right/image_raw"),
+    "lidar_status": ("/lidar/points",),
+    "slam_status": ("/lidar/points",),
+}
+"""What the nodes judge these resources by."""
 
 
 class PerceptionError(Exception):
@@ -59,6 +65,18 @@ def lift_off_of(bag: rosbag.Bag) -> int:
         if call["request"].get("resource") == "flight_status" and call["request"].get("to") == "IN_AIR":
             return round(float(call["end_s"]) * 1e9)
     return 0
+
+
+def begins_of(bag: rosbag.Bag, names: Mapping[str, str]) -> dict[str, int]:
+    """Return when a bag's measurements for each resource begin, nanoseconds; resources without measurements are missing.
+
+    ``names``: what topics of the bag are called here.
+    """
+    first = {}
+    for topic in bag.get_type_and_topic_info().topics:
+        if names.get(topic, topic) in TOPICS:
+            first[names.get(topic, topic)] = next(time for _, _, time in bag.read_messages(topics=[topic], raw=True)).to_nsec()
+    return {resource: max(first[topic] for topic in topics) for resource, topics in MEASURED.items() if first.keys() >= set(topics)}
 
 
 def make_nodes(graph: offline.Graph, map_path: str) -> list[object]:
@@ -98,6 +116,7 @@ class Perception:
         self._target = target
         self._names = names
         self._faults = faults
+        self._begins = begins_of(source, names)
         self._graph = offline.Graph(self._publish)
         self._graph.parameters = parameters
         offline.install(self._graph)
@@ -128,11 +147,15 @@ class Perception:
 
     def _take_call(self, message: Any) -> None:
         call = json.loads(message.data)
-        if call["service"] in AGAIN:
+        if call["service"] in AGAIN and not self._came_before(call):
             return
         self._target.write(offline.CALLS, message, self._time())
-        if not call["service"].endswith("/save"):
+        if call["service"] not in AGAIN and not call["service"].endswith("/save"):
             self._graph.call(call["service"], call["request"])
+
+    def _came_before(self, call: Mapping[str, Any]) -> bool:
+        """Tell whether a node has judged by measurements that the bag does not hold: the recorder begins later than the flight."""
+        return self._graph.now_ns < self._begins.get(call["request"].get("resource"), 0)
 
     def _publish(self, topic: str, message: Any) -> None:
         if topic == offline.CALLS and json.loads(message.data)["service"] not in AGAIN:

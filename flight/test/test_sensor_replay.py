@@ -98,6 +98,27 @@ def test_the_nodes_see_what_is_there_and_twice_the_same(measured, tmp_path):
     assert not {topic for topic, _, _ in first} & {"/zed/left/image_raw", "/lidar/points"}
 
 
+def test_what_was_said_before_the_measurements_begin_is_taken_from_the_record(measured, tmp_path):
+    begin_s, said_s = START_S + 0.3, START_S + 0.1
+    late_topics, said = (
+        {"/zed/left/image_raw", "/zed/right/image_raw", "/lidar/points"},
+        [("lidar_status", said_s), ("zed_status", begin_s + 0.05)],
+    )
+    calls = [("/calls", call("/perception/transition", {"resource": name, "to": "OK"}, t_s), stamp(t_s)) for name, t_s in said]
+    with rosbag.Bag(str(measured)) as bag, rosbag.Bag(str(tmp_path / "late.bag"), "w") as late:
+        kept = [one for one in bag.read_messages() if one[0] not in late_topics or one[2].to_sec() >= begin_s]
+        for topic, message, t in sorted([*kept, *calls], key=lambda one: one[2]):
+            late.write(topic, message, t)
+    perceived(tmp_path / "late.bag", tmp_path / "again.bag")
+    with rosbag.Bag(str(tmp_path / "again.bag")) as bag:
+        calls = [json.loads(message.data) for _, message, _ in bag.read_messages(topics=["/calls"])]
+    told = [(one["request"]["resource"], one["end_s"]) for one in calls if one["service"] == "/perception/transition"]
+    assert next(t_s for resource, t_s in told if resource == "lidar_status") == said_s
+    again_s = [t_s for resource, t_s in told if resource == "zed_status"]
+    assert begin_s + 0.05 not in again_s
+    assert begin_s < min(again_s)
+
+
 def test_measurements_that_stay_away_are_noticed_by_the_node(measured, tmp_path):
     perceived(measured, tmp_path / "dead.bag", "--fail", "zed@0.8")
     told = transitions(tmp_path / "dead.bag")
