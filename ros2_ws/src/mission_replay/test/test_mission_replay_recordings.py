@@ -33,7 +33,8 @@ def mission(run: Path) -> dict:
 
 @pytest.mark.parametrize("name", FLIGHTS)
 def test_a_flight_is_decided_as_it_was_by_its_skills(name, tmp_path, capsys):
-    assert main([str(RECORDINGS / name), "--out", str(tmp_path / "again")]) == SAME, capsys.readouterr().err
+    words = ["--out", str(tmp_path / "again"), "--expect", str(RECORDINGS / name / "expect.yaml")]
+    assert main([str(RECORDINGS / name), *words]) == SAME, capsys.readouterr().err
     assert decided(tmp_path / "again") == decided(RECORDINGS / name)
     assert mission(tmp_path / "again")["outcome"] == mission(RECORDINGS / name)["outcome"]
 
@@ -130,6 +131,25 @@ def test_a_bag_that_can_not_be_read_is_refused_in_a_line(content, tmp_path, caps
     assert said.startswith("alula replay: ")
     assert "functional.bag" in said
     assert said.count("\n") == 1
+
+
+def test_measurements_that_are_perceived_again_lead_to_the_decisions_of_the_flight(tmp_path, capsys):
+    pytest.importorskip("uav_msgs")
+    flown = RECORDINGS / "mapping-sensors"
+    words = ["--from", "sensors", "--expect", str(flown / "expect.yaml"), "--out", str(tmp_path / "again")]
+    assert main([str(flown), *words]) == SAME, capsys.readouterr().err
+    assert decided(tmp_path / "again") == decided(flown)
+
+
+def test_a_camera_that_is_made_to_die_in_the_measurements_is_decided_as_one_that_died_in_flight(tmp_path, capsys):
+    """The recorded images are withheld, the real node notices, the real managers and the real tree answer."""
+    pytest.importorskip("uav_msgs")
+    words = ["--from", "sensors", "--fail", "zed@6", "--on", "--out", str(tmp_path / "changed")]
+    assert main([str(RECORDINGS / "mapping-sensors"), *words]) == OTHERWISE, capsys.readouterr().err
+    flown = RECORDINGS / "mapping-zed"
+    assert decided(tmp_path / "changed") == decided(flown)
+    changed, then = mission(tmp_path / "changed"), mission(flown)
+    assert (changed["outcome"], changed["reason"].split(" (")[0]) == (then["outcome"], then["reason"].split(" (")[0])
 
 
 def test_a_flight_whose_measurements_were_not_recorded_is_not_perceived_again(capsys):

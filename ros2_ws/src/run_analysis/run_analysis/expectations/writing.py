@@ -37,15 +37,15 @@ def expectations_of(run: Run) -> str:
 
 
 def _groups(run: Run) -> list[list[EngineEvent]]:
-    groups: list[list[EngineEvent]] = []
+    """Return what comes one after another; what is near and of several skillsets is together, as a list has one order or none."""
+    near: list[list[EngineEvent]] = []
     for event in filter(starts_or_ends, run.events):
-        last = groups[-1] if groups else []
-        near = bool(last) and event.stamp_s - last[0].stamp_s <= TOGETHER_S
-        if near and all(event.skillset != other.skillset for other in last):
-            last.append(event)
+        if near and event.stamp_s - near[-1][0].stamp_s <= TOGETHER_S:
+            near[-1].append(event)
         else:
-            groups.append([event])
-    return groups
+            near.append([event])
+    several = [len({event.skillset for event in group}) > 1 for group in near]
+    return [part for group, any_order in zip(near, several, strict=True) for part in ([group] if any_order else [[one] for one in group])]
 
 
 def _moment(event: EngineEvent, run: Run) -> str:
