@@ -212,6 +212,8 @@ class Watcher:
                 self._meet(space, name, root)
         for one in list(self._watched.values()):
             one.look()
+        if not self.node.get_clock().ros_time_is_active:  # who publishes the clock may be found later than the skillsets
+            self._session.follow_clock()
 
     def _meet(self, space: str, name: str, root: str) -> None:
         try:
@@ -225,7 +227,6 @@ class Watcher:
         with self._lock:
             self._problems.pop(root, None)
             self._watched[root] = Watched(self.node, space, name)
-        self._session.follow_clock()
 
     def _ask(self) -> None:
         for one in list(self._watched.values()):

@@ -19,7 +19,7 @@ from textual.widgets import Button, Input, RichLog, Static
 from skill_panel.__main__ import main
 from skill_panel.app import Panel
 from skill_panel.memory import Memory
-from skill_panel.watcher import Watcher
+from skill_panel.watcher import Watcher, wait_for
 from skill_panel.widgets import ResourceLine, SkillForm, SkillTable
 
 SOON_S = 15.0
@@ -199,3 +199,25 @@ def test_the_list_says_what_runs(skillset, ros2_domain):
         assert done.returncode == 0, done.stderr
         said = done.stdout
     assert said.startswith(f"in DDS domain {ros2_domain}: /panel_test/navigation\n")
+
+
+def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watcher):
+    from rosgraph_msgs.msg import Clock
+
+    from skill_runtime.ros2.session import Session
+
+    assert wait_for(lambda: bool(watcher.watched), READY_S)
+    assert watcher.now_ns > 1_000_000_000_000_000_000, "nobody has published a clock yet"
+    session = Session("clock_test", domain=watcher.domain)
+    try:
+        clock = session.node.create_publisher(Clock, "/clock", 10)
+        message = Clock()
+        message.clock.sec = 42
+
+        def follows() -> bool:
+            clock.publish(message)
+            return watcher.now_ns == 42_000_000_000
+
+        assert wait_for(follows, READY_S)
+    finally:
+        session.close()
