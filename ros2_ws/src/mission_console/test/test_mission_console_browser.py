@@ -185,6 +185,32 @@ def test_pictures_and_the_figures_of_the_video_move_with_the_slider(browser: Any
     assert page.complaints() == []
 
 
+def test_a_failure_in_a_pause_is_told_with_what_was_done_when_the_mission_went_on(browser: Any, tmp_path: Path) -> None:
+    later, story = 60.0, failing_story()
+    moved = [(t_s + later if t_s >= LIFT_OFF_S + 30.5 else t_s, topic, value) for t_s, topic, value in story if topic != "/data"]
+    told = [
+        (t_s + later, topic, value) if (topic == TREE and t_s == LIFT_OFF_S + 30) else (t_s, topic, value) for t_s, topic, value in moved
+    ]
+    held = [
+        (LIFT_OFF_S + t_s, OPERATOR, {"command": command, "by": "mission", "reason": reason})
+        for t_s, command, reason in (
+            (20.0, "pause", "all are asked"),
+            (20.5, "paused", "navigation.goto holds"),
+            (30.1, "paused", "navigation.goto holds; perception.zed_depthmap has ended"),
+            (89.9, "resume", ""),
+        )
+    ]
+    page = Page(browser, make_report(tmp_path, sorted([*told, *held], key=lambda entry: entry[0])))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    chain = page.text(".chain b").split(" | ")
+    assert chain[-3:] == ["branch", "decision", "started"]
+    assert page.text("#lines li").count("The mission is paused") == 1
+    assert "69.9 s of a pause" in page.text("#costs li")
+    assert "paused 20.00 s" in page.text("#timeline text")
+    assert "goes on 89.90 s" in page.text("#timeline text")
+    assert page.complaints() == []
+
+
 def test_keys_go_from_event_to_event(browser: Any, tmp_path: Path) -> None:
     from selenium.webdriver.common.keys import Keys
 
@@ -375,6 +401,7 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
         page.wait("document.querySelector('#operator output').textContent === 'pause: pause'")
         writer.write(OPERATOR, round(33e9), {"command": "paused", "by": "mission", "reason": "navigation.goto holds"})
         page.wait("document.querySelector('.held').textContent === 'The mission is paused. navigation.goto holds'")
+        page.wait("document.querySelector('#headline').textContent === 'The mission is paused'")
         page.run(f"{button.format('go on')}.click(), {button.format('press again: go on')}.click()")
         writer.write(OPERATOR, round(40e9), {"command": "resume", "by": "mission", "reason": ""})
         page.wait("document.querySelector('.held').textContent === ''")

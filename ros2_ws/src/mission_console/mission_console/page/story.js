@@ -19,6 +19,7 @@ function headline(run) {
   const outcome = summary?.outcome ?? mission.outcome ?? "running";
   if (summary && outcome === "running") return { text: "The mission's process ended before the mission did", tone: "bad", reason: "" };
   const failed = failures(run).length;
+  if (outcome === "running" && (last(run.held.v) ?? null) !== null) return { text: `The mission is paused${failed ? `, after ${failed === 1 ? "a failure" : `${failed} failures`}` : ""}`, tone: "fair", reason: last(run.held.v) };
   if (outcome === "running" && failed) return { text: `The mission is under way, after ${failed === 1 ? "a failure" : `${failed} failures`}`, tone: "fair", reason: "" };
   const [text, tone] = OUTCOMES[outcome] ?? [`Outcome: ${words(outcome)}`, "now"];
   return { text, tone, reason: summary?.reason ?? mission.reason ?? "" };
@@ -103,28 +104,46 @@ function measurement(run, failure, sensor) {
   return null;
 }
 
+/** The pauses of the mission: [{from, to}]; `to` is null in one that lasts. */
+function pauses(run) {
+  const found = [];
+  run.held.v.forEach((held, index) => {
+    const open = found.length && last(found).to === null;
+    if (held !== null && !open) found.push({ from: run.held.t[index], to: null });
+    else if (held === null && open) last(found).to = run.held.t[index];
+  });
+  return found;
+}
+
+/** Until when a failure's reaction is looked for: a mission that is paused then reacts when it goes on. */
+function reactsUntil(run, t) {
+  const pause = pauses(run).find(({ from, to }) => from <= t && (to === null || t < to));
+  return (pause ? pause.to ?? Infinity : t) + REACTION_S;
+}
+
 /** The branch that a failure took down, and the one that the tree went on with. */
 function branchOf(run, failure) {
-  const tree = treeAt(run, failure.end + REACTION_S);
-  const leaf = tree?.nodes.find((node) => node.skill === `${failure.skillset}.${failure.skill}` && failedAround(node, failure.end) !== null);
+  const until = reactsUntil(run, failure.end);
+  const tree = treeAt(run, until);
+  const leaf = tree?.nodes.find((node) => node.skill === `${failure.skillset}.${failure.skill}` && failedAround(node, failure.end, until) !== null);
   if (!leaf) return [];
   let top = leaf;
-  while (top.parent && failedAround(top.parent, failure.end) !== null) top = top.parent;
-  const chain = [{ step: "branch", t: failedAround(top, failure.end) ?? failure.end, text: `“${top.name}” failed` }];
+  while (top.parent && failedAround(top.parent, failure.end, until) !== null) top = top.parent;
+  const chain = [{ step: "branch", t: failedAround(top, failure.end, until) ?? failure.end, text: `“${top.name}” failed` }];
   const siblings = top.parent?.children ?? [];
   const next = siblings.slice(siblings.indexOf(top) + 1).find((node) => node.track.v.some(({ status }) => status !== "INVALID"));
   if (next && top.parent.kind === "selector") {
     const index = next.track.v.findIndex(({ status }) => status !== "INVALID");
-    const t = next.track.t[index] <= failure.end + REACTION_S ? Math.max(failure.end, next.track.t[index]) : failure.end;
+    const t = next.track.t[index] <= until ? Math.max(failure.end, next.track.t[index]) : failure.end;
     chain.push({ step: "decision", t, text: `“${top.parent.name}” went on with “${next.name}”` });
   } else if (!top.parent) chain.push({ step: "decision", t: failure.end, text: "nothing was left to try" });
   return chain;
 }
 
-/** When a node became FAILURE around t; of a tree that was seen only once, then. Null: it did not. */
-function failedAround(node, t) {
+/** When a node became FAILURE between t and another moment; of a tree that was seen only once, then. Null: it did not. */
+function failedAround(node, t, until) {
   const { track } = node;
-  const index = track.v.findIndex(({ status }, at) => status === "FAILURE" && track.t[at] >= t - APART_S && track.t[at] <= t + REACTION_S);
+  const index = track.v.findIndex(({ status }, at) => status === "FAILURE" && track.t[at] >= t - APART_S && track.t[at] <= until);
   if (index >= 0) return track.t[index];
   return track.v.length === 1 && track.v[0].status === "FAILURE" ? t : null;
 }
@@ -132,7 +151,8 @@ function failedAround(node, t) {
 /** Skills that were interrupted for a failure's sake, and those that were started. */
 function reactionOf(run, failure) {
   const chain = [];
-  const near = (t) => t !== null && t >= failure.end - APART_S && t <= failure.end + REACTION_S;
+  const until = reactsUntil(run, failure.end);
+  const near = (t) => t !== null && t >= failure.end - APART_S && t <= until;
   const others = [...run.executions.values()].filter((execution) => execution !== failure);
   const stopped = others.filter((execution) => execution.state === "INTERRUPTED" && near(execution.end) && execution.start < failure.end);
   const started = others.filter((execution) => near(execution.running) && execution.start >= failure.end - APART_S);
@@ -161,9 +181,14 @@ function story(run) {
   if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, "The fallback watches: the flight is safe again.", "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
+  const paused = new Set();
   for (const act of run.operator) {
+    const pause = pauses(run).findIndex(({ from, to }) => from <= act.t && (to === null || act.t < to));
     if (act.by !== "mission") say(act.t, `The operator: ${act.command}.`);
-    else if (act.command === "paused") say(act.t, `The mission is paused: ${act.reason}.`, "reaction");
+    else if (act.command === "paused" && !paused.has(pause)) {
+      paused.add(pause); // later ones tell of what has ended meanwhile, which has a line of its own
+      say(act.t, `The mission is paused: ${act.reason}.`, "reaction");
+    }
     else if (act.command === "resume") say(act.t, "The mission goes on.", "reaction");
     else if (act.command === "abort") say(act.t, `The mission is told to stop: ${act.reason}.`, "reaction");
   }
@@ -185,6 +210,7 @@ function costs(run) {
     const missed = mission.waypoints - mission.waypoints_reached;
     lines.push(missed ? `${missed} of ${mission.waypoints} waypoints were not reached` : "no waypoint was missed");
   }
+  for (const { from, to } of pauses(run)) if (to !== null) lines.push(`${seconds(to - from)} of a pause; a failure meanwhile is dealt with behind it`);
   if (summary?.outcome === "degraded") lines.push("the rest of the mission was flown in degraded mode");
   if (summary?.outcome === "given_up") lines.push("the mission's aim was given up");
   if (summary?.collisions === 0) lines.push("nothing was hit");
@@ -201,5 +227,6 @@ function marks(run) {
     if (!found.length && recovery.failure_s != null) found.push({ t: zero + recovery.failure_s, kind: "failure", label: "failure" });
     for (const [name, label] of Object.entries(moments)) if (recovery[`${name}_s`] != null) found.push({ t: zero + recovery[`${name}_s`], kind: name, label });
   } else for (const failure of failures(run)) found.push({ t: failure.end, kind: "detected", label: `${failure.skill} ${endingOf(failure)}` });
+  for (const { from, to } of pauses(run)) found.push({ t: from, kind: "pause", label: "paused" }, ...(to === null ? [] : [{ t: to, kind: "pause", label: "goes on" }]));
   return found;
 }

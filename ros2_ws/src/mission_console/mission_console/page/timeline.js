@@ -5,7 +5,7 @@ const BAND_ROW = 17;
 const GROUP = 18;
 const AXIS = 22;
 const MARK_ROW = 15;
-const MARK_COLOURS = { failure: "var(--bad)", detected: "#8e5bd0", fallback_running: "var(--now)", moving_again: "var(--good)" };
+const MARK_COLOURS = { failure: "var(--bad)", detected: "#8e5bd0", fallback_running: "var(--now)", moving_again: "var(--good)", pause: "var(--fair)" };
 
 class TimelineView {
   constructor(choose) {
@@ -166,7 +166,7 @@ class TimelineView {
     const text = `${label} ${seconds(t - origin(this.run), 2)}`;
     const label_ = svg("text", { x: right ? x - 4 : x + 4, y: y - 2, "text-anchor": right ? "end" : "start" }, text);
     label_.style.fill = stroke;
-    return [svg("line", { x1: x, x2: x, y1: y - 10, y2: bottom, stroke, "stroke-width": 1.5, "stroke-dasharray": { failure: "", detected: "6 3", fallback_running: "8 3 2 3", moving_again: "2 3" }[kind] ?? "4 4", "pointer-events": "none" }), label_];
+    return [svg("line", { x1: x, x2: x, y1: y - 10, y2: bottom, stroke, "stroke-width": 1.5, "stroke-dasharray": { failure: "", detected: "6 3", fallback_running: "8 3 2 3", moving_again: "2 3", pause: "1 3" }[kind] ?? "4 4", "pointer-events": "none" }), label_];
   }
 
   // --- by hand -----------------------------------------------------------------------------------------------------------
