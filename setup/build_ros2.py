@@ -91,8 +91,10 @@ def find_packages() -> dict[str, Package]:
 
 
 def state_of(name: str, packages: Mapping[str, Package]) -> str:
-    """Return a hash of a package and of everything of the workspace that it needs."""
+    """Return a hash of a package and of everything of the workspace that it is compiled against; Python only runs with what it needs."""
     package = packages[name]
+    if not (package.folder / "CMakeLists.txt").exists():
+        return package.digest
     return digest(package.digest, *(state_of(needed, packages) for needed in sorted(package.needs & packages.keys())))
 
 

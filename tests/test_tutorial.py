@@ -11,31 +11,19 @@ from pathlib import Path
 
 import pytest
 
+from alula_testing.cover import cover
+
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 SECTION = (ALULA_ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ {4}(\./alula .*)$", SECTION, re.MULTILINE)
 BLOCKS = dict(re.findall(r"^```(\w+)\n(.*?)^```$", SECTION, re.MULTILINE | re.DOTALL))
 MODEL, HOOKS = "skillsets/rover/rover.skill", "ros2_ws/src/rover_robot/rover_robot/hooks.py"
 
-# Runs what follows in a mount namespace of its own, where the checkout is covered by a layer that takes every change.
-COVER = 'mount -t overlay overlay -o "lowerdir=$1,upperdir=$2/upper,workdir=$2/work" "$1" && cd "$1" && shift 2 && exec "$@"'
-
 
 @pytest.fixture
 def checkout(tmp_path):
-    """Return the words before a command that has it work on the checkout and leave the checkout as it is, also what was built.
-
-    Mounting needs a mount namespace: root's own, or one of a user namespace. A machine that allows neither skips the test: without
-    the layer everything would have to be set up again.
-    """
-    layer = tmp_path / "layer"
-    for name in ("upper", "work"):
-        (layer / name).mkdir(parents=True)
-    for rights in ([], ["--map-root-user"]):
-        cover = ["unshare", "--mount", *rights, "sh", "-c", COVER, "sh", str(ALULA_ROOT), str(layer)]
-        if subprocess.run([*cover, "true"], capture_output=True, check=False).returncode == 0:
-            return cover
-    pytest.skip("this machine allows no overlay mount, not even in a user namespace")
+    """Return the words before a command that has it work on the checkout and leave the checkout as it is."""
+    return cover(tmp_path)
 
 
 def run(checkout, *command) -> str:
