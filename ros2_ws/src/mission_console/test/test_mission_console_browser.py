@@ -205,7 +205,8 @@ def test_a_failure_in_a_pause_is_told_with_what_was_done_when_the_mission_went_o
     chain = page.text(".chain b").split(" | ")
     assert chain[-3:] == ["branch", "decision", "started"]
     assert page.text("#lines li").count("The mission is paused") == 1
-    assert "69.9 s of a pause" in page.text("#costs li")
+    assert "69.9 s paused" in page.text("#costs li")
+    assert "90.00 sReaction: “navigate” went on with “LiDAR navigation”" in page.text("#lines li")
     assert "paused 20.00 s" in page.text("#timeline text")
     assert "goes on 89.90 s" in page.text("#timeline text")
     assert page.complaints() == []

@@ -172,11 +172,12 @@ function story(run) {
   for (const failure of failures(run)) {
     const chain = chainOf(run, failure);
     const branch = chain.find(({ step }) => step === "decision");
-    const done = chain.filter(({ step }) => ["stopped", "started"].includes(step)).map(({ text }) => text.replace(":", "")).join("; ");
+    const acts = chain.filter(({ step }) => ["stopped", "started"].includes(step));
+    const done = acts.map(({ text }) => text.replace(":", "")).join("; ");
     const why = (failure.message || failure.result).replace(/, after .*$/, "");
     say(failure.end, `${failure.skillset}.${failure.skill} ${ENDINGS[endingOf(failure)].words}${why ? `: ${why}` : ""}.`, "bad");
     const reaction = [branch?.text, done].filter(Boolean).join("; ");
-    if (reaction) say(failure.end, `Reaction: ${reaction}.`, "reaction");
+    if (reaction) say(Math.max(failure.end, (branch ?? acts[0]).t), `Reaction: ${reaction}.`, "reaction");
   }
   if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, "The fallback watches: the flight is safe again.", "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
@@ -210,7 +211,7 @@ function costs(run) {
     const missed = mission.waypoints - mission.waypoints_reached;
     lines.push(missed ? `${missed} of ${mission.waypoints} waypoints were not reached` : "no waypoint was missed");
   }
-  for (const { from, to } of pauses(run)) if (to !== null) lines.push(`${seconds(to - from)} of a pause; a failure meanwhile is dealt with behind it`);
+  for (const { from, to } of pauses(run)) if (to !== null) lines.push(`${seconds(to - from)} paused; what failed meanwhile was dealt with afterwards`);
   if (summary?.outcome === "degraded") lines.push("the rest of the mission was flown in degraded mode");
   if (summary?.outcome === "given_up") lines.push("the mission's aim was given up");
   if (summary?.collisions === 0) lines.push("nothing was hit");
@@ -228,5 +229,5 @@ function marks(run) {
     for (const [name, label] of Object.entries(moments)) if (recovery[`${name}_s`] != null) found.push({ t: zero + recovery[`${name}_s`], kind: name, label });
   } else for (const failure of failures(run)) found.push({ t: failure.end, kind: "detected", label: `${failure.skill} ${endingOf(failure)}` });
   for (const { from, to } of pauses(run)) found.push({ t: from, kind: "pause", label: "paused" }, ...(to === null ? [] : [{ t: to, kind: "pause", label: "goes on" }]));
-  return found;
+  return found.sort((one, other) => one.t - other.t);
 }
