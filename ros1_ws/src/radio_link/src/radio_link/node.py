@@ -69,7 +69,7 @@ class RadioLinkNode:
         self._radio = Radio(make_place(settings), parse_faults(settings.faults, FAULTS), make_way=make_way)
         self._kernel_ways = [way for way in (self._radio.down, self._radio.up) if isinstance(way, KernelChannel)]
         self._vehicle = Vehicle()
-        self._told: Situation | None = None
+        self._told: tuple[Situation, bool] | None = None
         self._state_due_ns = 0
         self._log = _open_log(Path(settings.log_path)) if settings.log_path else None
         self._state = rospy.Publisher("~state", String, queue_size=5, latch=True)
@@ -125,11 +125,12 @@ class RadioLinkNode:
 
     def _tell(self, now_ns: int) -> None:
         """Publish the state twice a second and when it changes; log the changes."""
-        situation, changed = self._radio.situation, self._radio.situation != self._told
+        present = self._radio.situation, self._radio.control_lost
+        changed = present != self._told
         if not changed and now_ns < self._state_due_ns:
             return
         self._state_due_ns = now_ns + STATE_PERIOD_NS
-        self._told = situation
+        self._told = present
         text = json.dumps(describe(self._radio, now_ns))
         self._state.publish(String(text))
         if changed and self._log is not None:
