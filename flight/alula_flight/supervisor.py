@@ -44,17 +44,21 @@ class Watch:
         self._record = record
         self._clock = clock
         self._told: set[tuple[str, int]] = set()
-        self.monitor: Any = None
+        self._launch: Any = None
         self.mission_exit: int | None = None
         self.worst = Consequence.GO_ON
         self.changed = threading.Event()
         self.ending = False
 
+    def follow(self, launch: Any) -> None:
+        """Listen to a roslaunch parent; before it starts, for a process may die before its start returns."""
+        self._launch = launch
+
     def process_died(self, process_name: str, exit_code: int | None) -> None:
         """Note a death; called by the process monitor's thread, again and again until the process runs again."""
         if self.ending:
             return
-        process = self.monitor.get_process(process_name)
+        process = self._launch.pm.get_process(process_name)
         key = (process_name, getattr(process, "spawn_count", 0))
         if key in self._told:
             return
@@ -148,8 +152,8 @@ class Supervisor:
             sigint_timeout=5.0,
             sigterm_timeout=2.0,
         )
+        self._watch.follow(launch)
         launch.start()
-        self._watch.monitor = launch.pm
         # roslaunch has put its own handlers; ours let the vehicle land first.
         on_end_signal(self._end_asked)
         rospy.init_node("alula_supervisor", disable_signals=True)

@@ -52,14 +52,16 @@ def death_lines(died: Sequence[Death]) -> list[str]:
 def flight_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight through a world was."""
     chart = summary.get("map") or {}
-    coverage = chart.get("coverage")
+    coverage, collisions = chart.get("coverage"), summary.get("collisions")
     lines = [
         f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}, "
-        f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {summary.get('collisions')}, "
+        f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {'unknown' if collisions is None else collisions}, "
         f"nearest surface {number(summary.get('min_clearance_m'), 'm')}"
     ]
     if summary.get("video"):
         return [*lines, video_line(summary["video"])]
+    if chart.get("points") is None:
+        return [*lines, "  map: none"]
     return [
         *lines,
         f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
@@ -109,7 +111,7 @@ def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) 
     lines = ["", outcome_words(summary, died, out), *death_lines(died)]
     if summary.get("mock"):
         lines += mock_lines(summary)
-    elif summary.get("outcome") is not None or summary.get("distance_m") is not None:  # else there are no figures
+    elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known to have flown
         lines += flight_lines(summary)
     recovery = summary.get("recovery") or {}
     if recovery.get("failure_s") is not None:

@@ -43,6 +43,20 @@ def test_a_flight_whose_nodes_all_died_names_them_and_their_logs() -> None:
     ]
 
 
+def test_a_mission_that_could_not_start_tells_no_figures() -> None:
+    summary = {"outcome": "not_started", "reason": "the mission clock stands still", "landed": None, "collisions": None}
+    lines = verdict_lines(summary, [Death("uav_simulator", "exit code 1", None)], OUT)
+    assert lines == ["", "the mission could not start: the mission clock stands still", "  uav_simulator died (exit code 1)"]
+
+
+def test_what_is_not_known_of_a_flight_is_said_so() -> None:
+    lines = verdict_lines({"outcome": "given_up", "landed": True, "duration_s": 9.0, "collisions": None}, [], OUT)
+    assert lines[2:] == [
+        "  landed: yes, duration 9.0 s, flown unknown, collisions unknown, nearest surface unknown",
+        "  map: none",
+    ]
+
+
 def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
     summary = {"outcome": None, "landed": False, "duration_s": 12.0, "distance_m": 9.0}
     lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)
