@@ -41,13 +41,6 @@ class ProcessFault:
         """Return in which way it fails."""
         return self.request.how or WAYS[0]
 
-    def active(self, since_lift_off_s: float | None) -> bool:
-        """Tell whether it lasts now; ``since_lift_off_s`` None: not lifted off yet."""
-        begin_s, end_s = self.request.begin_s, self.request.end_s
-        if begin_s is None:
-            return True
-        return since_lift_off_s is not None and begin_s <= since_lift_off_s < (math.inf if end_s is None else end_s)
-
 
 @dataclass(frozen=True)
 class Applied:
@@ -90,7 +83,7 @@ class ProcessFaults:
         """Begin and end what is due."""
         since_s = None if self._lift_off_s is None else now_s - self._lift_off_s
         for fault in self._faults:
-            if fault.active(since_s):
+            if fault.request.lasts(since_s):
                 self._break(fault, now_s)
             elif fault in self._active:
                 self._mend(fault, now_s)

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -44,6 +45,12 @@ class FaultRequest:
         begin = "" if self.begin_s is None else f"@{_shown(self.begin_s)}"
         end = "" if self.end_s is None else f"-{_shown(self.end_s)}"
         return f"{self.what}{how}{begin}{end}"
+
+    def lasts(self, since_lift_off_s: float | None) -> bool:
+        """Tell whether it is there so many seconds after lift-off; None: before it."""
+        if self.begin_s is None:
+            return True
+        return since_lift_off_s is not None and self.begin_s <= since_lift_off_s < (math.inf if self.end_s is None else self.end_s)
 
 
 def parse_fault(text: str, known: Mapping[str, Sequence[str]] | None = None) -> FaultRequest:

@@ -70,3 +70,16 @@ def test_any_text_is_read_or_refused(text):
         parse_fault(text)
     except FaultError as error:
         assert str(error)  # noqa: PT017
+
+
+@pytest.mark.parametrize(
+    ("text", "there"),
+    [
+        ("zed", (True, True, True, True, True)),
+        ("zed@30", (False, False, True, True, True)),
+        ("zed@30-40", (False, False, True, True, False)),
+    ],
+)
+def test_a_fault_lasts_from_its_beginning_to_its_end(text, there):
+    fault = parse_fault(text)
+    assert tuple(fault.lasts(since_s) for since_s in (None, 29.99, 30.0, 39.99, 40.0)) == there

@@ -85,7 +85,7 @@ class Radio:
     def look(self, point: Point | None, since_lift_off_s: float | None) -> None:
         """Take the vehicle's place and the time into account."""
         situation = self._place(point)
-        active = [fault for fault in self._faults if _active(fault, since_lift_off_s)]
+        active = [fault for fault in self._faults if fault.lasts(since_lift_off_s)]
         self.control_lost = any(fault.what == "control" for fault in active)
         for fault in active:
             quality = Quality(fault.how or FAULTS["radio"][0]) if fault.what == "radio" else situation.quality
@@ -93,9 +93,3 @@ class Radio:
                 situation = Situation(PRESETS[quality], quality, f"fault {fault}")
         self.situation = situation
         self.down.condition, self.up.condition = situation.both.down, situation.both.up
-
-
-def _active(fault: FaultRequest, since_lift_off_s: float | None) -> bool:
-    if fault.begin_s is None:
-        return True
-    return since_lift_off_s is not None and since_lift_off_s >= fault.begin_s and (fault.end_s is None or since_lift_off_s < fault.end_s)
