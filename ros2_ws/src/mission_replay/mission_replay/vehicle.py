@@ -55,6 +55,14 @@ class ReplayedSkill(MockSkill):
         super().on_interrupt(execution)
         return False if self._vehicle.stops_later(execution.id) else None
 
+    def on_pause(self, execution: Execution) -> str | None:
+        """Hold where it held in the record."""
+        return "" if self._vehicle.held(execution.id) else super().on_pause(execution)
+
+    def on_resume(self, execution: Execution) -> str | None:  # noqa: ARG002
+        """Go on."""
+        return ""
+
 
 class ReplayHost(LocalMockHost):
     """The mock robot's host: mocks give the data of a skillset only where the record's are no longer true."""
@@ -130,6 +138,8 @@ class RecordedSkills(Vehicle):
         super().__init__(behaviour, start_s=start_s)
         self._answers = recorded.answers
         self._reported = recorded.reported
+        events = (entry.value for entry in recorded.entries if entry.topic == EVENTS)
+        self._held = {str(event.get("id")) for event in events if event.get("state") == ExecutionState.PAUSED.value}
         self._here: dict[str, str] = {}
         """The execution of this replay that has an id in the record."""
         self._calls: dict[str, deque[Answer | None]] = {}
@@ -177,6 +187,10 @@ class RecordedSkills(Vehicle):
         if recorded_id is None or recorded_id in self._passed:
             return False
         return self._answers[recorded_id].state is ExecutionState.INTERRUPTED
+
+    def held(self, execution_id: str) -> bool:
+        """Tell whether an execution was paused in the record."""
+        return self._recorded.get(execution_id) in self._held
 
     # --- what the record tells ---------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from mission_replay.comparison import alike
 from run_analysis import expect
 from skill_missions.director import Outcome
 from skill_missions.mocked import MockedMission
-from skill_runtime.mock import load_behaviour
+from skill_runtime.mock import MockSkill, load_behaviour
 from uav_missions import mapping, mock_flight
 from uav_missions.route import load_route
 
@@ -101,6 +101,25 @@ def test_a_pause_is_decided_as_it_was(tmp_path):
     assert main([str(tmp_path / "run"), "--out", str(tmp_path / "again")]) == SAME
     assert requests(tmp_path / "again") == requests(tmp_path / "run")
     assert ending(tmp_path / "again") == ending(tmp_path / "run")
+
+
+def test_skills_hold_in_a_replay_where_they_held_then(tmp_path, monkeypatch):
+    mission = mapping_over_mocks(tmp_path / "run")
+    monkeypatch.setattr(MockSkill, "on_pause", lambda _self, execution: "" if execution.skill == "goto_straight" else "no")
+    monkeypatch.setattr(MockSkill, "on_resume", lambda _self, _execution: "")
+
+    def tell(command: str) -> None:
+        mission._record.told(command, "")
+        (mission.director.pause if command == "pause" else mission.director.resume)()
+
+    mission.world.clock.after(15.0, lambda: tell("pause"))
+    mission.world.clock.after(18.0, lambda: tell("resume"))
+    assert mission.run().outcome is Outcome.ACCOMPLISHED
+    asked = [(kind, skill) for kind, _, skill, _ in requests(tmp_path / "run") if kind in {"pause", "resume"}]
+    assert (asked.count(("pause", "goto_straight")), asked.count(("resume", "goto_straight"))) == (1, 1)
+    monkeypatch.undo()
+    assert main([str(tmp_path / "run"), "--out", str(tmp_path / "again")]) == SAME
+    assert requests(tmp_path / "again") == requests(tmp_path / "run")
 
 
 def test_an_abort_is_decided_as_it_was(tmp_path):
