@@ -15,7 +15,7 @@ from pathlib import Path
 
 from alula_common.runs import NoRunError, Run, find_run, live_runs
 from skill_panel.memory import Memory
-from skill_panel.watcher import Watcher, skillsets_in, wait_for
+from skill_panel.watcher import Watcher, all_found, skillsets_in
 from skill_runtime.ros2.session import Session
 
 DOMAINS = range(233)
@@ -74,8 +74,7 @@ def say_what_runs(options: argparse.Namespace) -> None:
         session = Session("skill_panel", domain=place.domain)
         try:
             look = partial(skillsets_in, session.node, options.namespace, options.skillsets)
-            wait_for(lambda: bool(look()), LIST_S)  # noqa: B023 - called at once
-            found = [f"{space}/{name}" for space, name in look()]
+            found = [f"{space}/{name}" for space, name in sorted(all_found(look, LIST_S))]
         finally:
             session.close()
         sys.stdout.write(f"{place.title}: {', '.join(found) or 'no skillset'}\n")

@@ -21,7 +21,7 @@ from alula_common.runs import LATEST, NoRunError, find_run, load_run
 from alula_common.signals import Interrupts, on_end_signal
 from alula_common.suggestions import nearest
 from skill_panel.__main__ import DOMAINS, LIST_S, place_of
-from skill_panel.watcher import skillsets_in, wait_for
+from skill_panel.watcher import all_found, skillsets_in
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import event_record
 from skill_runtime.waiting import NoAnswerError
@@ -40,6 +40,10 @@ class CommandError(Exception):
     """What was asked for can't be; the message names it and what there is."""
 
 
+class NotThereError(CommandError):
+    """What was named belongs to no skillset that is known so far."""
+
+
 def find_skill(clients: Clients, name: str) -> tuple[Any, str]:
     """Return the client and the name of ``skill`` or ``skillset.skill``; raise CommandError."""
     skillset, _, skill = name.rpartition(".")
@@ -49,14 +53,15 @@ def find_skill(clients: Clients, name: str) -> tuple[Any, str]:
     known = [f"{n}.{s.name}" for n, c in clients.items() for s in c.model.skills]
     if found:
         raise CommandError(f"several skillsets have a skill {skill}; write {' or '.join(k for k in known if k.endswith(f'.{skill}'))}")
-    raise CommandError(f"there is no skill {name}; {nearest(name, [*known, *(k.partition('.')[2] for k in known)])}")
+    raise NotThereError(f"there is no skill {name}; {nearest(name, [*known, *(k.partition('.')[2] for k in known)])}")
 
 
 def find_member(clients: Clients, name: str, what: str) -> tuple[Any, str]:
     """Return the client and the name of ``skillset.member``; raise CommandError."""
     skillset, _, member = name.partition(".")
     if skillset not in clients or not member:
-        raise CommandError(f"there is no {what} {name}; write SKILLSET.NAME, skillsets: {', '.join(clients)}")
+        kind = NotThereError if member else CommandError
+        raise kind(f"there is no {what} {name}; write SKILLSET.NAME, skillsets: {', '.join(clients)}")
     return clients[skillset], member
 
 
@@ -249,19 +254,28 @@ def drive(options: argparse.Namespace, out: Out) -> int:
     place = place_of(options)
     session = Session("alula", domain=place.domain)
     try:
-        wait_for(lambda: bool(skillsets_in(session.node, options.namespace)), LIST_S)
-        names = [name for _, name in skillsets_in(session.node, options.namespace)]
-        if not names:
-            raise CommandError(f"no skillset runs {place.title}; ./alula fly mapping or ./alula mock skillsets/uav starts some")
-        robot = Robot(session.node, names, namespace=options.namespace)
-        if not robot.wait_ready(ANSWER_S):
-            raise CommandError(f"the managers of {', '.join(names)} do not answer {place.title}")
-        try:
-            return COMMANDS[options.command](robot.clients, options, out)
-        finally:
-            robot.close()
+        names: list[str] = []
+        problem = CommandError(f"no skillset runs {place.title}; ./alula fly mapping or ./alula mock skillsets/uav starts some")
+        # What is not there may belong to a skillset that the graph has not told of yet.
+        while more := _other_skillsets(session.node, options.namespace, names):
+            names = sorted([*names, *more])
+            robot = Robot(session.node, names, namespace=options.namespace)
+            try:
+                if not robot.wait_ready(ANSWER_S):
+                    raise CommandError(f"the managers of {', '.join(names)} do not answer {place.title}")
+                return COMMANDS[options.command](robot.clients, options, out)
+            except NotThereError as error:
+                problem = error
+            finally:
+                robot.close()
+        raise problem
     finally:
         session.close()
+
+
+def _other_skillsets(node: Any, namespace: str, known: Sequence[str]) -> list[str]:
+    """Return the names of the skillsets that are not known yet, as soon as there are some and the graph tells of no more."""
+    return all_found(lambda: [name for _, name in skillsets_in(node, namespace) if name not in known], LIST_S)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

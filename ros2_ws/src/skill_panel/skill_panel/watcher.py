@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -24,6 +24,9 @@ from skill_runtime.waiting import Pending
 DESCRIBE = "skillset_interfaces/srv/Describe"
 LOOK_S = 0.5
 DATA_S = 0.5
+QUIET_S = 1.0
+"""So long (wall clock) after the last of several things was found, they are taken for all."""
+T = TypeVar("T")
 
 
 def skillsets_in(node: Node, namespace: str = "", names: Sequence[str] = ()) -> list[tuple[str, str]]:
@@ -231,6 +234,24 @@ class Watcher:
     def _ask(self) -> None:
         for one in list(self._watched.values()):
             one.ask_for_data()
+
+
+def all_found(look: Callable[[], Sequence[T]], timeout_s: float) -> list[T]:
+    """Return what is found once that is something and nothing is added any more; nothing when there is none within the time (wall clock).
+
+    DDS tells of one process after another, and never that these are all.
+    """
+    found: list[T] = []
+
+    def is_added() -> bool:
+        added = [one for one in look() if one not in found]
+        found.extend(added)
+        return bool(added)
+
+    wait_s = timeout_s
+    while wait_for(is_added, wait_s):
+        wait_s = QUIET_S
+    return found
 
 
 def wait_for(condition: Callable[[], bool], timeout_s: float) -> bool:

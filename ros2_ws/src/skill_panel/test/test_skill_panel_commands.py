@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import navigation_managers.model as navigation
+import perception_managers.model as perception
 import pytest
 
 from alula_common.record import EVENTS, FILE, RecordWriter
+from skill_panel import commands
 from skill_panel.commands import COMMANDS, CommandError, main, parse
 from skill_runtime.mock import load_behaviour, mock_world
 
@@ -80,6 +84,43 @@ def test_wrong_words_are_named_with_what_is_meant(shell: Shell, words: tuple[str
     with pytest.raises(CommandError) as error:
         shell(*words)
     assert complaint in str(error.value)
+
+
+class LateGraph:
+    """A graph that tells of one skillset after another; ``Robot`` and ``Session`` that know no middleware."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **appear_s: float) -> None:
+        self.world, _ = mock_world([navigation.SKILLSET, perception.SKILLSET], load_behaviour([], [navigation.SKILLSET]))
+        self._appear_s = appear_s
+        self._began_s = time.monotonic()
+        monkeypatch.setattr(commands, "skillsets_in", self._look)
+        monkeypatch.setattr("skill_runtime.ros2.robot.Robot", self._robot)
+        monkeypatch.setattr("skill_runtime.ros2.session.Session", lambda *_, **__: SimpleNamespace(node=None, close=lambda: None))
+
+    def _look(self, *_: object) -> list[tuple[str, str]]:
+        passed_s = time.monotonic() - self._began_s
+        return [("", name) for name, appears_s in self._appear_s.items() if appears_s <= passed_s]
+
+    def _robot(self, _: object, names: list[str], **__: object) -> Any:
+        clients = {name: self.world.client(name) for name in names}
+        wait_ready = lambda timeout_s: all(client.wait_ready(timeout_s) for client in clients.values())  # noqa: E731
+        return SimpleNamespace(clients=clients, wait_ready=wait_ready, close=lambda: None)
+
+
+def test_all_skillsets_are_listed_however_late_the_graph_tells_of_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    LateGraph(monkeypatch, navigation=0.1, perception=0.6)
+    assert main(["skills", "--domain", "5", "--json"]) == 0
+    assert [json.loads(line)["skillset"] for line in capsys.readouterr().out.splitlines()] == ["navigation", "perception"]
+
+
+def test_a_skill_of_a_skillset_that_the_graph_tells_of_late_is_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    LateGraph(monkeypatch, perception=0.1, navigation=2.0)
+    assert main(["why", "takeoff", "--domain", "5"]) == 1
+    assert "SDK_authority" in capsys.readouterr().out
 
 
 def test_events_of_a_run_are_read_from_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
