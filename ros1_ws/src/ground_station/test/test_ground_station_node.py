@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import select
 import socket
 import threading
 import time
@@ -15,12 +16,14 @@ import cv2
 import numpy as np
 import pytest
 import rospy
+from geometry_msgs.msg import Twist, Vector3
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from radio_link.loop import LARGEST_DATAGRAM, udp_socket
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from uav_msgs.msg import VideoState
-from uav_msgs.srv import Stream
+from uav_msgs.srv import Command, Stream
 from video_stream.wire import NS, Seal, VideoPacket
 
 from alula_common.network import free_port
@@ -281,3 +284,69 @@ def test_a_ground_station_that_was_killed_leaves_the_drone_with_no_picture_and_t
     flight.back(GROUND)
     assert flight.until(telepilot.sees, 15.0) < 10.0
     assert telepilot.state.fps_margin >= 0.0
+
+
+class FakeAutopilot:
+    """The vehicle's end of the control link: says in which mode it is, and takes the one that it is told."""
+
+    def __init__(self, telemetry_port: int) -> None:
+        self.mode = 4
+        self.sticks: list[int] = []
+        self._socket = udp_socket(0)
+        self._to = telemetry_port
+        self._sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        self._parser = mavlink.MAVLink(None)
+
+    @property
+    def port(self) -> int:
+        return self._socket.getsockname()[1]
+
+    def work(self) -> None:
+        """Take what has come, and tell the mode."""
+        for message in self._heard():
+            if message.get_type() == "MANUAL_CONTROL":
+                self.sticks.append(message.x)
+            elif message.get_type() == "COMMAND_LONG":
+                self.mode = round(message.param2)
+        beat = mavlink.MAVLink_heartbeat_message(13, 3, 1, self.mode, 4, 3)
+        self._socket.sendto(bytes(beat.pack(self._sender)), ("127.0.0.1", self._to))
+
+    def _heard(self) -> list[mavlink.MAVLink_message]:
+        data = b""
+        while select.select([self._socket], [], [], 0.02)[0]:
+            data += self._socket.recv(LARGEST_DATAGRAM)
+        return self._parser.parse_buffer(data) or []
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def test_the_stick_s_topic_takes_the_vehicle_over_and_the_service_gives_it_back(ros_master, start_node):
+    telemetry = free_port()
+    autopilot = FakeAutopilot(telemetry)
+    ports = [f"_control_port:={autopilot.port}", f"_telemetry_port:={telemetry}", "_video_port:=0", "_player_port:=1", "_report_port:=1"]
+    start_node([str(SOURCES / GROUND / f"scripts/{GROUND}_node"), *ports])
+    stick = rospy.Publisher("/ground_station/stick", Twist, queue_size=1)
+    wait_until(stick.get_num_connections, timeout_s=PATIENCE_S, what="the ground station hears the stick")
+    give_back = rospy.ServiceProxy("/ground_station/give_back", Command)
+    give_back.wait_for_service(PATIENCE_S)
+    assert give_back().reason == "the telepilot does not have the vehicle"
+
+    def hold(forward: float) -> Callable[[], None]:
+        def held() -> None:
+            stick.publish(Twist(linear=Vector3(x=forward)))
+            autopilot.work()
+
+        return held
+
+    def flown(forward: float, condition: Callable[[], bool]) -> None:
+        held = hold(forward)
+        wait_until(lambda: held() or condition(), timeout_s=PATIENCE_S, what=f"the stick at {forward}")
+
+    hold(0.0)()
+    flown(0.5, lambda: 500 in autopilot.sticks)
+    assert autopilot.mode == 5
+    wait_until(lambda: autopilot.work() or autopilot.sticks[-1] == 0, timeout_s=PATIENCE_S, what="a stick that says nothing is centred")
+    assert give_back().accepted
+    flown(0.0, lambda: autopilot.mode == 4)
+    autopilot.close()
