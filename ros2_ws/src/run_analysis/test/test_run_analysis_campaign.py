@@ -224,7 +224,7 @@ def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp
     flights = load_campaign(path).flights
     there = [json.loads(line) for line in (out / ROWS).read_text(encoding="utf-8").splitlines()]
     assert [one["flight"] for one in there] == list(range(14))
-    assert there[:3] == json.loads(json.dumps(fly(flights[:3], MOCKS, (), "")))
+    assert there == json.loads(json.dumps(fly(flights, MOCKS, (), "")))
     assert [asdict(flight)["seed"] for flight in flights] == [one["seed"] for one in there]
     for name in ("coverage.json", "coverage.txt", "coverage.html"):
         assert (out / name).is_file()
