@@ -20,7 +20,9 @@ case "$1" in
     for _alula_package in "$ALULA_ROOT"/ros2_ws/src/{alula_common,skill_model,skill_language,skill_runtime,run_analysis,mission_console} "$ALULA_STATE"/generated/*_managers; do
       PYTHONPATH="$PYTHONPATH:$_alula_package"
     done
-    export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}" ROS_IP="${ROS_IP:-127.0.0.1}"
+    export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
+    # Loopback, unless the caller has given this machine a name: roscpp takes no peers by name beside a loopback address.
+    [ -n "${ROS_HOSTNAME:-}" ] || export ROS_IP="${ROS_IP:-127.0.0.1}"
     ;;
   2)
     export PATH="$ALULA_STATE/venv2/bin:$_alula_path"
