@@ -102,3 +102,17 @@ def test_a_measurement_waits_for_the_pose_of_its_moment():
     late.start()
     assert poses.wait_for(NS, timeout_s=10.0)
     late.join()
+
+
+@pytest.mark.parametrize(
+    ("position", "attitude"),
+    [((np.nan, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), ((0.0, 0.0, 0.0), (0.0, np.inf, 0.0, 1.0)), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))],
+)
+def test_a_pose_that_is_none_is_left_out(position, attitude) -> None:
+    poses = PoseBuffer()
+    poses.add(0, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+    poses.add(NS // 50, position, attitude)
+    poses.add(NS // 25, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+    found = poses.at([NS // 50])
+    assert found.position[0] == pytest.approx([1.0, 2.0, 3.0])
+    assert found.rotation[0] == pytest.approx(np.eye(3))

@@ -16,7 +16,11 @@ from alula_testing.ros1 import wait_until
 from perception_core import NS
 from perception_core.clouds import sweep_of_cloud
 from perception_core.testing import Expected, FakeFlight, check_fault, wall_pair
+from uav_simulator.sensors import degradation
+from uav_simulator.sensors.faults import SensorMode
 
+SIMULATED = ("flickering", "dark", "white", "blurred", "shifted", "rotated", "swapped")
+"""Faults that are made as the simulator makes them."""
 NODE = str(Path(__file__).parents[1] / "scripts" / "zed_depth_node")
 CAMERA_X_M = 0.3
 
@@ -36,11 +40,17 @@ class Camera:
             self.last_good_ns = stamp_ns
         left, right = wall_pair(self.disparity_px, seed=stamp_ns // 1000 % 2**31)
         frozen = wall_pair(self.disparity_px, seed=self.last_good_ns // 1000 % 2**31)
-        pairs = {"black": (left * 0, right * 0), "frozen": frozen, "shifted": (left, np.roll(right, 3, axis=0)), "swapped": (right, left)}
+        pairs = {"black": (left * 0, right * 0), "frozen": frozen}
+        if self.mode in SIMULATED:
+            rng = np.random.default_rng(stamp_ns // 1000 % 2**31)
+            pairs[self.mode] = degradation.pair(SensorMode(self.mode), frozen if self.mode == "flickering" else (left, right), rng)
         scale = 2 if self.mode == "wrong info" else 1
         for side, image in zip(("left", "right"), pairs.get(self.mode, (left, right)), strict=True):
             pixels = np.dstack([image] * 3) if self.encoding == "bgr8" else image
             late_ns = {"future": -10 * NS, "late": NS}.get(self.mode, 0)
+            if self.mode == "cut short":
+                self.flight.publish_cut_image(side, stamp_ns, image)
+                continue
             encoding = "jpeg" if self.mode == "encoding" else self.encoding
             self.flight.publish_image(side, stamp_ns - late_ns, pixels, encoding=encoding, info_scale=scale)
 
@@ -119,12 +129,18 @@ FAULTS = (
     Expected("dead", "silent", "no measurement for 0.35 s"),
     Expected("black", "exposure", "left image is dark"),
     Expected("frozen", "frozen", "left image is frozen"),
+    Expected("flickering", "frozen", "left image is frozen"),
+    Expected("dark", "exposure", "left image is dark"),
+    Expected("white", "exposure", "overexposed"),
+    Expected("blurred", "blur", "image is blurred", 1.0),
+    Expected("rotated", "calibration", "turned against each other", 1.0),
     Expected("shifted", "calibration", "px off the left one's rows", 1.0),
     Expected("swapped", "calibration", "left and right are swapped", 1.0),
     # Info and image come on two ways: a pair may still meet the info before it.
     Expected("wrong info", "info", "camera_info is for 960x540 images, the left image is 480x270", 1.0),
     Expected("future", "stamp", "in the future"),
     Expected("late", "stamp", "old when it arrives"),
+    Expected("cut short", "format", "bytes for"),
     Expected("encoding", "format", "image: encoding 'jpeg'; known are"),
 )
 

@@ -50,7 +50,9 @@ class PoseBuffer:
         self._lock = Condition()
 
     def add(self, stamp_ns: int, position_m: Sequence[float], quat_xyzw: Sequence[float]) -> None:
-        """Remember a pose; time that jumps backwards (a restarted clock) clears the memory."""
+        """Remember a pose; time that jumps backwards (a restarted clock) clears the memory. One with numbers that are none is left out."""
+        if not np.isfinite([*position_m, *quat_xyzw]).all() or not any(quat_xyzw):
+            return
         with self._lock:
             if self._rows and stamp_ns <= self._rows[-1][0]:
                 self._rows.clear()

@@ -31,7 +31,7 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
-from perception_core.ros import TunableSettings, read_settings
+from perception_core.ros import RawSubscriber, TunableSettings, read_settings
 from resource_reporter import ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
@@ -48,6 +48,7 @@ log = logging.getLogger(__name__)
 
 STATE_HZ = 20.0
 HEARTBEAT_PERIOD_S = 1.0
+OBSTACLE_BYTES = 1 << 16
 # The autopilot's agreement is bounded on the mission clock; this bounds the wait of a caller should that clock stand still.
 AGREEMENT_WALL_S = 30.0
 SKILLSET = "navigation"
@@ -72,7 +73,7 @@ class GuidanceNode:
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
         self._link = Link(settings.url, settings.baud, on_message=self._on_message, on_connect=self._on_connect)
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
-            rospy.Subscriber(topic, Obstacle, self._on_obstacle, queue_size=5, tcp_nodelay=True)
+            RawSubscriber(topic, Obstacle, self._on_obstacle, _on_garbage, buffer_bytes=OBSTACLE_BYTES, queue_size=5)
         self._offer_services()
         self._tuning = TunableSettings(settings, self._tune)
 
@@ -205,6 +206,10 @@ class GuidanceNode:
     def _report_resources(self) -> None:
         for resource, state in self._guidance.resources().items():
             self._reporter.report(resource, state)
+
+
+def _on_garbage(reason: str) -> None:
+    log.warning("a sensor's verdict is left out, which is as if nobody watched: %s", reason)
 
 
 def _now_s() -> float:

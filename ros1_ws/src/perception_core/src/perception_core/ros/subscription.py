@@ -35,7 +35,7 @@ class RawSubscriber(Generic[Message]):
     rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
     So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A stream that has lost the
     borders between its messages can't be decoded at all: after `SILENCE_S` without a message the connections are rebuilt, at growing
-    intervals.
+    intervals. Of messages that wait the newest ``queue_size`` are decoded.
     """
 
     def __init__(
@@ -46,8 +46,9 @@ class RawSubscriber(Generic[Message]):
         on_garbage: Callable[[str], None],
         *,
         buffer_bytes: int,
+        queue_size: int = 1,
     ) -> None:
-        self._topic, self._kind, self._buffer_bytes = topic, kind, buffer_bytes
+        self._topic, self._kind, self._buffer_bytes, self._queue_size = topic, kind, buffer_bytes, queue_size
         self._on_message, self._on_garbage = on_message, on_garbage
         self._lock = Lock()
         self._heard_s = rospy.get_time()
@@ -59,7 +60,8 @@ class RawSubscriber(Generic[Message]):
         self._watch.start()
 
     def _subscribe(self) -> rospy.Subscriber:
-        return rospy.Subscriber(self._topic, rospy.AnyMsg, self._on_bytes, queue_size=1, buff_size=self._buffer_bytes, tcp_nodelay=True)
+        size, queue = self._buffer_bytes, self._queue_size
+        return rospy.Subscriber(self._topic, rospy.AnyMsg, self._on_bytes, queue_size=queue, buff_size=size, tcp_nodelay=True)
 
     @property
     def published(self) -> bool:

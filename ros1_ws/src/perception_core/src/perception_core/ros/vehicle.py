@@ -13,10 +13,12 @@ from uav_msgs.msg import GuidanceState
 from perception_core.corridor import Motion
 from perception_core.poses import PoseBuffer
 from perception_core.ros.conversions import matrix_of_transform
+from perception_core.ros.subscription import RawSubscriber
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+BUFFER_BYTES = 1 << 16
 POSES_KEPT_S = 3.0
 POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
@@ -29,9 +31,9 @@ class Vehicle:
         self.motion = Motion()
         self._mounts: dict[str, NDArray[np.float64]] = {}
         self._subscribers = [
-            rospy.Subscriber("/uav_guidance/pose", PoseStamped, self._on_pose, queue_size=50, tcp_nodelay=True),
-            rospy.Subscriber("/uav_guidance/state", GuidanceState, self._on_state, queue_size=1, tcp_nodelay=True),
-            rospy.Subscriber("/tf_static", TFMessage, self._on_static, queue_size=10),
+            RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, _on_garbage, buffer_bytes=BUFFER_BYTES, queue_size=50),
+            RawSubscriber("/uav_guidance/state", GuidanceState, self._on_state, _on_garbage, buffer_bytes=BUFFER_BYTES),
+            RawSubscriber("/tf_static", TFMessage, self._on_static, _on_garbage, buffer_bytes=BUFFER_BYTES, queue_size=10),
         ]
 
     def poses_at(self, stamp_ns: int) -> PoseBuffer:
@@ -58,3 +60,7 @@ class Vehicle:
         for item in message.transforms:
             if item.header.frame_id.lstrip("/") == "base_link":
                 self._mounts[item.child_frame_id.lstrip("/")] = matrix_of_transform(item.transform)
+
+
+def _on_garbage(reason: str) -> None:
+    rospy.logwarn_throttle(2.0, f"left out: {reason}")

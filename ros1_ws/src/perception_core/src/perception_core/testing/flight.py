@@ -189,6 +189,14 @@ class FakeFlight:
         step, self._measured = image.strides[0], True
         self._images[side].publish(Image(header=header, height=height, width=width, encoding=encoding, step=step, data=image.tobytes()))
 
+    def publish_cut_image(self, side: str, stamp_ns: int, image: NDArray[np.uint8]) -> None:
+        """Send an image whose last bytes are missing, as a message of its own that is complete as far as its length says."""
+        header = Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id=f"zed_{side}")
+        height, width = image.shape
+        buffer = BytesIO()
+        Image(header=header, height=height, width=width, encoding="mono8", step=width, data=image.tobytes()).serialize(buffer)
+        send_raw(self._images[side], framed(buffer.getvalue()[:-100]))
+
     def publish_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
         """Publish one cloud of the LiDAR, whose frame is base_link's moved up by 0.1 m."""
         self._measured = True
