@@ -96,6 +96,13 @@ def make_report(folder: Path, story: Story | None = None, *, world: str = "yard.
     return f"file://{folder / REPORT}"
 
 
+UNNAMED = (
+    "[...document.querySelectorAll('button, input, select, progress, canvas, img, [role=img]')].filter((one) => !one.closest('[hidden]') &&"
+    "!(one.textContent.trim() || one.getAttribute('aria-label') || one.alt || one.closest('label'))).map((one) => one.outerHTML)"
+)
+"""Controls and pictures that a screen reader has no name for."""
+
+
 def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser: Any, tmp_path: Path) -> None:
     page = Page(browser, make_report(tmp_path))
     page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
@@ -238,11 +245,7 @@ def test_the_page_fits_the_screen_and_names_its_controls(browser: Any, tmp_path:
     page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
     assert page.run("document.documentElement.scrollWidth") <= size[0]
     assert page.run("document.documentElement.dataset.theme") == theme
-    unnamed = (
-        "[...document.querySelectorAll('button, input, select, canvas, [role=img]')].filter((one) => !one.closest('[hidden]') &&"
-        "!(one.textContent.trim() || one.getAttribute('aria-label') || one.closest('label'))).map((one) => one.outerHTML)"
-    )
-    assert page.run(unnamed) == []
+    assert page.run(UNNAMED) == []
     assert page.complaints() == []
 
 
@@ -514,6 +517,7 @@ def test_skills_are_driven_by_hand(
             {"act": "transition", "root": "/navigation", "resource": "flight_status", "to": "ON_GROUND"},
         ]
         assert page.run("document.documentElement.scrollWidth") <= size[0]
+        assert page.run(UNNAMED) == []
         assert page.run("document.title") == "Alula"
         page.run("document.querySelector('#hands summary').click()")
         page.wait("document.querySelector('#hands').open === false")
