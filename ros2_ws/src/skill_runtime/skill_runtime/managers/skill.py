@@ -17,6 +17,9 @@ from skill_runtime.middleware import ActionServer, Goal, Middleware
 class SkillManager:
     """Serves one skill; a goal's id is the execution's."""
 
+    server: ActionServer
+    """The action, once it is served."""
+
     def __init__(
         self,
         middleware: Middleware,
@@ -33,7 +36,8 @@ class SkillManager:
 
     def serve(self) -> ActionServer:
         """Take goals."""
-        return self._middleware.serve_action(self._skill.name, self._on_goal, self._on_cancel)
+        self.server = self._middleware.serve_action(self._skill.name, self._on_goal, self._on_cancel)
+        return self.server
 
     def on_event(self, event: ExecutionEvent) -> None:
         """Follow an execution of this skill."""
