@@ -80,13 +80,13 @@ class LidarAhead:
         """Select the returns around the way ahead, by one pose for all; the vehicle's own are left out."""
         body = self._settings.body
         usable = sweep.within(0.05, float("inf"))
-        R, t = (T_base_lidar[:3, :3].astype(np.float32), T_base_lidar[:3, 3].astype(np.float32))  # noqa: N806 -- matrix
-        in_base = usable.points @ R.T + t
-        own = (np.hypot(in_base[:, 0], in_base[:, 1]) <= body.radius_m) & (np.abs(in_base[:, 2]) <= body.half_height_m)
+        x, y, z = _axes(usable.points, T_base_lidar[:3, :3], T_base_lidar[:3, 3])
+        own = (x * x + y * y <= body.radius_m**2) & (np.abs(z) <= body.half_height_m)
         axes = np.array([direction, [-direction[1], direction[0], 0.0], [0.0, 0.0, 1.0]]) @ pose[:3, :3]
-        ahead, left, up = (in_base @ axes.T.astype(np.float32)).T
-        flat = np.hypot(ahead, left)
-        towards = (ahead >= np.cos(np.radians(VIEW_DEG)) * flat) & (np.abs(up) <= np.tan(np.radians(STEEP_DEG)) * flat) & ~own
+        ahead, left, up = _axes(usable.points, axes @ T_base_lidar[:3, :3], axes @ T_base_lidar[:3, 3])
+        flat = ahead * ahead + left * left  # squared, as all that is compared with it: a root of each point costs as much as the rest
+        in_view = (ahead >= 0.0) & (ahead * ahead >= np.cos(np.radians(VIEW_DEG)) ** 2 * flat)
+        towards = in_view & (up * up <= np.tan(np.radians(STEEP_DEG)) ** 2 * flat) & ~own
         length_m = self._settings.corridor.length_m
         near = (ahead >= -BEHIND_M - BLUR_M) & (ahead <= length_m + BLUR_M) & (np.abs(left) <= ASIDE_M + BLUR_M) & ~own
         return _Around(near=usable.select(near), ahead=int(np.count_nonzero(towards)))
@@ -96,3 +96,10 @@ class LidarAhead:
 class _Around:
     near: Sweep
     ahead: int
+
+
+def _axes(points: NDArray[np.float32], rotation: Floats, origin: Floats) -> NDArray[np.float32]:
+    """Return the points (N, 3) in another frame, coordinate by coordinate, (3, N)."""
+    seen: NDArray[np.float32] = rotation.astype(np.float32) @ points.T
+    seen += origin.astype(np.float32)[:, None]
+    return seen
