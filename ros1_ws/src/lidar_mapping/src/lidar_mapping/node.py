@@ -31,6 +31,7 @@ from perception_core.ros import (
     cloud_message,
     read_settings,
     sweep_of_cloud,
+    warn_of_garbage,
 )
 from resource_reporter import ResourceReporter, ToldService
 
@@ -72,8 +73,8 @@ class LidarMappingNode:
             rospy.Timer(rospy.Duration.from_sec(settings.publish_period_s), self._publish_map, reset=True),
             rospy.Timer(rospy.Duration.from_sec(TF_PERIOD_S), self._publish_tf, reset=True),
         ]
-        self._imu = RawSubscriber(IMU, Imu, self._on_imu, self._on_garbage, buffer_bytes=IMU_BYTES, queue_size=IMU_QUEUE)
-        self._clouds = RawSubscriber(CLOUD, PointCloud2, self._on_cloud, self._on_garbage, buffer_bytes=CLOUD_BYTES)
+        self._imu = RawSubscriber(IMU, Imu, self._on_imu, buffer_bytes=IMU_BYTES, queue_size=IMU_QUEUE)
+        self._clouds = RawSubscriber(CLOUD, PointCloud2, self._on_cloud, buffer_bytes=CLOUD_BYTES)
         rospy.on_shutdown(lambda: self._save_if_new(None))
 
     def _resume(self) -> None:
@@ -95,13 +96,9 @@ class LidarMappingNode:
         try:
             self._worker.offer((message.header.frame_id, sweep_of_cloud(message)))
         except ValueError as error:
-            self._on_garbage(str(error))
+            warn_of_garbage(str(error))
             return False
         return True
-
-    @staticmethod
-    def _on_garbage(reason: str) -> None:
-        rospy.logwarn_throttle(2.0, f"left out: {reason}")
 
     def _process(self, item: tuple[str, Sweep]) -> None:
         try:
@@ -113,7 +110,7 @@ class LidarMappingNode:
         rates, force = message.angular_velocity, message.linear_acceleration
         reading = ImuReading(message.header.stamp.to_nsec(), np.array([rates.x, rates.y, rates.z]), np.array([force.x, force.y, force.z]))
         if not self._readings.add(reading, rospy.Time.now().to_nsec()):
-            self._on_garbage(
+            warn_of_garbage(
                 f"a reading of {IMU} can't be one: stamp {reading.stamp_ns}, {reading.rates} rad/s, {reading.specific_force} m/s2"
             )
 

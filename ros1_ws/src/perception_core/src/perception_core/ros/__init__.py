@@ -10,7 +10,7 @@ from perception_core.ros.conversions import (
 from perception_core.ros.done import DoneReporter
 from perception_core.ros.health import HealthReporter
 from perception_core.ros.settings import read_settings
-from perception_core.ros.subscription import RawSubscriber
+from perception_core.ros.subscription import RawSubscriber, warn_of_garbage
 from perception_core.ros.switch import EnableSwitch
 from perception_core.ros.tuning import TunableSettings
 from perception_core.ros.vehicle import Vehicle
@@ -30,4 +30,5 @@ __all__ = [
     "obstacle_message",
     "read_settings",
     "sweep_of_cloud",
+    "warn_of_garbage",
 ]

@@ -29,6 +29,11 @@ class MessageLike(Protocol):
 Message = TypeVar("Message", bound=MessageLike)
 
 
+def warn_of_garbage(reason: str) -> None:
+    """Log that something is left out."""
+    rospy.logwarn_throttle(2.0, f"left out: {reason}")
+
+
 class RawSubscriber(Generic[Message]):
     """Subscribe to bytes and decode them here.
 
@@ -43,7 +48,7 @@ class RawSubscriber(Generic[Message]):
         topic: str,
         kind: type[Message],
         on_message: Callable[[Message], None],
-        on_garbage: Callable[[str], None],
+        on_garbage: Callable[[str], None] = warn_of_garbage,
         *,
         buffer_bytes: int,
         queue_size: int = 1,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import rospy
 from geometry_msgs.msg import PoseStamped
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
@@ -31,9 +30,9 @@ class Vehicle:
         self.motion = Motion()
         self._mounts: dict[str, NDArray[np.float64]] = {}
         self._subscribers = [
-            RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, _on_garbage, buffer_bytes=BUFFER_BYTES, queue_size=50),
-            RawSubscriber("/uav_guidance/state", GuidanceState, self._on_state, _on_garbage, buffer_bytes=BUFFER_BYTES),
-            RawSubscriber("/tf_static", TFMessage, self._on_static, _on_garbage, buffer_bytes=BUFFER_BYTES, queue_size=10),
+            RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, buffer_bytes=BUFFER_BYTES, queue_size=50),
+            RawSubscriber("/uav_guidance/state", GuidanceState, self._on_state, buffer_bytes=BUFFER_BYTES),
+            RawSubscriber("/tf_static", TFMessage, self._on_static, buffer_bytes=BUFFER_BYTES, queue_size=10),
         ]
 
     def poses_at(self, stamp_ns: int) -> PoseBuffer:
@@ -60,7 +59,3 @@ class Vehicle:
         for item in message.transforms:
             if item.header.frame_id.lstrip("/") == "base_link":
                 self._mounts[item.child_frame_id.lstrip("/")] = matrix_of_transform(item.transform)
-
-
-def _on_garbage(reason: str) -> None:
-    rospy.logwarn_throttle(2.0, f"left out: {reason}")
