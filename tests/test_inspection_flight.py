@@ -118,12 +118,14 @@ def test_a_killed_encoder_is_not_told_as_a_bad_radio(killed: Callable[[str], tup
     assert "encoder failed at 10.0" in flight.words()
 
 
-def test_without_the_ground_station_the_criterion_goes_first_and_then_the_autopilot_flies_home(
+def test_without_the_ground_station_the_autopilot_flies_home(
     killed: Callable[[str], tuple[Flight, Summary]],
 ) -> None:
     flight, summary = killed("ground_station@10")
-    assert only(summary, "stream")["result"] == "enough_frames"
-    assert only(summary, "stream")["end_s"] < 16.0
+    stream = only(summary, "stream")
+    # The criterion is missed 4.5 to 4.7 s after the death, the failsafe comes 4.5 to 5 s after it: either may be first.
+    assert (stream["outcome"], stream["result"]) in {("RESOURCE_INVARIANT_VIOLATED", "enough_frames"), ("INTERRUPTED", "")}
+    assert 14.0 < stream["end_s"] < 16.0
     assert summary["outcome"] == "given_up"
     assert "RTL" in summary["reason"]
     assert [death["name"] for death in summary["died"]] == ["ground_station"]

@@ -26,7 +26,8 @@ What was decided, and why:
 - **The video encoder dies or hangs**: `stream` ends as LOST, another name than a bad radio has, and the end is the same: stop, hover,
   land. An encoder that is started again is not switched on again: what died once in this flight is not relied on.
 - **The ground station dies**: to the drone that is a radio that is out, so the criteria are missed; the control link is lost with it,
-  and 5 s after its last heartbeat the autopilot flies home, out of the hover. The mission is given up and waits for the landing.
+  and 5 s after its last heartbeat the autopilot flies home, out of the hover or just before it: the two are about as quick. The
+  mission is given up and waits for the landing.
 - **Degraded zones**: the picture gets worse, `stream` goes on, and so does the flight.
 - **The video comes back while it hovers**: it lands all the same. A radio that has failed once here will fail again, and a flight
   that goes on and off with the picture is what nobody can take over.
