@@ -93,7 +93,7 @@ SKILLS = {
     },
     "perception": {"zed_depthmap": ({}, ["LOST", "ABORTED"]), "lidar_depthmap": ({}, ["LOST", "ABORTED"])},
     "mapping": {"lidar_mapping": ({}, ["ABORTED"])},
-    "video": {"stream": ({"min_fps": "float64", "min_quality": "float64", "patience": "float64"}, ["ABORTED"])},
+    "video": {"stream": ({"min_fps": "float64", "min_quality": "float64", "patience": "float64"}, ["LOST", "ABORTED"])},
 }
 
 
