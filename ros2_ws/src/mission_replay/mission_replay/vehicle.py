@@ -16,16 +16,16 @@ from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.core.execution import Execution
 from skill_runtime.handle import SkillHandle
 from skill_runtime.local import LocalWorld
-from skill_runtime.mock import NEVER, Behaviour, Choice, Ending, LocalMockHost, MockRobot, MockSkill, Rule, serve_robot
+from skill_runtime.mock import NEVER, Behaviour, Choice, Ending, LocalMockHost, MockRobot, MockSkill, MockState, Rule, serve_robot
 
 
 class ReplayedSkill(MockSkill):
     """The hooks of one skill: a call that was recorded is answered by the record, any other one by the mock's rules."""
 
     def __init__(
-        self, vehicle: RecordedSkills, robot: MockRobot, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
+        self, vehicle: RecordedSkills, state: MockState, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random
     ) -> None:
-        super().__init__(robot, skillset, skill, rules, chance)
+        super().__init__(state, skillset, skill, rules, chance)
         self._vehicle = vehicle
 
     def choose(self, inputs: object) -> Choice:
@@ -148,8 +148,8 @@ class RecordedSkills(Vehicle):
         self._passed: set[str] = set()
         serve_robot(self.world, self.robot, skillsets, self._make_skill)
 
-    def _make_skill(self, robot: MockRobot, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
-        return ReplayedSkill(self, robot, skillset, skill, rules, chance)
+    def _make_skill(self, state: MockState, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> MockSkill:
+        return ReplayedSkill(self, state, skillset, skill, rules, chance)
 
     # --- requests ----------------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from skill_runtime.mock.reading import load_behaviour
 from skill_runtime.mock.robot import MockRobot
 from skill_runtime.mock.skill import Choice, MockSkill
 from skill_runtime.mock.starter import starter
+from skill_runtime.mock.state import MockState
 
 __all__ = [
     "NEVER",
@@ -25,6 +26,7 @@ __all__ = [
     "MockHost",
     "MockRobot",
     "MockSkill",
+    "MockState",
     "Rule",
     "TimelineEvent",
     "Value",

@@ -1,23 +1,23 @@
-"""Plays a behaviour: memory and chance of all skillsets' mocks, what happens by the clock, faults, data."""
+"""A robot that follows a behaviour: the mocks of all its skillsets, what happens by the clock, faults, data."""
 
 from __future__ import annotations
 
 import functools
 import random
-import threading
 from collections.abc import Callable, Mapping, Sequence
 
 from alula_common.faults import FaultRequest
 from skill_model.model import Skill, Skillset
-from skill_runtime.mock.behaviour import Behaviour, DataScript, MockFault, Place, Rule, Value
+from skill_runtime.mock.behaviour import Behaviour, DataScript, MockFault, Place, Rule
 from skill_runtime.mock.formula import Formula, FormulaError
 from skill_runtime.mock.host import Job, MockHost
 from skill_runtime.mock.skill import MockSkill
+from skill_runtime.mock.state import MockState
 
-MakeSkill = Callable[["MockRobot", str, Skill, Sequence[Rule], random.Random], MockSkill]
+MakeSkill = Callable[[MockState, str, Skill, Sequence[Rule], random.Random], MockSkill]
 
 
-class MockRobot:
+class MockRobot(MockState):
     """A robot whose skills, faults and data follow a behaviour; the same seed makes the same one.
 
     ``hooks_of`` gives the hooks for each skillset's managers; ``begin`` is to be called once all of them are there, ``on_state``
@@ -25,19 +25,14 @@ class MockRobot:
     """
 
     def __init__(self, behaviour: Behaviour, host: MockHost, *, seed: int = 0) -> None:
-        self.memory: dict[str, object] = dict(behaviour.memory)
-        self.lock = threading.RLock()
-        self.host = host
+        super().__init__(behaviour.memory, host, random.Random(f"{seed} timeline"))  # noqa: S311 - a mock, not a secret
         self.faults: dict[str, float] = {}
         """When which fault happened, seconds of mission clock."""
         self._behaviour = behaviour
         self._seed = seed
-        self._chance = random.Random(f"{seed} timeline")  # noqa: S311 - a mock, not a secret
         self._skills: list[MockSkill] = []
         self._resources: dict[str, tuple[str, ...]] = {}
         self._began_s = 0.0
-        self._held: dict[Place, str] = {}
-        """What faults hold resources at, whatever else the script says of them."""
         self._before: dict[str, dict[Place, str]] = {}
         """What the resources of a fault were before it."""
         self._awaited: dict[tuple[Place, str], list[tuple[float, Job]]] = {}
@@ -52,6 +47,7 @@ class MockRobot:
             chance = random.Random(f"{self._seed} {skillset.name}.{skill.name}")  # noqa: S311
             made[skill.name] = make(self, skillset.name, skill, rules, chance)
         self._skills += made.values()
+        self._moving += [skill.move for skill in made.values()]
         return made
 
     def begin(self) -> None:
@@ -88,40 +84,6 @@ class MockRobot:
     def holds(self, skillset: str) -> bool:
         """Tell whether a fault holds a resource of this skillset."""
         return any(place[0] == skillset for place in self._held)
-
-    # --- for the skills ----------------------------------------------------------------------------------------------
-
-    def take(self, states: Mapping[Place, str]) -> None:
-        """Have resources be in these states, as far as they are not."""
-        for (skillset, resource), wanted in states.items():
-            state = self._held.get((skillset, resource), wanted)
-            if self.host.state(skillset, resource) == state:
-                continue
-            refusal = self.host.transition(skillset, resource, state)
-            if refusal:
-                self.host.note(f"the mock can't have {skillset}.{resource} be {state}: {refusal}")
-
-    def number(self, value: Value, names: Mapping[str, object], chance: random.Random | None = None) -> float:
-        """Return a value that is a number; raise FormulaError when it is none."""
-        result = self.value(value, names, chance)
-        if isinstance(result, bool) or not isinstance(result, int | float):
-            raise FormulaError(f"{value!r} is {result!r}, not a number")
-        return float(result)
-
-    def value(self, value: Value, names: Mapping[str, object], chance: random.Random | None = None) -> object:
-        """Return what a value is now; ``names`` go before the memory."""
-        if isinstance(value, bool | int | float | str):
-            return value
-        if isinstance(value, Formula):
-            return value(names if value.names <= names.keys() else self._known(names), chance or self._chance)
-        return value(self._known(names))
-
-    def _known(self, names: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the names with the memory as it is now behind them."""
-        with self.lock:
-            for skill in self._skills:
-                skill.move()
-            return {**self.memory, **names}
 
     # --- the clock's part --------------------------------------------------------------------------------------------
 

@@ -14,11 +14,11 @@ from skill_model.model import Skill
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.mock.behaviour import Rule, Script, cascade, default_script
 from skill_runtime.mock.formula import FormulaError, coordinates
+from skill_runtime.mock.state import MockState
 
 if TYPE_CHECKING:
     from skill_runtime.core.execution import Execution
     from skill_runtime.mock.host import Appointment
-    from skill_runtime.mock.robot import MockRobot
 
 
 class MockCrashError(Exception):
@@ -56,8 +56,8 @@ class Run:
 class MockSkill(SkillHooks):
     """One skill of a mock robot; its hooks may be called in any thread."""
 
-    def __init__(self, robot: MockRobot, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
-        self._play = robot
+    def __init__(self, state: MockState, skillset: str, skill: Skill, rules: Sequence[Rule], chance: random.Random) -> None:
+        self._state = state
         self.place = skillset, skill.name
         self._inputs = [parameter.name for parameter in skill.inputs]
         self._rules = tuple(rules)
@@ -86,10 +86,10 @@ class MockSkill(SkillHooks):
         """Begin what was chosen."""
         choice = execution.inputs.choice if isinstance(execution.inputs, MockInputs) else self._unattached
         run = self._begin(execution, choice)
-        after = self._play.host.after
+        after = self._state.host.after
         for change in choice.script.changes:
-            when_s = max(0.0, self._play.number(change.after_s, run.names, self._chance))
-            run.appointments.append(after(when_s, lambda states=change.states: self._play.take(states)))  # type: ignore[misc]
+            when_s = max(0.0, self._state.number(change.after_s, run.names, self._chance))
+            run.appointments.append(after(when_s, lambda states=change.states: self._state.take(states)))  # type: ignore[misc]
         if choice.script.ending.crash and not run.delay_s:
             raise MockCrashError(choice.script.ending.crash)
         if choice.script.ending.crash or choice.result:
@@ -100,18 +100,18 @@ class MockSkill(SkillHooks):
         run = self._runs.get(execution.id)
         if run is None:
             return execution.progress
-        elapsed_s = self._play.host.now_s - run.started_s
+        elapsed_s = self._state.host.now_s - run.started_s
         part = _part(elapsed_s, run.delay_s)
         said = run.choice.script.progress
         if isinstance(said, tuple):
             return _between(said, part)
         if isinstance(said, bool | int | float):
             return said
-        return self._play.number(said, {**run.names, "t": elapsed_s, "f": part}, self._chance)
+        return self._state.number(said, {**run.names, "t": elapsed_s, "f": part}, self._chance)
 
     def on_interrupt(self, execution: Execution) -> bool | None:
         """Stop: what it moves stays where it is, what was still to come does not come."""
-        with self._play.lock:
+        with self._state.lock:
             self.move()
             run = self._runs.pop(execution.id, None)
         for appointment in run.appointments if run is not None else ():
@@ -120,7 +120,7 @@ class MockSkill(SkillHooks):
 
     def end(self, result: str, message: str) -> None:
         """End what runs before its time: what it moves stays where it is."""
-        with self._play.lock:
+        with self._state.lock:
             executions = [run.execution for run in self._runs.values()]
         for execution in executions:
             self.on_interrupt(execution)
@@ -129,11 +129,11 @@ class MockSkill(SkillHooks):
     def move(self) -> None:
         """Bring the memory up to date; called with the robot's lock held."""
         for run in self._runs.values():
-            self._move(run, _part(self._play.host.now_s - run.started_s, run.delay_s))
+            self._move(run, _part(self._state.host.now_s - run.started_s, run.delay_s))
 
     def forget(self, execution_id: str) -> None:
         """Take note that somebody else has ended an execution: what it moves has got there, what was still to come does not come."""
-        with self._play.lock:
+        with self._state.lock:
             run = self._runs.pop(execution_id, None)
             if run is not None:
                 self._move(run, 1.0)
@@ -147,7 +147,7 @@ class MockSkill(SkillHooks):
 
         There is one draw for each rule that has a chance, whether or not it applies.
         """
-        with self._play.lock:
+        with self._state.lock:
             self._calls += 1
             names = self._names(inputs)
             drawn = [rule.chance is None or self._chance.random() < rule.chance for rule in self._rules]
@@ -160,20 +160,20 @@ class MockSkill(SkillHooks):
     def _applies(self, rule: Rule, names: Mapping[str, object]) -> bool:
         if rule.call is not None and rule.call != self._calls:
             return False
-        return rule.when is None or bool(self._play.value(rule.when, names, self._chance))
+        return rule.when is None or bool(self._state.value(rule.when, names, self._chance))
 
     def _begin(self, execution: Execution, choice: Choice) -> Run:
-        robot, names = self._play, self._names(execution.inputs)
-        delay_s = max(0.0, robot.number(choice.script.delay, names, self._chance))
-        with robot.lock:
-            targets = {name: robot.value(value, names, self._chance) for name, value in choice.script.moves.items()}
-            moves = {name: (robot.memory.get(name), _plain(target)) for name, target in targets.items()}
-            run = self._runs[execution.id] = Run(execution, choice, {**names, "delay": delay_s}, robot.host.now_s, delay_s, moves)
+        state, names = self._state, self._names(execution.inputs)
+        delay_s = max(0.0, state.number(choice.script.delay, names, self._chance))
+        with state.lock:
+            targets = {name: state.value(value, names, self._chance) for name, value in choice.script.moves.items()}
+            moves = {name: (state.memory.get(name), _plain(target)) for name, target in targets.items()}
+            run = self._runs[execution.id] = Run(execution, choice, {**names, "delay": delay_s}, state.host.now_s, delay_s, moves)
         return run
 
     def _finish(self, run: Run) -> None:
         """End an execution as it was chosen."""
-        with self._play.lock:
+        with self._state.lock:
             if self._runs.pop(run.execution.id, None) is None:
                 return
             self._move(run, 1.0)
@@ -182,7 +182,7 @@ class MockSkill(SkillHooks):
             return
         said = run.choice.script.outputs
         try:
-            outputs = {name: self._play.value(value, run.names, self._chance) for name, value in said.items()}
+            outputs = {name: self._state.value(value, run.names, self._chance) for name, value in said.items()}
         except FormulaError as error:
             run.execution.fail(str(error))
             return
@@ -190,7 +190,7 @@ class MockSkill(SkillHooks):
 
     def _move(self, run: Run, part: float) -> None:
         for name, (source, target) in run.moves.items():
-            self._play.memory[name] = _towards(source, target, part)
+            self._state.memory[name] = _towards(source, target, part)
 
     def _names(self, inputs: object) -> dict[str, object]:
         if isinstance(inputs, Mapping):
