@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from alula_common.record import FILE as RECORD
+from alula_flight.report import __main__ as report
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.making import make_report
 from alula_flight.verdict import verdict_lines
@@ -226,6 +227,14 @@ def test_the_same_folder_gives_the_same_files_again(whole):
     again = make_report(facts(folder))
     assert (again["problems"], again["landed"]) == ([], True)
     assert ((folder / "timeline.svg").read_bytes(), (folder / "timeline.json").read_bytes()) == before
+
+
+def test_the_report_of_a_run_without_a_supervisor_is_a_command(folder, capsys):
+    assert report.main([str(folder), "--scenario", "mapping", "--seed", "3", "--fail", "zed@30"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "mission accomplished in degraded mode: zed_depthmap: zed_works was violated"
+    assert "zed failed at 30.00 s" in "".join(lines)
+    assert json.loads((folder / "summary.json").read_text())["seed"] == 3
 
 
 def test_an_empty_folder(tmp_path):
