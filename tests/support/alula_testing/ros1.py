@@ -72,6 +72,19 @@ def ros_master() -> Iterator[str]:
         yield uri
 
 
+@pytest.fixture(autouse=True)
+def parameters_as_before(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Take the parameters that came with a test off the master: those of a node outlive it, for the next one of its name to read."""
+    if "ros_master" not in request.fixturenames:
+        yield
+        return
+    master = ServerProxy(request.getfixturevalue("ros_master"))
+    before = set(master.getParamNames("/tester")[2])
+    yield
+    for name in set(master.getParamNames("/tester")[2]) - before:
+        master.deleteParam("/tester", name)
+
+
 @pytest.fixture
 def start_node(ros_master: str) -> Iterator[StartNode]:
     """Return a function that starts a node's executable (a list of words, remappings and ``_private:=`` parameters included)."""

@@ -140,7 +140,7 @@ def test_listening_ends_with_the_last_who_looks(run_of: Path, monkeypatch: pytes
         ({"root": "/navigation", "act": ["start"]}, "there is no act"),
         ({"root": "/navigation", "act": "start", "skill": HOSTILE}, "has no skill <script>"),
         ({"root": "/navigation", "act": "start", "skill": {"a": 1}}, "has no skill"),
-        ({"root": "/navigation", "act": "start", "skill": "hover"}, "hover takes duration .float64, > 0., each as a text"),
+        ({"root": "/navigation", "act": "start", "skill": "hover"}, "hover takes duration .float64, s, > 0., each as a text"),
         ({"root": "/navigation", "act": "start", "skill": "hover", "texts": {"duration": 3}}, "each as a text"),
         ({"root": "/navigation", "act": "start", "skill": "hover", "texts": {"duration": "9" * 3000}}, "longer than 2000"),
         ({"root": "/navigation", "act": "start", "skill": "hover", "texts": {"duration": HOSTILE}}, "is no number"),
