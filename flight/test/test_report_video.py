@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from alula_common.scenarios import load_scenario
+from alula_flight.report.events import History
 from alula_flight.report.phases import Phases
+from alula_flight.report.recording import FaultChange, Recording
+from alula_flight.report.recovery import find_recovery
 from alula_flight.report.video import RadioState, Video, radio_lost_s
 
 LIFT_OFF_S = 100.0
@@ -29,3 +33,10 @@ def test_the_radio_was_lost_when_it_became_as_bad_as_it_was_in_the_end(states, l
 
 def test_a_stream_that_no_criterion_ended_lost_no_radio():
     assert radio_lost_s(Video(radio=(RadioState(1.0, "out", "", 0.0),), end_s=22.0), Phases()) is None
+
+
+@pytest.mark.parametrize(("killed_s", "failure_s"), [(110.0, 110.0), (None, 112.5)])
+def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s):
+    killed = () if killed_s is None else (FaultChange("ground_station", "killed", killed_s),)
+    recovery = find_recovery(load_scenario("inspection"), History(), Recording(processes=killed), Phases(), radio_lost_s=112.5)
+    assert recovery.failure_s == failure_s

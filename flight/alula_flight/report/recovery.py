@@ -48,7 +48,7 @@ def find_recovery(
     broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN]
     if not faults and not broken and radio_lost_s is None:
         return None
-    failure_s = radio_lost_s if radio_lost_s is not None else faults[0].t_s if faults else None
+    failure_s = _failure(recording, radio_lost_s)
     since_s = -np.inf if failure_s is None else failure_s - STAMP_TOLERANCE_S
     violated = [e.end_s for e in history.executions if (e.outcome == VIOLATED or e.result == LOST) and e.end_s is not None]
     detected_s = _first([*broken, *violated], since_s)
@@ -56,6 +56,14 @@ def find_recovery(
     motion_s = None if fallback_s is None else _first(_running_stamps(history, scenario.motion), fallback_s)
     moving_s = None if motion_s is None or recording.path is None else moving_again(recording.path, motion_s, phases.landing_s)
     return Recovery(failure_s, detected_s, fallback_s, moving_s)
+
+
+def _failure(recording: Recording, radio_lost_s: float | None) -> float | None:
+    """Return when the first failure happened; a process that died is not told as the radio, whatever that was like."""
+    dead = [fault.t_s for fault in recording.processes if fault.mode != MENDED]
+    if dead or radio_lost_s is None:
+        return min((fault.t_s for fault in injected(recording)), default=None)
+    return radio_lost_s
 
 
 def _running_stamps(history: History, skills: tuple[str, ...]) -> list[float]:
