@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 CLOUD, CLOUD_BYTES = "/lidar/points", 1 << 23
 IMU, IMU_BYTES, IMU_QUEUE = "/imu/data", 1 << 16, 100
+READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it, over a connection of their own
 TF_PERIOD_S = 0.1
 
 
@@ -116,6 +117,7 @@ class LidarMappingNode:
 
     def _register(self, frame: str, sweep: Sweep) -> None:
         poses = self._vehicle.poses_at(sweep.end_ns)
+        self._readings.wait_for(sweep.end_ns, READING_WAIT_S)
         with self._lock:
             if not self._switch.enabled:
                 return
