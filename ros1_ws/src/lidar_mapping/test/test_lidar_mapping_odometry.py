@@ -11,7 +11,6 @@ import open3d as o3d
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from lidar_mapping_yard import yard
 from scipy.spatial.transform import Rotation
 
@@ -30,7 +29,6 @@ from lidar_mapping import (
     flat_patches,
     register,
 )
-from lidar_mapping.surface import PATCH_M, smallest_axis
 from perception_core import NS, Sweep
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -77,31 +75,6 @@ def test_a_plane_is_flat_and_an_edge_is_not() -> None:
     assert np.mean(np.maximum(to_floor, to_wall) > 0.95) > 0.97  # the rest lies along the edge
     thread = np.stack([np.linspace(0.0, 3.0, 300), np.zeros(300), np.ones(300)], axis=1)
     assert len(flat_patches(thread, thread).points) == 0
-
-
-@given(arrays(np.float64, (6, 3, 3), elements=st.floats(-1.0, 1.0)))
-@settings(max_examples=60, deadline=None)
-def test_the_smallest_axis_is_the_general_ways(factors) -> None:
-    matrices = factors.transpose(0, 2, 1) @ factors
-    spread, axes = smallest_axis(matrices)
-    values, vectors = np.linalg.eigh(matrices)
-    assert spread == pytest.approx(values[:, :2], abs=1e-6)
-    apart = values[:, 1] - values[:, 0] > 1e-3 * values[:, 2] + 1e-9
-    assert np.abs(np.sum(axes * vectors[:, :, 0], axis=1))[apart] == pytest.approx(1.0, abs=1e-4)
-
-
-def test_points_too_near_to_one_another_tell_no_normal_and_thinned_ones_do() -> None:
-    rng = np.random.default_rng(1)
-    wall = np.stack([rng.normal(0.0, 0.02, 60_000), rng.uniform(0.0, 3.0, 60_000), rng.uniform(0.0, 3.0, 60_000)], axis=1)
-    dense, thinned = downsample(wall, 0.03), downsample(wall, PATCH_M)
-    assert len(flat_patches(thinned, dense).points) < 0.2 * len(thinned)
-    patches = flat_patches(thinned, thinned)
-    assert len(patches.points) > 0.9 * len(thinned)
-    assert np.sqrt(np.mean(patches.points[:, 0] ** 2)) < 0.01
-    frames = Keyframes(voxel_m=0.08, limit=10)
-    for k in range(4):  # what the last keyframes saw lies upon one another
-        frames.add(k, np.eye(4), wall[k::4])
-    assert len(frames.all[-1].patches.points) > 0.9 * len(thinned)
 
 
 def surface_of(points) -> Surface:
