@@ -141,20 +141,9 @@ def test_readings_that_can_not_be_any_are_left_out() -> None:
     ):
         assert not queue.add(wrong, NS + 5)
     assert queue.add(ImuReading(NS + 3, still, up), NS + 5)
-    assert [reading.stamp_ns for reading in queue.take_until(NS + 2)] == [NS, NS + 2]
+    assert [reading.stamp_ns for reading in queue.take_until(NS + 2)] == [NS]
     assert [reading.stamp_ns for reading in queue.take_until(2 * NS)] == [NS + 3]
     assert queue.add(ImuReading(2, still, up), 8), "the clock was set back"
-
-
-def test_a_sweep_gets_the_part_of_the_reading_that_spans_its_end() -> None:
-    queue, up = ReadingQueue(), np.array([0.0, 0.0, 9.81])
-    for k in range(1, 4):
-        assert queue.add(ImuReading(k * NS // 50, np.full(3, k), up), NS)
-    taken = queue.take_until(3 * NS // 100)
-    assert [(reading.stamp_ns, reading.rates[0]) for reading in taken] == [(NS // 50, 1.0), (3 * NS // 100, 2.0)]
-    assert [reading.stamp_ns for reading in queue.take_until(NS)] == [2 * NS // 50, 3 * NS // 50], "it is whole for the next sweep"
-    assert queue.add(ImuReading(5 * NS, np.zeros(3), up), 5 * NS)
-    assert queue.take_until(NS) == [], "a reading after a gap says nothing of the time before the gap"
 
 
 def test_the_readings_of_a_sweep_are_waited_for_once_in_vain() -> None:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import replace
 from threading import Condition
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lidar_mapping.odometry import IMU_GAP_NS
 from perception_core import NS
 
 if TYPE_CHECKING:
@@ -54,16 +52,10 @@ class ReadingQueue:
                 self._silent = not self._arrived.wait_for(lambda: self._last_ns >= stamp_ns, timeout_s)
 
     def take_until(self, stamp_ns: int) -> list[ImuReading]:
-        """Take the readings up to a moment; later ones stay for the next sweep.
-
-        A reading tells of the time before it, so the first of the later ones is given for its part up to that moment, too: without it
-        the points at the end of each sweep would not be straightened.
-        """
+        """Take the readings up to a moment; later ones stay for the next sweep."""
         taken: list[ImuReading] = []
         while self._readings and self._readings[0].stamp_ns <= stamp_ns:
             taken.append(self._readings.popleft())
-        if self._readings and self._readings[0].stamp_ns - stamp_ns < IMU_GAP_NS:
-            taken.append(replace(self._readings[0], stamp_ns=stamp_ns))
         return taken
 
     def clear(self) -> None:
