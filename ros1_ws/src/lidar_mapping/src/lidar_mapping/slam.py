@@ -11,8 +11,6 @@ from lidar_mapping.graph import GraphSettings, PoseGraph
 from lidar_mapping.inertial import POSITION, State
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.odometry import AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
-from lidar_mapping.readings import SET_BACK_NS
-from lidar_mapping.registration import refused
 from lidar_mapping.surface import flat_patches
 from lidar_mapping.voxel_map import VoxelMap, downsample
 from perception_core import NS
@@ -116,21 +114,13 @@ class Slam:
         self._lost_since_ns = None
 
     def add(self, sweep: Sweep, readings: Sequence[ImuReading], poses: PoseBuffer, T_base_lidar: Floats) -> Registration:  # noqa: N803
-        """Follow the vehicle through one sweep; a scan that is not believed, or not later than the one before, is not inserted.
+        """Follow the vehicle through one sweep; a scan that is not believed is not inserted.
 
-        A sweep that is earlier by more than a second tells of a clock that was set back: track is lost and found as at the start.
         ``poses`` are the autopilot's. Raises PoseUnavailableError when it says nothing of the sweep's end; then nothing was changed.
         """
         ends = poses.at([sweep.end_ns - VELOCITY_BASE_NS, sweep.end_ns])
         given = self.T_map_odom @ ends.matrix(1)
         velocity = self.T_map_odom[:3, :3] @ (ends.position[1] - ends.position[0]) / (VELOCITY_BASE_NS / NS)
-        early_ns = 0 if self._odometry is None else self._odometry.filter.stamp_ns - sweep.end_ns
-        if early_ns > SET_BACK_NS:
-            self.stop()
-        elif self._odometry is not None and early_ns >= 0:
-            self.count.scans += 1
-            self.count.rejected += 1
-            return refused("the sweep is not later than the one before")
         if self._odometry is None:
             self._start(sweep, poses, velocity)
         assert self._odometry is not None  # noqa: S101 -- just started
