@@ -87,7 +87,7 @@ class Graph:
 
 
 class OfflinePublisher:
-    """A topic's writing end. Nobody listens, as far as nodes ask: what is made for listeners alone is not made."""
+    """A topic's writing end. A node that asks is told of no subscriber: what is made for subscribers alone is not made."""
 
     def __init__(self, graph: Graph, name: str) -> None:
         self._graph = graph

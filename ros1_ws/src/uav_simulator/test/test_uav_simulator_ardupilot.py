@@ -144,7 +144,7 @@ def test_garbage_is_left_alone_and_a_taken_port_is_named(vehicle):
         sock.sendto(wrong, ("127.0.0.1", vehicle.port))
     assert not vehicle.tick(TICK_S, TICK_S)
     sock.sendto(packet(0, [1000] * 6), ("127.0.0.1", vehicle.port))
-    sock.close()  # the answer finds nobody
+    sock.close()  # the answer finds no socket
     assert not vehicle.tick(TICK_S, TICK_S)
     peer = Peer(vehicle.port)
     tick_while(vehicle, lambda: peer.step([1000] * 6))

@@ -8,6 +8,7 @@ import sys
 import time
 from itertools import pairwise
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import pytest
 import rospy
@@ -20,6 +21,7 @@ from tf2_msgs.msg import TFMessage
 from uav_msgs.srv import SetSensor
 from uav_simulator_ardupilot import InThread, Peer
 
+from alula_common.network import free_port
 from alula_testing.ros1 import wait_until
 
 NODE = Path(__file__).parents[1] / "scripts" / "uav_simulator_node"
@@ -53,6 +55,12 @@ def clock_steps_ns(seen, from_s=0.0, to_s=float("inf")):
     """Return the steps between the clock messages within a stretch of simulated time."""
     stamps = [m.clock.to_nsec() for m in seen.messages["clock"] if from_s <= m.clock.to_sec() <= to_s]
     return [after - before for before, after in pairwise(stamps)]
+
+
+def wait_until_time_goes_on(collect):
+    """Wait for a second of simulated time: its first tick is told again and again while it is held."""
+    ticks = collect(clock=("/clock", Clock)).messages["clock"]
+    wait_until(lambda: ticks and ticks[-1].clock.to_sec() > 1.0, timeout_s=30.0, what="a second of simulated time")
 
 
 class Client:
@@ -216,6 +224,46 @@ def test_a_client_takes_off_and_a_broken_zed_falls_silent(start_simulator, colle
     steps = clock_steps_ns(seen)
     assert min(steps) == 20_000_000, "50 Hz, and never backwards"
     assert {step % 20_000_000 for step in steps} == {0}, "flat out, whole ticks may be dropped on the way, none is bent"
+
+
+def test_time_begins_when_all_that_work_for_it_are_there(start_simulator, collect):
+    others = f"{PACE_TOPIC}_of_another"
+    start_simulator("_rate:=0", f"_pace_topics:=[{PACE_TOPIC},{others}]", "_start_patience_s:=60")
+    seen = collect(clock=("/clock", Clock), imu=("/imu/data", Imu))
+    first = rospy.Publisher(PACE_TOPIC, Header, queue_size=1)
+    wait_until(lambda: first.get_num_connections() > 0, timeout_s=30.0, what="the simulator listens")
+    seen.wait("clock", 5)  # told again and again, so that a node that comes late has a clock, too
+    assert {m.clock.to_nsec() for m in seen.messages["clock"]} == {20_000_000}
+    assert not seen.count("imu")
+    second = rospy.Publisher(others, Header, queue_size=1)
+    seen.wait("imu")
+    assert seen.messages["imu"][0].header.stamp.to_sec() < 0.05, "the first measurements are heard"
+    first.unregister()
+    second.unregister()
+
+
+def test_subscribers_that_are_there_first_miss_no_first_measurement(start_simulator, collect):
+    seen = collect(imu=("/imu/data", Imu), pose=("/sim/true_pose", PoseStamped))
+    start_simulator("_rate:=0")
+    for name in ("imu", "pose"):
+        wait_until(lambda name=name: seen.count(name) > 0, timeout_s=30.0, what=name)
+        assert seen.messages[name][0].header.stamp.to_nsec() <= 20_000_000, f"the first {name} is of the first tick"
+
+
+def test_a_subscriber_that_has_died_is_not_waited_for_without_end(ros_master, start_simulator, collect):
+    master = ServerProxy(ros_master)
+    gone = ("/gone", "/imu/data", "sensor_msgs/Imu", f"http://127.0.0.1:{free_port()}/")
+    assert master.registerSubscriber(*gone)[0] == 1
+    try:
+        start_simulator("_rate:=0", "_start_patience_s:=0.5")
+        wait_until_time_goes_on(collect)
+    finally:
+        master.unregisterSubscriber(gone[0], gone[1], gone[3])
+
+
+def test_time_begins_without_a_node_that_never_comes(start_simulator, collect):
+    start_simulator("_rate:=0", f"_pace_topics:=[{PACE_TOPIC}]", "_start_patience_s:=0.5")
+    wait_until_time_goes_on(collect)
 
 
 def test_time_waits_for_who_works_for_it_and_lets_go_of_the_dead(start_simulator, collect):

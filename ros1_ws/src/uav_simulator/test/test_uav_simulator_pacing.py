@@ -72,7 +72,7 @@ def test_who_works_on_measurements_is_waited_for_while_there_are_some():
     p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
     p.measured("zed", 10.0, 10.0)
     p.heard("/depth/done", 10.0)
-    assert p.may_advance(99.0, 0.0), "a dead camera holds nobody up"
+    assert p.may_advance(99.0, 0.0), "a dead camera does not hold time"
     p.measured("zed", 10.1, 10.1)
     assert p.may_advance(10.16, 0.0), "a measurement is worked on"
     assert not p.may_advance(10.18, 0.0), "but not when the next one is due"

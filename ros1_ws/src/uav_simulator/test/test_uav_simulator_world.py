@@ -35,7 +35,7 @@ def along_route(config, step_m=0.2):
 
 @pytest.mark.parametrize(("config", "seed"), SEEDS, ids=SEED_NAMES)
 def test_the_route_has_room_on_all_sides_and_ahead_of_each_leg(config, seed):
-    """Whoever watches ahead must not stop before a corner: 4.5 m beyond each level leg a corridor of 2.6 x 2 m is free."""
+    """A watching sensor must not stop the vehicle before a corner: 4.5 m beyond each level leg a corridor of 2.6 x 2 m is free."""
     world = Scene(build_parts(config, seed))
     distance, _ = distances_to_mesh(shapes.Mesh(world.vertices, world.triangles), along_route(config))
     assert distance.min() >= config.keep_clear_m - 0.1

@@ -16,6 +16,7 @@ from typing import Any
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from skillset_interfaces.msg import Event
@@ -51,7 +52,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._view_json = ""
         self._skillsets = {name: MissionClient(SkillsetClient(self, name), self.wake, self.record) for name in plan.skillsets}
         self.director = self._make_director()
-        self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", 10)
+        self._heartbeat: Publisher | None = None
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
         for name in plan.skillsets:
             self.create_subscription(Event, f"/{name}/events", self._on_event, ALL_EVENTS)
@@ -66,6 +67,11 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _clock_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
+
+    def meet(self) -> None:
+        """Advertise the heartbeats once every skillset can be called: simulated time begins with them."""
+        if self._heartbeat is None and all(client.ready for client in self._skillsets.values()):
+            self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", 10)
 
     def wake(self) -> None:
         """Have the tree ticked in this turn of the main loop; several events in one turn make one tick."""
@@ -83,8 +89,8 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         held = self.director.news_of_pause()
         if held:
             self.record.told("paused", held)
-        stamp = self.get_clock().now().to_msg()
-        self._heartbeat.publish(Header(stamp=stamp, frame_id="mission"))
+        if self._heartbeat is not None:
+            self._heartbeat.publish(Header(stamp=self.get_clock().now().to_msg(), frame_id="mission"))
         self.record.outcome_of_tick(self.director)
         self._publish_tree()
 
@@ -172,6 +178,7 @@ def tick_to_the_end(node: MissionNode, signals: Sequence[int]) -> End:
     obeyed = 0
     while node.director.end is None:
         executor.spin_once(timeout_sec=TURN_S)
+        node.meet()
         if len(signals) > obeyed:
             obeyed = len(signals)
             node.abort(f"told to end by {signal.Signals(signals[-1]).name}")

@@ -64,7 +64,7 @@ class MissionRecord:
         self._write(REPORTS, told)
 
     def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
-        """Write a value of a data; ``stamp_ns`` None: nobody knows when it came, so it is now."""
+        """Write a value of a data; ``stamp_ns`` None: it is not known when it came, so it is now."""
         stamp_ns = self._clock_ns() if stamp_ns is None else stamp_ns
         content = {"skillset": skillset, "data": data, "value": to_plain(value), "stamp_s": stamp_ns / 1e9}
         self._writer.write(DATA, stamp_ns, content)

@@ -1,4 +1,4 @@
-"""The sensors' drivers on ROS: measure when it is time and somebody listens, publish as the sensor's mode says."""
+"""The sensors' drivers on ROS: measure when a measurement is due and has subscribers, publish as the sensor's mode says."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ class Driver(Protocol):
     at_ticks: tuple[int, ...]  # within its period: sensors take turns, so that the work spreads
 
     def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
-        """Measure this moment as the mode has it, with a stamp that is wrong by so much; None when nobody listens."""
+        """Measure this moment as the mode has it, with a stamp that is wrong by so much; None without subscribers."""
 
 
 class _Publisher:
-    """A publisher that knows whether somebody listens."""
+    """A publisher that knows whether it has subscribers."""
 
     def __init__(self, topic: str, kind: type) -> None:
         self._publisher = rospy.Publisher(topic, kind, queue_size=5)
@@ -199,6 +199,6 @@ class Drivers:
 
     def _publish(self, sensor: str, mode: SensorMode, measurement: Measurement) -> None:
         measurement.publish()
-        # Nobody can be waited for who rightly refuses a stamp of the future.
+        # A node that rightly refuses a stamp of the future never says that it is done, so time does not wait for it.
         if mode is not SensorMode.FUTURE:
             self._measured(sensor, measurement.taken_ns * 1e-9, self._simulation.now_s)

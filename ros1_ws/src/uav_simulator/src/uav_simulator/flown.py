@@ -1,4 +1,4 @@
-"""What flies in a simulation: a body, moved by one tick at a time by whoever flies it."""
+"""What flies in a simulation: a body, moved by one tick at a time by its pilot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
 
 
 class Flown(Protocol):
-    """A vehicle and whoever flies it."""
+    """A vehicle and its pilot."""
 
     @property
     def body(self) -> RigidBody:

@@ -10,6 +10,7 @@ import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
@@ -33,7 +34,16 @@ from uav_simulator.world.ply import write_mesh
 POSE_PERIOD_NS = 50_000_000
 STATE_PERIOD_NS = 1_000_000_000
 WAIT_S = 0.002  # longest nap while time stands still; MAVLink wakes it
+START_CLOCK_S = 0.05  # how often the first tick is told while time has not begun, for nodes that come late
 CATCH_UP_S = 0.25  # a delay of more is not made up for
+
+
+def unconnected() -> list[str]:
+    """Return the topics of this node that more nodes have subscribed to, as the master knows, than are connected to it."""
+    _, subscribed, _ = rosgraph.Master(rospy.get_name()).getSystemState()
+    nodes = {topic: len(names) for topic, names in subscribed}
+    published = rospy.topics.get_topic_manager().pubs
+    return [topic for topic, publication in published.items() if publication.get_num_connections() < nodes.get(topic, 0)]
 
 
 class SimulatorNode:
@@ -84,19 +94,43 @@ class SimulatorNode:
     def run(self) -> None:
         """Step until ``stop`` or until ROS shuts down."""
         self._tf_static.publish(ros_messages.static_transforms(0))
+        first_tick = True
         due = time.monotonic()
         while not self._ended:
             self._obey_pilot()
             if not self._simulation.tick():
                 continue  # who flies it has not come so far yet
+            if first_tick:
+                first_tick = False
+                self._begin()
             self._publish()
             if self._settings.rate > 0.0:
                 due = max(due + TICK_S / self._settings.rate, time.monotonic() - CATCH_UP_S)
             self._wait(due)
         self._pilot.close()
 
+    def _begin(self) -> None:
+        """Hold time at its first tick until all that work for it are there: how long nodes take to start changes no flight.
+
+        Who has subscribed by then is connected, too, so that perception and recorder miss no first measurement. An
+        autopilot that is followed has a clock of its own, which goes on.
+        """
+        if self._settings.followed_url:
+            return
+        patience = time.monotonic() + self._settings.start_patience_s
+        while (missing := [*self._absent(), *unconnected()]) and time.monotonic() < patience and not self._ended:
+            self._publish_clock()
+            again = time.monotonic() + START_CLOCK_S
+            while (rest := again - time.monotonic()) > 0.0:
+                self._pilot.serve(min(rest, WAIT_S))
+        if missing and not self._ended:
+            rospy.logwarn(f"simulated time begins without {', '.join(missing)}: not connected for {self._settings.start_patience_s:g} s")
+
+    def _absent(self) -> list[str]:
+        return [topic for topic, subscriber in self._paced.items() if not subscriber.get_num_connections()]
+
     def _wait(self, due: float) -> None:
-        """Serve the link until wall time and everybody's work have come far enough."""
+        """Serve the link until wall time and the paced topics have come far enough."""
         while not self._ended:
             now = time.monotonic()
             held = not self._pacer.may_advance(self._simulation.now_s, now)
@@ -112,12 +146,15 @@ class SimulatorNode:
         """Publish the tick's clock, truth and measurements."""
         simulation = self._simulation
         self._pilot.serve()  # an answer to the new state may leave before the images are made
-        self._clock.publish(Clock(clock=ros_messages.ros_time(simulation.now_ns)))
+        self._publish_clock()
         if simulation.now_ns >= self._pose_due_ns:
             self._pose_due_ns += POSE_PERIOD_NS
             self._pose.publish(ros_messages.pose_stamped(simulation.pose, simulation.now_ns))
         self._publish_state()
         self._drivers.publish_due()
+
+    def _publish_clock(self) -> None:
+        self._clock.publish(Clock(clock=ros_messages.ros_time(self._simulation.now_ns)))
 
     def _publish_state(self) -> None:
         """Publish the state once a second, and at once when something other than time, way and clearance has changed."""
@@ -146,9 +183,8 @@ class SimulatorNode:
         self._pacer.heard(topic, header_stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
 
     def _leave_out_the_dead(self) -> None:
-        for topic, subscriber in self._paced.items():
-            if not subscriber.get_num_connections():
-                self._pacer.gone(topic)
+        for topic in self._absent():
+            self._pacer.gone(topic)
 
     def _tell_left_out(self) -> None:
         left_out = self._pacer.left_out

@@ -1,4 +1,4 @@
-"""The whole simulation without ROS: a world, a vehicle that somebody flies in it, and the sensors that see it, on a clock of its own.
+"""The whole simulation without ROS: a world, a vehicle with its pilot, and the sensors that see both, on a clock of its own.
 
 One tick is 20 ms. Everything that varies is drawn from generators of the seed, each for one purpose, so the same seed and the
 same commands give the same flight, images and clouds.
@@ -31,7 +31,7 @@ TICK_S = TICK_NS * 1e-9
 
 @dataclass(frozen=True)
 class State:
-    """What the simulator knows and nobody in the air does; times on the simulated clock."""
+    """The truth, which no node in the air knows; times on the simulated clock."""
 
     t_s: float
     lift_off_s: float | None

@@ -63,7 +63,7 @@ class ArduPilotVehicle:
 
     @property
     def landed_state(self) -> LandedState:
-        """What the body's height and the flight so far say; nobody knows what ArduPilot has in mind."""
+        """What the body's height and the flight so far say: ArduPilot does not tell its intention."""
         height = self.body.position[2]
         if self.body.on_ground or (height < AIRBORNE_M and not self._high):
             return LandedState.ON_GROUND

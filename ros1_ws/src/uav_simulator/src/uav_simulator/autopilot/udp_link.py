@@ -1,4 +1,4 @@
-"""A UDP port on loopback for one MAVLink peer, as a ground station behind a radio is: whoever spoke last is answered; never blocks."""
+"""A UDP port on loopback for one MAVLink peer, as a ground station behind a radio is: the last sender is answered; never blocks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DATAGRAM = 1200  # bytes of MAVLink in one, whole messages or not: the peer's pa
 
 
 class UdpLink:
-    """Carries an endpoint's bytes; what is sent before anybody has spoken is lost."""
+    """Carries an endpoint's bytes; what is sent before the first datagram came is lost."""
 
     def __init__(self, endpoint: Endpoint, port: int) -> None:
         self._endpoint = endpoint

@@ -82,8 +82,8 @@ class ListeningLink:
         now_s = time.monotonic()
         if now_s - self._heartbeat_s >= HEARTBEAT_S:
             self._heartbeat_s = now_s
-            kind, nobody = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
-            self._mav.send(mavlink.MAVLink_heartbeat_message(kind, nobody, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
+            kind, no_autopilot = mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID
+            self._mav.send(mavlink.MAVLink_heartbeat_message(kind, no_autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
         for number, rate_hz in STREAMS_HZ.items():
             if now_s - self._heard_s[number] >= ASK_S:
                 self._heard_s[number] = now_s

@@ -1,4 +1,4 @@
-"""The body of a vehicle that somebody else simulates or flies: it is where its autopilot says, when its autopilot says."""
+"""The body of a vehicle that is simulated or flown elsewhere: pose and time are those that its autopilot tells."""
 
 from __future__ import annotations
 

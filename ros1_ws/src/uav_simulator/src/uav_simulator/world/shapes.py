@@ -1,4 +1,4 @@
-"""Triangle meshes of simple things. Outward normals; faces that lie on the ground are left out, for nobody can see them."""
+"""Triangle meshes of simple things. Outward normals; faces that lie on the ground are left out, because no sensor sees them."""
 
 from __future__ import annotations
 
