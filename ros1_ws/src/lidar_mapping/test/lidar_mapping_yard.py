@@ -35,11 +35,14 @@ def yard(count, seed=0, *, corridor=False):
 
 
 class Path:
-    """A vehicle on a smooth path: ``position(t)`` (3,), ``yaw(t)``; seconds."""
+    """A vehicle on a smooth path: ``position(t)`` (3,), ``yaw(t)``; seconds.
 
-    def __init__(self, position, yaw=lambda _t: 0.0, *, corridor=False, reach_m=12.0) -> None:
+    Its LiDAR sees what lies within ``across_deg`` of the plane across its heading.
+    """
+
+    def __init__(self, position, yaw=lambda _t: 0.0, *, corridor=False, reach_m=12.0, across_deg=90.0) -> None:
         self.position, self.yaw = position, yaw
-        self._corridor, self._reach_m = corridor, reach_m
+        self._corridor, self._reach_m, self._across = corridor, reach_m, np.sin(np.radians(across_deg))
 
     def pose(self, t):
         transform = np.eye(4)
@@ -70,15 +73,20 @@ class Path:
             seen[here] = (points[here] - pose[:3, 3]) @ pose[:3, :3]
         times = np.round(times * 100) / 100
         seen += rng.normal(0.0, NOISE_M, seen.shape)
-        near = np.linalg.norm(seen, axis=1) < self._reach_m
+        range_m = np.linalg.norm(seen, axis=1)
+        near = (range_m < self._reach_m) & (np.abs(seen[:, 0]) <= self._across * range_m)
         return Sweep(round(start_s * NS), seen[near].astype(np.float32), times[near].astype(np.float32))
 
-    def autopilot(self, end_s, *, drift=0.0, jump_m=0.0, jump_s=np.inf):
-        """What the autopilot tells of the last second: the pose, its position wrong by ``drift`` of the way from the start."""
+    def autopilot(self, end_s, *, drift=0.0, jump_m=0.0, jump_s=np.inf, turned=lambda _t: np.zeros(3)):
+        """What the autopilot tells of the last second: the pose, its position wrong by ``drift`` of the way from the start.
+
+        Its attitude is wrong by the rotation vector ``turned(t)``, map frame, radians.
+        """
         poses = PoseBuffer(keep_s=60.0)
         for t in np.arange(max(0.0, end_s - 1.0), end_s + 0.03, 0.02):
             pose = self.pose(t)
             start = self.position(0.0)
             given = start + (1.0 + drift) * (pose[:3, 3] - start) + (jump_m if t >= jump_s else 0.0) * np.array([1.0, 0.0, 0.0])
-            poses.add(round(t * NS), tuple(given), Rotation.from_matrix(pose[:3, :3]).as_quat())
+            attitude = Rotation.from_rotvec(turned(t)) * Rotation.from_matrix(pose[:3, :3])
+            poses.add(round(t * NS), tuple(given), attitude.as_quat())
         return poses

@@ -7,13 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import Imu, PointCloud2
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 from uav_msgs.msg import MappingState
 
 from alula_testing.ros1 import end_process, wait_until
 from lidar_mapping import read_ply
-from perception_core.testing import FakeFlight
+from perception_core import NS
+from perception_core.testing import FakeFlight, framed, send_raw
 
 NODE = str(Path(__file__).parents[1] / "scripts" / "lidar_mapping_node")
 LIDAR_HEIGHT_M = 0.1
@@ -24,6 +26,7 @@ class Walls:
 
     def __init__(self, flight: FakeFlight) -> None:
         self.flight = flight
+        self.cut = False
         flight.at_10_hz = self
 
     def __call__(self, stamp_ns: int) -> None:
@@ -32,7 +35,8 @@ class Walls:
         walls = [(np.full(2000, 6.0), a, b), (a, np.full(2000, 4.0), b), (a, rng.permutation(a), np.zeros(2000))]
         points = np.vstack([np.stack(wall, axis=1) for wall in walls]) - [*self.flight.position]
         points = np.vstack([points - [0.0, 0.0, LIDAR_HEIGHT_M], rng.uniform(-0.5, 0.5, (50, 3))])
-        self.flight.publish_cloud(stamp_ns, (points + rng.normal(0.0, 0.01, points.shape)).astype(np.float32))
+        noisy = (points + rng.normal(0.0, 0.01, points.shape)).astype(np.float32)
+        (self.flight.publish_cut_cloud if self.cut else self.flight.publish_cloud)(stamp_ns, noisy)
 
 
 @pytest.fixture
@@ -113,3 +117,30 @@ def test_started_again_after_a_crash_it_goes_on_with_map_and_work(flight, states
     assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 1)
     assert states[-1].running
     assert states[-1].points >= before
+
+
+def test_garbage_on_its_inputs_is_left_out_and_it_maps_on(flight, states) -> None:
+    walls = Walls(flight)
+    imu = rospy.Publisher("/imu/data", Imu, queue_size=10)
+    wait_until(imu.get_num_connections, timeout_s=15.0, what="it listens to the IMU")
+    assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 3)
+    scans = states[-1].scans
+
+    walls.cut = True
+    flight.run(0.5)
+    walls.cut = False
+    send_raw(imu, framed(b"\x00" * 30))
+    for stamp_ns, force in ((flight.now_ns, np.nan), (flight.now_ns, 1e30), (flight.now_ns + 1000 * NS, 9.81)):
+        reading = Imu(header=Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="base_link"))
+        reading.linear_acceleration.z = force
+        imu.publish(reading)
+    stamp_ns, cloud = flight.now_ns, np.full((300, 3), np.nan, np.float32)
+    flight.publish_cloud(stamp_ns, cloud)
+    flight.publish_cloud(stamp_ns + 10 * NS, cloud + 1.0)
+    flight.publish_cloud(stamp_ns, cloud[:0])
+
+    assert flight.run(8.0, until=lambda: states[-1].scans >= scans + 15 and not states[-1].refusal)
+    assert states[-1].fitness > 0.8
+    assert not states[-1].problem
+    imu.unregister()

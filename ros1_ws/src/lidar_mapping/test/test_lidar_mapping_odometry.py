@@ -11,6 +11,7 @@ import open3d as o3d
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from lidar_mapping_yard import yard
 from scipy.spatial.transform import Rotation
 
@@ -29,6 +30,7 @@ from lidar_mapping import (
     flat_patches,
     register,
 )
+from lidar_mapping.surface import PATCH_M, smallest_axis
 from perception_core import NS, Sweep
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -44,11 +46,11 @@ def filter_at(position=(0.0, 0.0, 2.0), *, sigma_m=0.1, sigma_rad=0.02) -> Inert
     return found
 
 
-@given(vectors, vectors, vectors, vectors, vectors)
+@given(vectors, vectors, vectors, vectors, vectors, vectors)
 @settings(max_examples=40, deadline=None)
-def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel) -> None:
-    error = np.concatenate([turn, velocity, position, gyro, accel])
-    start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro)
+def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel, autopilot) -> None:
+    error = np.concatenate([turn, velocity, position, gyro, accel, autopilot])
+    start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro, gyro[::-1])
     assert start.plus(error).minus(start) == pytest.approx(error, abs=1e-9)
 
 
@@ -75,6 +77,31 @@ def test_a_plane_is_flat_and_an_edge_is_not() -> None:
     assert np.mean(np.maximum(to_floor, to_wall) > 0.95) > 0.97  # the rest lies along the edge
     thread = np.stack([np.linspace(0.0, 3.0, 300), np.zeros(300), np.ones(300)], axis=1)
     assert len(flat_patches(thread, thread).points) == 0
+
+
+@given(arrays(np.float64, (6, 3, 3), elements=st.floats(-1.0, 1.0)))
+@settings(max_examples=60, deadline=None)
+def test_the_smallest_axis_is_the_general_ways(factors) -> None:
+    matrices = factors.transpose(0, 2, 1) @ factors
+    spread, axes = smallest_axis(matrices)
+    values, vectors = np.linalg.eigh(matrices)
+    assert spread == pytest.approx(values[:, :2], abs=1e-6)
+    apart = values[:, 1] - values[:, 0] > 1e-3 * values[:, 2] + 1e-9
+    assert np.abs(np.sum(axes * vectors[:, :, 0], axis=1))[apart] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_points_too_near_to_one_another_tell_no_normal_and_thinned_ones_do() -> None:
+    rng = np.random.default_rng(1)
+    wall = np.stack([rng.normal(0.0, 0.02, 60_000), rng.uniform(0.0, 3.0, 60_000), rng.uniform(0.0, 3.0, 60_000)], axis=1)
+    dense, thinned = downsample(wall, 0.03), downsample(wall, PATCH_M)
+    assert len(flat_patches(thinned, dense).points) < 0.2 * len(thinned)
+    patches = flat_patches(thinned, thinned)
+    assert len(patches.points) > 0.9 * len(thinned)
+    assert np.sqrt(np.mean(patches.points[:, 0] ** 2)) < 0.01
+    frames = Keyframes(voxel_m=0.08, limit=10)
+    for k in range(4):  # what the last keyframes saw lies upon one another
+        frames.add(k, np.eye(4), wall[k::4])
+    assert len(frames.all[-1].patches.points) > 0.9 * len(thinned)
 
 
 def surface_of(points) -> Surface:
@@ -127,7 +154,7 @@ def test_what_can_not_be_believed_says_why_and_leaves_the_filter_alone() -> None
 # --- real scans ------------------------------------------------------------------------------------------------------
 
 # What is said of the motion is hardly believed: it is wrong on purpose.
-FREE = OdometrySettings(noise=InertialNoise(start_velocity_m_s=10.0), autopilot_m_s=2.0, autopilot_rad=0.01)
+FREE = OdometrySettings(noise=InertialNoise(start_velocity_m_s=10.0), autopilot_m_s=2.0)
 
 
 def odometry() -> LidarInertialOdometry:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import time
+from threading import Timer
+
 import numpy as np
 import pytest
 from lidar_mapping_yard import Path
+from scipy.spatial.transform import Rotation
 
-from lidar_mapping import Slam, SlamSettings
-from perception_core import PoseBuffer, PoseUnavailableError
+from lidar_mapping import ImuReading, Slam, SlamSettings
+from lidar_mapping.readings import ReadingQueue
+from perception_core import NS, PoseBuffer, PoseUnavailableError
 
 LAP_S = 24.0
 
@@ -18,12 +23,12 @@ def lap(t):
     return np.array([6.0 * np.cos(phase), 3.0 * np.sin(phase), 2.0])
 
 
-def fly(path, slam, seconds, **wrong) -> float:
+def fly(path, slam, seconds, *, count=7000, **wrong) -> float:
     """Let a SLAM follow a path; return by how much its position is off at the end, metres."""
     rng = np.random.default_rng(7)
     for k in range(round(seconds * 10)):
         start_s = k / 10
-        sweep = path.sweep(start_s, seed=k)
+        sweep = path.sweep(start_s, seed=k, count=count)
         slam.add(sweep, path.readings(start_s, start_s + 0.1, rng), path.autopilot(start_s + 0.1, **wrong), np.eye(4))
     pose, _ = slam.pose()
     return float(np.linalg.norm(pose[:3, 3] - path.position(slam._odometry.filter.stamp_ns * 1e-9)))
@@ -37,13 +42,48 @@ def off_the_yard(points) -> np.ndarray:
 @pytest.mark.parametrize("drift", [0.02, 0.05])
 def test_the_autopilots_drift_does_not_get_into_pose_or_map(drift) -> None:
     path, slam = Path(lap, yaw=lambda t: 0.2 * np.sin(t)), Slam(SlamSettings())
-    assert fly(path, slam, 6.0, drift=drift) < 0.1
+    assert fly(path, slam, 35.0, count=2500, drift=drift) < 0.1
+    way = [path.position(t) for t in np.arange(0.0, 35.05, 0.1)]
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).sum() > 40.0
     assert slam.count.rejected == 0
     large = slam.map.points[slam.map.points[:, 2] > 1.7]  # above the crates
     assert np.sqrt(np.mean(off_the_yard(large) ** 2)) < 0.04
-    given = path.autopilot(6.0, drift=drift).at([int(6.0e9)]).position[0]
+    given = path.autopilot(35.0, drift=drift).at([int(35.0e9)]).position[0]
     there = slam.T_map_odom @ np.append(given, 1.0)
-    assert there[:3] == pytest.approx(path.position(6.0), abs=0.15)
+    assert there[:3] == pytest.approx(path.position(35.0), abs=0.15)
+
+
+def leg(t):
+    """Along the yard from rest, 0.6 m/s, with half a metre to both sides."""
+    way = 0.6 * (t - 2.0 * (1.0 - np.exp(-t / 2.0))) if t > 0.0 else 0.0
+    return np.array([way - 8.0, 0.5 * np.sin(way / 3.0), 2.0])
+
+
+SLOW_ERRORS_DEG = {
+    "heading": lambda t: (0.0, 0.0, 0.5 - 0.5 * np.cos(np.pi * min(t / 20.0, 1.0))),
+    "tilt": lambda t: (0.4 * np.sin(t / 6.0), 0.4 * np.cos(t / 8.0) - 0.4, 0.0),
+    "heading at the start": lambda t: (0.0, 0.0, max(0.0, 1.0 - t / 2.0)),
+}
+"""What the autopilot's attitude is off about the axes of the map, by time, degrees."""
+
+
+@pytest.mark.parametrize("kind", SLOW_ERRORS_DEG)
+def test_the_autopilots_slow_error_of_attitude_does_not_bend_the_map(kind) -> None:
+    path, slam, rng = Path(leg, across_deg=17.0), Slam(SlamSettings()), np.random.default_rng(7)
+    off_deg = []
+    for k in range(250):
+        end_s = (k + 1) / 10
+        given = path.autopilot(end_s, turned=lambda t: np.radians(SLOW_ERRORS_DEG[kind](t)))
+        slam.add(path.sweep(k / 10, seed=k, count=2500), path.readings(k / 10, end_s, rng), given, np.eye(4))
+        turn = slam.pose()[0][:3, :3] @ path.pose(end_s)[:3, :3].T
+        off_deg.append(np.degrees(Rotation.from_matrix(turn).as_rotvec()))
+    off_deg = np.array(off_deg)
+    began_deg = SLOW_ERRORS_DEG[kind](0.0)[2]
+    assert np.abs(off_deg[:, 2] - began_deg).max() < (0.3 if began_deg else 0.15)
+    assert np.linalg.norm(off_deg[:, :2], axis=1).max() < 0.3
+    back = Rotation.from_euler("z", -began_deg, degrees=True)  # a map is turned as the vehicle was taken to be when it began
+    points = back.apply(slam.map.points - leg(0.0)) + leg(0.0)
+    assert np.sqrt(np.mean(off_the_yard(points[points[:, 2] > 1.7]) ** 2)) < 0.02
 
 
 def test_a_jump_of_the_autopilots_position_moves_odom_and_not_the_map() -> None:
@@ -109,3 +149,56 @@ def test_a_sweep_without_pose_changes_nothing() -> None:
     with pytest.raises(PoseUnavailableError):
         slam.add(Path(lap).sweep(0.0, seed=1), [], PoseBuffer(), np.eye(4))
     assert (len(slam.map), slam.count.scans) == (0, 0)
+
+
+def test_a_sweep_that_is_not_later_is_left_out_and_a_clock_that_was_set_back_is_followed() -> None:
+    path, slam, rng = Path(lap), Slam(SlamSettings()), np.random.default_rng(2)
+    fly(path, slam, 2.0)
+    points = len(slam.map)
+    found = slam.add(path.sweep(1.5, seed=1), [], path.autopilot(1.6), np.eye(4))
+    assert (found.refusal, len(slam.map)) == ("the sweep is not later than the one before", points)
+    for k in range(5):
+        found = slam.add(path.sweep(k / 10, seed=k), path.readings(k / 10, k / 10 + 0.1, rng), path.autopilot(k / 10 + 0.1), np.eye(4))
+        assert found.believed, found.refusal
+    assert slam.pose()[0][:3, 3] == pytest.approx(path.position(0.5), abs=0.1)
+
+
+def test_readings_that_can_not_be_any_are_left_out() -> None:
+    queue, still, up = ReadingQueue(), np.zeros(3), np.array([0.0, 0.0, 9.81])
+    assert queue.add(ImuReading(NS, still, up), NS)
+    for wrong in (
+        ImuReading(NS, still, up),  # again
+        ImuReading(NS - 1, still, up),
+        ImuReading(10 * NS, still, up),
+        ImuReading(NS + 2, still + np.nan, up),
+        ImuReading(NS + 2, still, up * 1e3),
+    ):
+        assert not queue.add(wrong, NS + 5)
+    assert queue.add(ImuReading(NS + 3, still, up), NS + 5)
+    assert [reading.stamp_ns for reading in queue.take_until(NS + 2)] == [NS, NS + 2]
+    assert [reading.stamp_ns for reading in queue.take_until(2 * NS)] == [NS + 3]
+    assert queue.add(ImuReading(2, still, up), 8), "the clock was set back"
+
+
+def test_a_sweep_gets_the_part_of_the_reading_that_spans_its_end() -> None:
+    queue, up = ReadingQueue(), np.array([0.0, 0.0, 9.81])
+    for k in range(1, 4):
+        assert queue.add(ImuReading(k * NS // 50, np.full(3, k), up), NS)
+    taken = queue.take_until(3 * NS // 100)
+    assert [(reading.stamp_ns, reading.rates[0]) for reading in taken] == [(NS // 50, 1.0), (3 * NS // 100, 2.0)]
+    assert [reading.stamp_ns for reading in queue.take_until(NS)] == [2 * NS // 50, 3 * NS // 50], "it is whole for the next sweep"
+    assert queue.add(ImuReading(5 * NS, np.zeros(3), up), 5 * NS)
+    assert queue.take_until(NS) == [], "a reading after a gap says nothing of the time before the gap"
+
+
+def test_the_readings_of_a_sweep_are_waited_for_once_in_vain() -> None:
+    queue, up = ReadingQueue(), np.array([0.0, 0.0, 9.81])
+    late = Timer(0.2, lambda: queue.add(ImuReading(NS, np.zeros(3), up), NS))
+    late.start()
+    queue.wait_for(NS, 30.0)
+    assert [reading.stamp_ns for reading in queue.take_until(NS)] == [NS]
+    queue.wait_for(2 * NS, 0.01)
+    begun_s = time.monotonic()
+    queue.wait_for(3 * NS, 30.0)
+    assert time.monotonic() - begun_s < 15.0, "none has come since the last wait, which was in vain"
+    late.join()

@@ -48,23 +48,62 @@ def test_a_stream_that_lost_its_borders_is_connected_again(link) -> None:
     wait_until(publish_and_hear, timeout_s=30.0, what="messages on a new connection")
 
 
-def test_a_held_clock_is_no_silence(ros_master, monkeypatch) -> None:
+class Watched:
+    """A subscription on a clock that the test moves; how often its watch looked at the clock, and how often it subscribed."""
+
+    def __init__(self, monkeypatch) -> None:
+        self.now_s, self.looks, self.subscribed = 5.0, 0, 0
+        monkeypatch.setattr(subscription, "LOOK_S", 0.01)
+        monkeypatch.setattr(subscription, "SILENCE_S", 0.2)
+        monkeypatch.setattr(rospy, "get_time", self._time)
+        subscribe = RawSubscriber._subscribe
+        monkeypatch.setattr(RawSubscriber, "_subscribe", lambda subscriber: (self._count(), subscribe(subscriber))[1])
+
+    def _time(self) -> float:
+        self.looks += 1
+        return self.now_s
+
+    def _count(self) -> None:
+        self.subscribed += 1
+
+    def look(self) -> None:
+        """Wait until the watch has looked 50 times, half a second of wall clock."""
+        self.looks = 0
+        wait_until(lambda: self.looks > 50, timeout_s=15.0, what="50 looks")
+
+
+@pytest.fixture
+def watched(ros_master, monkeypatch):
+    return Watched(monkeypatch)
+
+
+def test_a_held_clock_is_no_silence(watched) -> None:
     """Simulated time waits for slow nodes: no message is due, so the connections stay as they are."""
-    now_s, looks = [5.0], []
-    monkeypatch.setattr(subscription, "LOOK_S", 0.01)
-    monkeypatch.setattr(subscription, "SILENCE_S", 0.2)
-    monkeypatch.setattr(rospy, "get_time", lambda: (looks.append(1), now_s[0])[1])
-    subscribed: list[str] = []
-    subscribe = RawSubscriber._subscribe
-    monkeypatch.setattr(RawSubscriber, "_subscribe", lambda self: (subscribed.append(self._topic), subscribe(self))[1])
     publisher = rospy.Publisher("/raw/held", Point, queue_size=10)
     subscriber = RawSubscriber("/raw/held", Point, lambda _message: None, lambda _why: None, buffer_bytes=1 << 16)
     wait_until(publisher.get_num_connections, timeout_s=15.0, what="connected")
-    looks.clear()
-    wait_until(lambda: len(looks) > 50, timeout_s=15.0, what="50 looks, half a second of wall clock")
-    assert len(subscribed) == 1
-    now_s[0] += 0.2
-    wait_until(lambda: len(subscribed) == 2, timeout_s=15.0, what="connected again when the clock has gone on")
+    send_raw(publisher, struct.pack("<I", 24) + b"the rest is due")
+    watched.look()
+    assert watched.subscribed == 1
+    watched.now_s += 0.2
+    wait_until(lambda: watched.subscribed == 2, timeout_s=15.0, what="connected again when the clock has gone on")
+    subscriber.close()
+    publisher.unregister()
+
+
+def test_a_topic_that_is_silent_by_nature_is_left_alone(watched) -> None:
+    """A latched topic says once what it has to say."""
+    heard: list[float] = []
+    publisher = rospy.Publisher("/raw/latched", Point, queue_size=10, latch=True)
+    publisher.publish(Point(x=4.0))
+    subscriber = RawSubscriber("/raw/latched", Point, lambda message: heard.append(message.x), buffer_bytes=1 << 16)
+    wait_until(lambda: heard == [4.0], timeout_s=15.0, what="the latched message")
+    for _ in range(3):
+        watched.now_s += 100.0
+        watched.look()
+    assert watched.subscribed == 1
+    publisher.publish(Point(x=5.0))
+    wait_until(lambda: heard == [4.0, 5.0], timeout_s=15.0, what="the next message")
     subscriber.close()
     publisher.unregister()
 

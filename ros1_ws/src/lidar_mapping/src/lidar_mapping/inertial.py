@@ -1,7 +1,8 @@
 """The state of a LiDAR-inertial odometry: propagated by inertial readings, corrected by whatever measures pose or velocity.
 
-An error-state Kalman filter in information form. Its 15 error terms are, in this order: attitude (rotation vector in the body frame),
-velocity and position (map frame, ENU), gyro bias and accelerometer bias (body frame).
+An error-state Kalman filter in information form. Its 18 error terms are, in this order: attitude (rotation vector in the body frame),
+velocity and position (map frame, ENU), gyro bias and accelerometer bias (body frame), and the error of the autopilot's attitude (rotation
+vector in the map frame). That error changes slowly, so a hundred attitudes within a few seconds know no more than one.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
     Linearise = Callable[["State"], tuple[Floats, Floats]]
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
-ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS = (slice(3 * i, 3 * i + 3) for i in range(5))
+ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS, AUTOPILOT = (slice(3 * i, 3 * i + 3) for i in range(6))
+HEADING = 2  # of the attitude, while the vehicle is level
+TERMS = 18
 HISTORY = 64
 """States kept for the deskewing of one sweep."""
 
@@ -43,10 +46,11 @@ class InertialNoise:
     """Densities of the noise (per root hertz) and what is known at the start (standard deviations).
 
     Without inertial readings the vehicle is assumed to keep its velocity and attitude; ``free_m_s2`` and ``free_rad_s`` say how badly
-    (root mean square over one second).
+    (root mean square over one second). The autopilot's attitude is off by ``autopilot_tilt_rad`` about each horizontal axis and by
+    ``autopilot_heading_rad``, which change within ``autopilot_s`` (first-order Gauss-Markov processes).
     """
 
-    gyro: float = 0.004
+    gyro: float = 0.0005
     accel: float = 0.08
     gyro_walk: float = 5e-5
     accel_walk: float = 5e-4
@@ -56,17 +60,26 @@ class InertialNoise:
     start_velocity_m_s: float = 0.1
     start_gyro_bias: float = 0.003
     start_accel_bias: float = 0.05
+    autopilot_tilt_rad: float = 0.01
+    autopilot_heading_rad: float = 0.05
+    autopilot_s: float = 30.0
+
+    @property
+    def autopilot_rad(self) -> Floats:
+        """The standard deviation of the autopilot's attitude about the map's axes, (3,)."""
+        return np.array([self.autopilot_tilt_rad, self.autopilot_tilt_rad, self.autopilot_heading_rad])
 
 
 @dataclass(frozen=True)
 class State:
-    """``rotation`` (3, 3) is R_map_base; the rest are (3,) vectors."""
+    """``rotation`` (3, 3) is R_map_base; the rest are (3,) vectors. The autopilot says Exp(``autopilot_error``) R_map_base."""
 
     rotation: Floats
     velocity: Floats
     position: Floats
     gyro_bias: Floats = field(default_factory=lambda: np.zeros(3))
     accel_bias: Floats = field(default_factory=lambda: np.zeros(3))
+    autopilot_error: Floats = field(default_factory=lambda: np.zeros(3))
 
     @property
     def matrix(self) -> Floats:
@@ -76,23 +89,25 @@ class State:
         return transform
 
     def plus(self, error: Floats) -> State:
-        """Return the state moved by an error (15,)."""
+        """Return the state moved by an error (18,)."""
         return State(
             self.rotation @ Rotation.from_rotvec(error[ATTITUDE]).as_matrix(),
             self.velocity + error[VELOCITY],
             self.position + error[POSITION],
             self.gyro_bias + error[GYRO_BIAS],
             self.accel_bias + error[ACCEL_BIAS],
+            self.autopilot_error + error[AUTOPILOT],
         )
 
     def minus(self, other: State) -> Floats:
-        """Return the error (15,) that leads from ``other`` to this state."""
+        """Return the error (18,) that leads from ``other`` to this state."""
         turn = Rotation.from_matrix(other.rotation.T @ self.rotation).as_rotvec()
         shifts = (
             self.velocity - other.velocity,
             self.position - other.position,
             self.gyro_bias - other.gyro_bias,
             self.accel_bias - other.accel_bias,
+            self.autopilot_error - other.autopilot_error,
         )
         return np.concatenate([turn, *shifts])
 
@@ -105,7 +120,7 @@ class InertialFilter:
         self.stamp_ns = stamp_ns
         self.state = start
         sigmas = (noise.start_attitude_rad, noise.start_velocity_m_s, 1e-3, noise.start_gyro_bias, noise.start_accel_bias)
-        self.covariance: Floats = np.diag(np.repeat(np.square(sigmas), 3))
+        self.covariance: Floats = np.diag(np.square([*np.repeat(sigmas, 3), *noise.autopilot_rad]))
         self.history: deque[tuple[int, State]] = deque([(stamp_ns, start)], maxlen=HISTORY)
 
     def propagate(self, reading: ImuReading) -> None:
@@ -115,19 +130,19 @@ class InertialFilter:
             rates = reading.rates - self.state.gyro_bias
             force = reading.specific_force - self.state.accel_bias
             noise = self._noise
-            densities = np.repeat(np.square([noise.gyro, noise.accel, 0.0, noise.gyro_walk, noise.accel_walk]), 3)
-            self._move(reading.stamp_ns, rates, self.state.rotation @ force + GRAVITY, force, densities * duration_s)
+            densities = np.square([noise.gyro, noise.accel, 0.0, noise.gyro_walk, noise.accel_walk])
+            self._move(reading.stamp_ns, rates, self.state.rotation @ force + GRAVITY, force, densities)
 
     def coast(self, stamp_ns: int) -> None:
         """Move to a moment without any reading: attitude and velocity are kept, and become uncertain."""
         duration_s = (stamp_ns - self.stamp_ns) / NS
         if duration_s > 0.0:
             noise = self._noise
-            densities = np.repeat(np.square([noise.free_rad_s, noise.free_m_s2, 0.0, noise.gyro_walk, noise.accel_walk]), 3)
-            self._move(stamp_ns, np.zeros(3), np.zeros(3), np.zeros(3), densities * duration_s)
+            densities = np.square([noise.free_rad_s, noise.free_m_s2, 0.0, noise.gyro_walk, noise.accel_walk])
+            self._move(stamp_ns, np.zeros(3), np.zeros(3), np.zeros(3), densities)
 
     def correct(self, linearise: Linearise, *, least: int = 1, most: int = 1) -> None:
-        """Take a measurement that was linearised about the state: an information matrix (15, 15) and a gradient (15,), iterated.
+        """Take a measurement that was linearised about the state: an information matrix (18, 18) and a gradient (18,), iterated.
 
         Small steps end the iterations after the ``least``: a measurement may narrow its gates as it goes.
         """
@@ -154,16 +169,18 @@ class InertialFilter:
 
         return take_back
 
-    def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, growth: Floats) -> None:
+    def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, densities: Floats) -> None:
         duration_s = (stamp_ns - self.stamp_ns) / NS
-        before = self.state
+        before, fading = self.state, float(np.exp(-duration_s / self._noise.autopilot_s))
         turn = Rotation.from_rotvec(rates * duration_s).as_matrix()
-        transition = np.eye(15)
+        transition = np.eye(TERMS)
         transition[ATTITUDE, ATTITUDE] = turn.T
         transition[ATTITUDE, GYRO_BIAS] = -np.eye(3) * duration_s
         transition[VELOCITY, ATTITUDE] = -before.rotation @ cross_matrix(force) * duration_s
         transition[VELOCITY, ACCEL_BIAS] = -before.rotation * duration_s
         transition[POSITION, VELOCITY] = np.eye(3) * duration_s
+        transition[AUTOPILOT, AUTOPILOT] = np.eye(3) * fading
+        growth = [*np.repeat(densities * duration_s, 3), *(1.0 - fading**2) * self._noise.autopilot_rad**2]
         self.covariance = transition @ self.covariance @ transition.T + np.diag(growth)
         self.state = State(
             before.rotation @ turn,
@@ -171,6 +188,7 @@ class InertialFilter:
             before.position + before.velocity * duration_s + 0.5 * acceleration * duration_s**2,
             before.gyro_bias,
             before.accel_bias,
+            before.autopilot_error * fading,
         )
         self.stamp_ns = stamp_ns
         self.history.append((stamp_ns, self.state))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lidar_mapping.surface import Patches, Surface, flat_patches, join
+from lidar_mapping.surface import PATCH_M, Patches, Surface, flat_patches, join
 from lidar_mapping.voxel_map import downsample
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Keyframes:
         fresh = downsample(points, self._voxel_m)
         around = np.vstack([fresh, *(frame.points_in_map() for frame in self.all[-NEIGHBOUR_KEYFRAMES:])])
         back: Floats = np.asarray(np.linalg.inv(pose), dtype=np.float64)
-        patches = flat_patches(fresh, around).moved(back)
+        patches = flat_patches(downsample(fresh, PATCH_M), downsample(around, PATCH_M)).moved(back)
         inside = (fresh @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
         frame = Keyframe(stamp_ns, pose, inside, patches)
         self.all.append(frame)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -19,10 +18,20 @@ from uav_msgs.msg import MappingState
 
 from lidar_mapping.inertial import ImuReading
 from lidar_mapping.ply import read_ply, write_ply
+from lidar_mapping.readings import ReadingQueue
 from lidar_mapping.settings import MappingSettings
 from lidar_mapping.slam import Slam
 from perception_core import NS, Sweep
-from perception_core.ros import DoneReporter, EnableSwitch, NewestWorker, Vehicle, cloud_message, read_settings, sweep_of_cloud
+from perception_core.ros import (
+    DoneReporter,
+    EnableSwitch,
+    NewestWorker,
+    RawSubscriber,
+    Vehicle,
+    cloud_message,
+    read_settings,
+    sweep_of_cloud,
+)
 from resource_reporter import ResourceReporter, ToldService
 
 if TYPE_CHECKING:
@@ -30,8 +39,9 @@ if TYPE_CHECKING:
 
     from lidar_mapping.registration import Registration
 
-CLOUD_BYTES = 1 << 23
-READINGS_KEPT = 2000
+CLOUD, CLOUD_BYTES = "/lidar/points", 1 << 23
+IMU, IMU_BYTES, IMU_QUEUE = "/imu/data", 1 << 16, 100
+READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it, over a connection of their own
 TF_PERIOD_S = 0.1
 
 
@@ -42,7 +52,7 @@ class LidarMappingNode:
         self._settings = settings
         self._path = Path(settings.map_path)
         self._slam = Slam(settings.slam)
-        self._readings: deque[ImuReading] = deque(maxlen=READINGS_KEPT)
+        self._readings = ReadingQueue()
         self._lock = Lock()
         self._saving = Lock()
         self._received = 0
@@ -63,10 +73,8 @@ class LidarMappingNode:
             rospy.Timer(rospy.Duration.from_sec(settings.publish_period_s), self._publish_map, reset=True),
             rospy.Timer(rospy.Duration.from_sec(TF_PERIOD_S), self._publish_tf, reset=True),
         ]
-        self._subscribers = [
-            rospy.Subscriber("/imu/data", Imu, self._on_imu, queue_size=100, tcp_nodelay=True),
-            rospy.Subscriber("/lidar/points", PointCloud2, self._on_cloud, queue_size=1, buff_size=CLOUD_BYTES),
-        ]
+        self._imu = RawSubscriber(IMU, Imu, self._on_imu, self._on_garbage, buffer_bytes=IMU_BYTES, queue_size=IMU_QUEUE)
+        self._clouds = RawSubscriber(CLOUD, PointCloud2, self._on_cloud, self._on_garbage, buffer_bytes=CLOUD_BYTES)
         rospy.on_shutdown(lambda: self._save_if_new(None))
 
     def _resume(self) -> None:
@@ -80,10 +88,21 @@ class LidarMappingNode:
 
     def _on_cloud(self, message: PointCloud2) -> None:
         self._received += self._switch.enabled
-        if self._switch.enabled and self._received % self._settings.every_scan == 0:
-            self._worker.offer((message.header.frame_id, sweep_of_cloud(message)))
-        else:
+        wanted = self._switch.enabled and self._received % self._settings.every_scan == 0
+        if not (wanted and self._offered(message)):
             self._done.done(message.header.stamp.to_nsec())
+
+    def _offered(self, message: PointCloud2) -> bool:
+        try:
+            self._worker.offer((message.header.frame_id, sweep_of_cloud(message)))
+        except ValueError as error:
+            self._on_garbage(str(error))
+            return False
+        return True
+
+    @staticmethod
+    def _on_garbage(reason: str) -> None:
+        rospy.logwarn_throttle(2.0, f"left out: {reason}")
 
     def _process(self, item: tuple[str, Sweep]) -> None:
         try:
@@ -94,22 +113,18 @@ class LidarMappingNode:
     def _on_imu(self, message: Imu) -> None:
         rates, force = message.angular_velocity, message.linear_acceleration
         reading = ImuReading(message.header.stamp.to_nsec(), np.array([rates.x, rates.y, rates.z]), np.array([force.x, force.y, force.z]))
-        if np.isfinite(reading.rates).all() and np.isfinite(reading.specific_force).all():
-            self._readings.append(reading)
-
-    def _readings_until(self, stamp_ns: int) -> list[ImuReading]:
-        """Take the readings up to a moment; later ones stay for the next sweep."""
-        taken: list[ImuReading] = []
-        while self._readings and self._readings[0].stamp_ns <= stamp_ns:
-            taken.append(self._readings.popleft())
-        return taken
+        if not self._readings.add(reading, rospy.Time.now().to_nsec()):
+            self._on_garbage(
+                f"a reading of {IMU} can't be one: stamp {reading.stamp_ns}, {reading.rates} rad/s, {reading.specific_force} m/s2"
+            )
 
     def _register(self, frame: str, sweep: Sweep) -> None:
         poses = self._vehicle.poses_at(sweep.end_ns)
+        self._readings.wait_for(sweep.end_ns, READING_WAIT_S)
         with self._lock:
             if not self._switch.enabled:
                 return
-            registration = self._slam.add(sweep, self._readings_until(sweep.end_ns), poses, self._vehicle.mount(frame))
+            registration = self._slam.add(sweep, self._readings.take_until(sweep.end_ns), poses, self._vehicle.mount(frame))
             self._publish_state(sweep.stamp_ns, registration)
             self._publish_pose(sweep.end_ns)
         self._report()

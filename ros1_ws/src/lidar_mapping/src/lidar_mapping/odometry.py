@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lidar_mapping.inertial import ATTITUDE, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
+from lidar_mapping.inertial import ATTITUDE, AUTOPILOT, HEADING, TERMS, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.registration import Registration, RegistrationSettings, refused, register
 from lidar_mapping.voxel_map import downsample
@@ -28,16 +28,18 @@ if TYPE_CHECKING:
 IMU_GAP_NS = 100_000_000
 KNOT_NS = 10_000_000
 FIRST_SWEEPS = 3
+FIRST_HEADING_RAD = 0.001  # a new map's heading is what the start says, by definition
+AUTOPILOT_RAD = 0.003  # what its attitude is off without the slow error, which is a part of the state
 
 
 @dataclass(frozen=True)
 class OdometrySettings:
     """Metres, radians. Scans are thinned to ``scan_voxel_m`` and ``scan_points``; the surface is what keyframes within ``reach_m`` saw.
 
-    A keyframe is taken after ``keyframe_m`` or ``keyframe_rad``; it holds the sweeps since the last one, ``keyframe_sweeps`` at most. What
-    the autopilot says of attitude and velocity is believed to ``autopilot_rad`` and ``autopilot_m_s``: the velocity loosely, because
-    its errors go on for seconds, so that it counts only where no surface holds a direction for long. A fitness below
-    ``good_fitness`` makes other starts be tried.
+    A keyframe is taken after ``keyframe_m`` or ``keyframe_rad``; it holds the sweeps since the last one, ``keyframe_sweeps`` at most. The
+    autopilot's velocity is believed to ``autopilot_m_s``: loosely, because its errors go on for seconds, so that it counts only where
+    no surface holds a direction for long. How its attitude is believed stands in ``noise``. A fitness below ``good_fitness`` makes
+    other starts be tried.
     """
 
     scan_voxel_m: float = 0.2
@@ -48,7 +50,6 @@ class OdometrySettings:
     keyframe_rad: float = 0.2
     keyframe_sweeps: int = 8
     max_keyframes: int = 1500
-    autopilot_rad: float = 0.003
     autopilot_m_s: float = 0.2
     good_fitness: float = 0.85
     noise: InertialNoise = field(default_factory=InertialNoise)
@@ -57,7 +58,7 @@ class OdometrySettings:
 
 @dataclass(frozen=True)
 class AutopilotMotion:
-    """What the autopilot says: R_map_base (3, 3), and velocity m/s ENU."""
+    """What the autopilot says: R_enu_base (3, 3), with its slow error, and velocity m/s ENU, which a wrong heading does not turn."""
 
     rotation: Floats
     velocity: Floats
@@ -79,6 +80,8 @@ class LidarInertialOdometry:
         self._settings = settings
         self.keyframes = keyframes
         self.filter = InertialFilter(settings.noise, stamp_ns, start)
+        if not keyframes.all:
+            self.filter.covariance[HEADING, HEADING] = FIRST_HEADING_RAD**2
         self._surface: Surface | None = keyframes.surface(start.position, settings.reach_m)
         self._since: list[Floats] = []
         self._last_pose: Floats | None = None
@@ -102,7 +105,8 @@ class LidarInertialOdometry:
         """Follow the map when it is corrected; ``correction`` (4, 4) is T_corrected_before at the vehicle."""
         state, turn = self.filter.state, correction[:3, :3]
         position = turn @ state.position + correction[:3, 3]
-        moved = State(turn @ state.rotation, turn @ state.velocity, position, state.gyro_bias, state.accel_bias)
+        error = (Rotation.from_rotvec(state.autopilot_error) * Rotation.from_matrix(turn.T)).as_rotvec()
+        moved = State(turn @ state.rotation, turn @ state.velocity, position, state.gyro_bias, state.accel_bias, error)
         self.filter.state = moved
         self.filter.history[-1] = (self.filter.stamp_ns, moved)
         self._last_pose = None if self._last_pose is None else correction @ self._last_pose
@@ -159,14 +163,14 @@ class LidarInertialOdometry:
         return best
 
     def _listen_to(self, autopilot: AutopilotMotion, velocity_m_s: float) -> None:
-        settings = self._settings
-
         def linearise(state: State) -> tuple[Floats, Floats]:
-            information, gradient = np.zeros((15, 15)), np.zeros(15)
-            information[ATTITUDE, ATTITUDE] = np.eye(3) / settings.autopilot_rad**2
-            gradient[ATTITUDE] = Rotation.from_matrix(autopilot.rotation.T @ state.rotation).as_rotvec() / settings.autopilot_rad**2
-            information[VELOCITY, VELOCITY] = np.eye(3) / velocity_m_s**2
-            gradient[VELOCITY] = (state.velocity - autopilot.velocity) / velocity_m_s**2
+            said = Rotation.from_rotvec(state.autopilot_error).as_matrix() @ state.rotation
+            rows = np.zeros((3, TERMS))
+            rows[:, ATTITUDE], rows[:, AUTOPILOT] = np.eye(3), said.T
+            information = rows.T @ rows / AUTOPILOT_RAD**2
+            gradient: Floats = rows.T @ Rotation.from_matrix(autopilot.rotation.T @ said).as_rotvec() / AUTOPILOT_RAD**2
+            information[VELOCITY, VELOCITY] += np.eye(3) / velocity_m_s**2
+            gradient[VELOCITY] += (state.velocity - autopilot.velocity) / velocity_m_s**2
             return information, gradient
 
         self.filter.correct(linearise)

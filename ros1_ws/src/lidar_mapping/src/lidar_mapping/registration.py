@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lidar_mapping.inertial import ATTITUDE, POSITION
+from lidar_mapping.inertial import ATTITUDE, POSITION, TERMS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +31,8 @@ class RegistrationSettings:
     """How to register, and when to believe it.
 
     Pairs are searched within a gate that shrinks from three standard deviations of the prediction (at least ``widest_m / 5``, at most
-    ``widest_m``) to ``gate_m``; residuals beyond ``kernel_m`` count less (Cauchy). A point is known to ``point_sigma_m``, and
-    neighbours share their errors: ``independent`` of them count. ``tilt_rad`` is the noise of a normal.
+    ``widest_m``) to ``gate_m``; residuals beyond ``kernel_m`` count less (Cauchy). A point is known to ``point_sigma_m``, and neighbours
+    share their errors, as do the sweeps that meet the same patches: ``independent`` of them count. ``tilt_rad`` is the noise of a normal.
 
     A result is refused when fewer than ``min_points``, or fewer than ``min_fitness`` of those that have a patch within three gates, lie
     within half a gate of its plane: what sees new ground is not to blame for having no partner there, and of points laid down at
@@ -122,7 +122,7 @@ class _Measurement:
         scale[3:, 3:] = axes @ np.diag(np.sqrt(share)) @ axes.T
         information, gradient = scale @ information @ scale, scale @ gradient
         self.held = information[3:, 3:]
-        whole, whole_gradient = np.zeros((15, 15)), np.zeros(15)
+        whole, whole_gradient = np.zeros((TERMS, TERMS)), np.zeros(TERMS)
         whole[np.ix_(POSE, POSE)], whole_gradient[POSE] = information, gradient
         return whole, whole_gradient
 

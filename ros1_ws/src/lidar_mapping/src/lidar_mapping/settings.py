@@ -32,7 +32,8 @@ class MappingSettings:
     max_keyframes: int = _ODOMETRY.max_keyframes
     min_fitness: float = _ODOMETRY.registration.min_fitness
     autopilot_m_s: float = _ODOMETRY.autopilot_m_s
-    autopilot_rad: float = _ODOMETRY.autopilot_rad
+    autopilot_tilt_rad: float = _ODOMETRY.noise.autopilot_tilt_rad
+    autopilot_heading_rad: float = _ODOMETRY.noise.autopilot_heading_rad
     loop_reach_m: float = _GRAPH.reach_m
     autopilot_m: float = _GRAPH.autopilot_m
 
@@ -40,13 +41,14 @@ class MappingSettings:
     def slam(self) -> SlamSettings:
         """How the map is made."""
         registration = replace(_ODOMETRY.registration, min_fitness=self.min_fitness)
+        noise = replace(_ODOMETRY.noise, autopilot_tilt_rad=self.autopilot_tilt_rad, autopilot_heading_rad=self.autopilot_heading_rad)
         odometry = replace(
             _ODOMETRY,
             reach_m=self.reach_m,
             scan_voxel_m=self.scan_voxel_m,
             max_keyframes=self.max_keyframes,
             autopilot_m_s=self.autopilot_m_s,
-            autopilot_rad=self.autopilot_rad,
+            noise=noise,
             registration=registration,
         )
         return replace(

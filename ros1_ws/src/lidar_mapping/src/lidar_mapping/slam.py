@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from lidar_mapping.graph import GraphSettings, PoseGraph
 from lidar_mapping.inertial import POSITION, State
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.odometry import AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
+from lidar_mapping.readings import SET_BACK_NS
+from lidar_mapping.registration import refused
 from lidar_mapping.surface import flat_patches
 from lidar_mapping.voxel_map import VoxelMap, downsample
 from perception_core import NS
@@ -114,24 +117,32 @@ class Slam:
         self._lost_since_ns = None
 
     def add(self, sweep: Sweep, readings: Sequence[ImuReading], poses: PoseBuffer, T_base_lidar: Floats) -> Registration:  # noqa: N803
-        """Follow the vehicle through one sweep; a scan that is not believed is not inserted.
+        """Follow the vehicle through one sweep; a scan that is not believed, or not later than the one before, is not inserted.
 
+        A sweep that is earlier by more than a second tells of a clock that was set back: track is lost and found as at the start.
         ``poses`` are the autopilot's. Raises PoseUnavailableError when it says nothing of the sweep's end; then nothing was changed.
         """
         ends = poses.at([sweep.end_ns - VELOCITY_BASE_NS, sweep.end_ns])
-        given = self.T_map_odom @ ends.matrix(1)
-        velocity = self.T_map_odom[:3, :3] @ (ends.position[1] - ends.position[0]) / (VELOCITY_BASE_NS / NS)
+        velocity = (ends.position[1] - ends.position[0]) / (VELOCITY_BASE_NS / NS)
+        early_ns = 0 if self._odometry is None else self._odometry.filter.stamp_ns - sweep.end_ns
+        if early_ns > SET_BACK_NS:
+            self.stop()
+        elif self._odometry is not None and early_ns >= 0:
+            self.count.scans += 1
+            self.count.rejected += 1
+            return refused("the sweep is not later than the one before")
         if self._odometry is None:
             self._start(sweep, poses, velocity)
         assert self._odometry is not None  # noqa: S101 -- just started
         near = sweep.within(self._settings.self_m, self._settings.max_range_m)
-        step = self._odometry.add(near, readings, T_base_lidar, AutopilotMotion(given[:3, :3], velocity))
+        step = self._odometry.add(near, readings, T_base_lidar, AutopilotMotion(ends.rotation[1], velocity))
         self._take(step, ends.matrix(1))
         return step.registration
 
     def _start(self, sweep: Sweep, poses: PoseBuffer, velocity: Floats) -> None:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
-        start = State(place[:3, :3], velocity, place[:3, 3])
+        error = Rotation.from_matrix(self.T_map_odom[:3, :3].T).as_rotvec()
+        start = State(place[:3, :3], velocity, place[:3, 3], autopilot_error=error)
         self._odometry = LidarInertialOdometry(self._settings.odometry, self.keyframes, sweep.stamp_ns, start)
 
     def _take(self, step: Step, T_odom_base: Floats) -> None:  # noqa: N803 -- T_target_source

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+PATCH_M = 0.12
+"""Apart as clouds are to be thinned for patches: on a plane 14 points are then within the smallest radius."""
 NEIGHBOURS = 20
 MIN_NEIGHBOURS = 8
 TREE_LEAF = 24
@@ -50,20 +52,26 @@ class Patches:
 
 
 def flat_patches(points: Floats, around: Floats, scales: Sequence[Scale] = SCALES) -> Patches:
-    """Return a patch for each of the points (N, 3) whose neighbourhood in ``around`` (M, 3) is flat at one of the scales.
+    """Return a patch for each of the points (N, 3) whose neighbourhood in ``around`` (M, 3) is flat at one of the scales, smallest first.
 
-    ``around`` has to be thinned to about a third of the smallest radius: a neighbourhood is of a fixed number of points at most.
+    ``around`` has to be thinned to `PATCH_M`: a neighbourhood is of a fixed number of points, and in a denser cloud these are too near
+    to one another to tell a normal.
     """
     tree = cKDTree(around, leafsize=TREE_LEAF, balanced_tree=False, compact_nodes=False)
+    distance, index = tree.query(points, k=NEIGHBOURS, distance_upper_bound=scales[-1].radius_m)
+    offsets = around[np.minimum(index, len(around) - 1)] - points[:, None]
     found: list[Patches] = []
-    left = points
+    left = np.arange(len(points))
     for scale in scales:
-        if not len(left):
-            break
-        means, normals, flat, crowded = _planes(left, around, tree, scale)
-        found.append(Patches(means[flat], normals[flat]))
+        near = distance[left] < scale.radius_m
+        enough = np.count_nonzero(near, axis=1) >= MIN_NEIGHBOURS
+        chosen = left[enough]
+        means, spread, normals = _planes(offsets[chosen], near[enough])
+        wide = spread[:, 1] > (0.25 * scale.radius_m) ** 2
+        flat = wide & (spread[:, 0] < scale.flat_m**2)
+        found.append(Patches(points[chosen[flat]] + means[flat], normals[flat]))
         # What has many neighbours and is not flat is an edge; only what was too sparse gets another chance, at a larger scale.
-        left = left[~crowded]
+        left = np.setdiff1d(left, chosen[wide], assume_unique=True)
     return join(found)
 
 
@@ -74,19 +82,32 @@ def join(parts: Sequence[Patches]) -> Patches:
     return Patches(np.vstack([part.points for part in parts]), np.vstack([part.normals for part in parts]))
 
 
-def _planes(points: Floats, around: Floats, tree: cKDTree, scale: Scale) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return the mean and the normal of each neighbourhood, which are flat, and which had neighbours enough to tell."""
-    distance, index = tree.query(points, k=NEIGHBOURS, distance_upper_bound=scale.radius_m)
-    near = np.isfinite(distance)
-    count = near.sum(axis=1)
-    members = np.where(near[:, :, None], around[np.minimum(index, len(around) - 1)], 0.0)
-    means = members.sum(axis=1) / np.maximum(count, 1)[:, None]
-    offsets = np.where(near[:, :, None], members - means[:, None], 0.0)
-    covariances = np.einsum("nki,nkj->nij", offsets, offsets) / np.maximum(count, 1)[:, None, None]
-    spread, axes = np.linalg.eigh(covariances)
-    crowded = count >= MIN_NEIGHBOURS
-    wide = spread[:, 1] > (0.25 * scale.radius_m) ** 2
-    return means, axes[:, :, 0], crowded & wide & (spread[:, 0] < scale.flat_m**2), crowded & wide
+def _planes(offsets: Floats, near: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
+    """Return mean (N, 3), variances along the axes (N, 2; the smallest two) and normal (N, 3) of offsets (N, K, 3) where they are near."""
+    count = np.count_nonzero(near, axis=1)[:, None]
+    means = np.einsum("nk,nki->ni", near, offsets) / count
+    centred = (offsets - means[:, None]) * near[:, :, None]
+    spread, normals = smallest_axis(np.matmul(centred.transpose(0, 2, 1), centred) / count[:, :, None])
+    return means, spread, normals
+
+
+def smallest_axis(symmetric: Floats) -> tuple[Floats, Floats]:
+    """Return the smaller two eigenvalues (N, 2) of symmetric matrices (N, 3, 3), and the unit eigenvectors (N, 3) of the smallest.
+
+    In closed form (Smith 1961): ten times as fast for small matrices as the general way. Where two eigenvalues agree the vector is any.
+    """
+    mean = np.trace(symmetric, axis1=1, axis2=2) / 3.0
+    rest = symmetric - mean[:, None, None] * np.eye(3)
+    size = np.maximum(np.sqrt(np.einsum("nij,nij->n", rest, rest) / 6.0), np.finfo(float).tiny ** 0.25)
+    angle = np.arccos(np.clip(np.linalg.det(rest) / (2.0 * size**3), -1.0, 1.0)) / 3.0
+    least = mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0)
+    middle = 3.0 * mean - least - (mean + 2.0 * size * np.cos(angle))
+    rows = symmetric - least[:, None, None] * np.eye(3)
+    normals = np.cross(rows, np.roll(rows, -1, axis=1))  # the vector is square to all rows
+    length = np.linalg.norm(normals, axis=2)
+    best = np.argmax(length, axis=1)
+    chosen = np.arange(len(best))
+    return np.stack([least, middle], axis=1), normals[chosen, best] / np.maximum(length[chosen, best], np.finfo(float).tiny)[:, None]
 
 
 class Surface:

@@ -1,6 +1,15 @@
 """What the perception nodes share: poses at a time, straightened sweeps, the corridor ahead, health watches. ROS only in ``ros``."""
 
-from perception_core.corridor import Corridor, Motion, Nearest, Support, corridor_coordinates, direction_of_motion, nearest_obstacle
+from perception_core.corridor import (
+    Ahead,
+    Corridor,
+    Motion,
+    Nearest,
+    Support,
+    corridor_coordinates,
+    direction_of_motion,
+    nearest_obstacle,
+)
 from perception_core.health import FINE, FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
 from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
 from perception_core.stamps import StampJudge, StampLimits
@@ -10,6 +19,7 @@ from perception_core.tunable import SettingsError, tunable
 __all__ = [
     "FINE",
     "NS",
+    "Ahead",
     "Corridor",
     "FaultKind",
     "Finding",

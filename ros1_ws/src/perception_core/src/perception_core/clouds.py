@@ -1,4 +1,4 @@
-"""Point clouds of all common LiDAR drivers to sweeps; no ROS, a message is whatever has its attributes.
+"""Point clouds of all common LiDAR drivers to sweeps; no ROS, a message is what has its attributes.
 
 Times of the points, as the drivers of these makers name and count them (each is found by name, its unit by its size):
 

@@ -76,6 +76,14 @@ class Nearest:
     size_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+@dataclass(frozen=True)
+class Ahead:
+    """What is ahead: the nearest obstacle, or None; then ``unknown`` says why the corridor can't be called free, or nothing."""
+
+    nearest: Nearest | None
+    unknown: str = ""
+
+
 def direction_of_motion(position_enu_m: NDArray[np.float64], nose: NDArray[np.float64], motion: Motion) -> NDArray[np.float64]:
     """Return the horizontal unit vector (3,) of the motion: of the velocity if moving, else towards the target, else of the nose."""
     target = position_enu_m if motion.target_enu_m is None else np.array(motion.target_enu_m)

@@ -1,4 +1,4 @@
-"""Camera images of all common encodings to grey ones of 8 bits; no ROS, a message is whatever has its attributes."""
+"""Camera images of all common encodings to grey ones of 8 bits; no ROS, a message is what has its attributes."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from perception_core.poses import NS
 
 
 class DoneReporter:
-    """Publishes ``~done``, a Header with the stamp of each measurement that the node has dealt with, whatever came of it."""
+    """Publishes ``~done``, a Header with the stamp of each measurement that the node has dealt with, good or bad."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("~done", Header, queue_size=5, tcp_nodelay=True)

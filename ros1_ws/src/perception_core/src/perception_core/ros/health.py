@@ -26,7 +26,7 @@ class HealthReporter:
 
     def __init__(self, sensor: str, *, resource: str, limits: HealthLimits, stamps: StampLimits) -> None:
         self.missing: Callable[[], str] = lambda: ""
-        """Says which inputs have no driver; to be set by who subscribes to them."""
+        """Says which inputs have no driver; to be set by the subscriber."""
         self._sensor = sensor
         self._resource = resource
         self._watch = HealthWatch(limits)

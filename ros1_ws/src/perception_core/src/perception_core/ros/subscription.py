@@ -12,7 +12,7 @@ import rospy
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-SILENCE_S = 2.0  # mission clock: while it is held, or the machine is slow, no message is due
+SILENCE_S = 2.0  # that the rest of a message may take; mission clock: while it is held, or the machine is slow, none is due
 LONGEST_SILENCE_S = 30.0
 LOOK_S = 0.5  # wall clock
 
@@ -39,8 +39,9 @@ class RawSubscriber(Generic[Message]):
 
     rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
     So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A stream that has lost the
-    borders between its messages can't be decoded at all: after `SILENCE_S` without a message the connections are rebuilt, at growing
-    intervals. Of messages that wait the newest ``queue_size`` are decoded.
+    borders between its messages can't be decoded at all: where bytes came and for `SILENCE_S` no message, the connections are rebuilt, at
+    growing intervals. Where no bytes come, as mostly on a latched topic, nothing is wrong with the stream. Of messages that wait the newest
+    ``queue_size`` are decoded.
     """
 
     def __init__(
@@ -56,7 +57,8 @@ class RawSubscriber(Generic[Message]):
         self._topic, self._kind, self._buffer_bytes, self._queue_size = topic, kind, buffer_bytes, queue_size
         self._on_message, self._on_garbage = on_message, on_garbage
         self._lock = Lock()
-        self._heard_s = rospy.get_time()
+        self._complete_s = rospy.get_time()
+        self._received, self._messages = 0, 0
         self._patience_s = SILENCE_S
         self._reconnected_s = -math.inf
         self._ended = False
@@ -82,7 +84,6 @@ class RawSubscriber(Generic[Message]):
             self._subscriber.unregister()
 
     def _on_bytes(self, raw: rospy.AnyMsg) -> None:
-        self._heard_s, self._patience_s = rospy.get_time(), SILENCE_S
         sent = raw._connection_header.get("type", "*")  # noqa: SLF001 -- rospy's documented way to the publisher's type
         wanted = self._kind._type  # noqa: SLF001 -- generated messages have it
         if sent not in {"*", wanted}:
@@ -100,15 +101,28 @@ class RawSubscriber(Generic[Message]):
         pause = rospy.rostime.wallsleep
         while not (rospy.is_shutdown() or self._ended):
             pause(LOOK_S)
-            if abs(rospy.get_time() - self._heard_s) >= self._patience_s:  # also where the clock went back
+            if self._complete():
+                self._complete_s = rospy.get_time()
+            elif abs(rospy.get_time() - self._complete_s) >= self._patience_s:  # also where the clock went back
                 self._reconnect()
+
+    def _complete(self) -> bool:
+        """Return whether no bytes came since the last message."""
+        with self._lock:
+            connections = [] if self._ended else list(self._subscriber.impl.connections)
+        received, messages = (sum(int(getattr(each, count)) for each in connections) for count in ("stat_bytes", "stat_num_msg"))
+        if messages > self._messages:
+            self._patience_s = SILENCE_S
+        if messages != self._messages or received < self._received:
+            self._received, self._messages = received, messages
+        return received == self._received
 
     def _reconnect(self) -> None:
         with self._lock:
-            if self._ended or not self._subscriber.get_num_connections():
-                self._heard_s = rospy.get_time()
+            if self._ended:
                 return
             self._reconnected_s = rospy.get_time()
             self._subscriber.unregister()
             self._subscriber = self._subscribe()
-        self._heard_s, self._patience_s = rospy.get_time(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)
+        self._received, self._messages = 0, 0
+        self._complete_s, self._patience_s = rospy.get_time(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)

@@ -35,16 +35,22 @@ class Expected:
 
 
 def check_fault(flight: FakeFlight, sensor: FakeSensor, expected: Expected, obstacles: list[Obstacle], *, mended_within_s: float) -> None:
-    """Break the sensor, mend it, and assert what the node says meanwhile; its function is enabled, and nothing is in the way."""
+    """Break the sensor, mend it, and assert what the node says meanwhile; its function is enabled, and nothing is in the way.
+
+    From the first broken measurement on no corridor is called free, before the verdict and after it.
+    """
     mode = expected.mode
     flight.run(0.5)
     flight.reports.clear()
     sensor.mode, last_good_ns = mode, sensor.last_good_ns
+    obstacles.clear()
     assert flight.run(2.0, until=lambda: flight.reports and flight.told_ns(SensorHealth.BROKEN, after_ns=last_good_ns)), mode
     assert flight.reports[0].to == "BROKEN", mode
     broken_ns = flight.told_ns(SensorHealth.BROKEN, after_ns=last_good_ns)
     # Counted from the arrival, at which the node's clock may be some ticks of 20 ms behind.
     assert 0.25 * NS <= broken_ns - last_good_ns <= expected.within_s * NS, mode
+    early = [obstacle for obstacle in obstacles if obstacle.header.stamp.to_nsec() != last_good_ns]
+    assert all(obstacle.unknown or obstacle.detected for obstacle in early), mode
     obstacles.clear()
     flight.run(0.5)
     health = flight.health[-1]

@@ -225,7 +225,7 @@ def framed(data: bytes) -> bytes:
 
 
 def send_raw(publisher: rospy.Publisher, data: bytes) -> None:
-    """Write bytes into each of a publisher's connections, whatever they are."""
+    """Write bytes into each of a publisher's connections as they are."""
     for connection in publisher.impl.connections:
         connection.write_data(data)
 

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 480, 270
+DOWN_DEG = np.linspace(10.0, 80.0, 16)  # of the beams that meet the ground
 
 
 def wall_pair(disparity_px: float, *, seed: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
@@ -30,7 +31,9 @@ def box_cloud(
     """Return returns (N, 3) of a box 0.6 m wide at a place in the sensor's frame, of the ground below, and of the vehicle's own frame."""
     rng = np.random.default_rng(seed)
     box = np.array(centre_m) + rng.uniform(-0.3, 0.3, (count, 3))
-    ground = np.column_stack([rng.uniform(-10, 10, (400, 2)), np.full(400, ground_m)])
+    azimuth, down = (grid.ravel() for grid in np.meshgrid(np.radians(np.arange(360)), np.radians(DOWN_DEG)))
+    away = -ground_m / np.tan(down)
+    ground = np.column_stack([away * np.cos(azimuth), away * np.sin(azimuth), np.full(len(away), ground_m)])
     own = rng.uniform(-0.5, 0.5, (50, 3))
     points = np.vstack([box, ground, own])
     return (points + rng.normal(0.0, noise_m, points.shape)).astype(np.float32)

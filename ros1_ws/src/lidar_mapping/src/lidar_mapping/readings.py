@@ -1,0 +1,76 @@
+"""Inertial readings that wait for their sweep; what can't be one is left out."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from threading import Condition
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lidar_mapping.odometry import IMU_GAP_NS
+from perception_core import NS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from lidar_mapping.inertial import ImuReading
+
+KEPT = 2000
+FASTEST_RAD_S, STRONGEST_M_S2 = 70.0, 320.0  # 4000 degrees/s and 32 g: beyond the range of what flies on a drone
+AHEAD_NS = NS  # of the clock, which a busy machine hears late; a reading of the future would hold back all after it
+SET_BACK_NS = NS  # a stamp earlier by more tells of a clock that was set back
+
+
+class ReadingQueue:
+    """Readings in the order of their stamps, the newest `KEPT`; one thread adds, one takes."""
+
+    def __init__(self) -> None:
+        self._readings: deque[ImuReading] = deque(maxlen=KEPT)
+        self._last_ns = -1
+        self._arrived = Condition()
+        self._silent = False
+        """The last wait was in vain, and nothing has come since."""
+
+    def add(self, reading: ImuReading, now_ns: int) -> bool:
+        """Keep a reading that has just arrived; return whether it can be one: of now, later than the last one, within an IMU's range."""
+        if not _within(reading.rates, FASTEST_RAD_S) or not _within(reading.specific_force, STRONGEST_M_S2):
+            return False
+        if reading.stamp_ns < self._last_ns - SET_BACK_NS:
+            self.clear()
+        if not self._last_ns < reading.stamp_ns <= now_ns + AHEAD_NS:
+            return False
+        self._readings.append(reading)
+        with self._arrived:
+            self._last_ns, self._silent = reading.stamp_ns, False
+            self._arrived.notify_all()
+        return True
+
+    def wait_for(self, stamp_ns: int, timeout_s: float) -> None:
+        """Wait (wall clock) until the readings reach a moment; not where the last wait was in vain and none has come since."""
+        with self._arrived:
+            if not self._silent:
+                self._silent = not self._arrived.wait_for(lambda: self._last_ns >= stamp_ns, timeout_s)
+
+    def take_until(self, stamp_ns: int) -> list[ImuReading]:
+        """Take the readings up to a moment; later ones stay for the next sweep.
+
+        A reading tells of the time before it, so the first of the later ones is given for its part up to that moment, too: without it
+        the points at the end of each sweep would not be straightened.
+        """
+        taken: list[ImuReading] = []
+        while self._readings and self._readings[0].stamp_ns <= stamp_ns:
+            taken.append(self._readings.popleft())
+        if self._readings and self._readings[0].stamp_ns - stamp_ns < IMU_GAP_NS:
+            taken.append(replace(self._readings[0], stamp_ns=stamp_ns))
+        return taken
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._readings.clear()
+        self._last_ns = -1
+
+
+def _within(vector: NDArray[np.float64], limit: float) -> bool:
+    return bool(np.all(np.abs(vector) <= limit))
