@@ -85,7 +85,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
     parser.add_argument("--case", metavar="WORDS", default="", help="only cases whose name begins so")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help=f"measure so many frames a case (default {FRAMES})")
+    parser.add_argument("--recording", type=Path, metavar="BAG", nargs="+", help="say what the nodes make of recorded flights instead")
+    parser.add_argument("--times", type=int, default=0, metavar="N", help="with --recording: break the sensors so often in each way, too")
     options = parser.parse_args(arguments)
+    if options.recording:
+        return _judge_recordings(options.recording, options.times, options.json)
     chosen = [case for case in CASES if case.name.startswith(options.case)]
     if not chosen or options.frames < 1:
         sys.stderr.write(f"alula bench perception: no case begins with {options.case!r}; there are {[case.name for case in CASES]}\n")
@@ -100,4 +104,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.write(f"{line['what']}: {line['figure']}\n")
     if options.json:
         options.json.write_text(json.dumps({"cases": rows, "accuracy": table}, indent=1) + "\n")
+    return EXIT_OK
+
+
+def _judge_recordings(bags: Sequence[Path], times: int, json_file: Path | None) -> int:
+    """Print what the nodes make of recorded flights."""
+    from perception_bench.recordings import judged, told  # late: the simulator would count as memory of the cases
+
+    rows = []
+    for bag in bags:
+        for row in judged(bag, times):
+            rows.append(row)
+            sys.stdout.write(told(row) + "\n")
+    if json_file:
+        json_file.write_text(json.dumps(rows, indent=1) + "\n")
     return EXIT_OK

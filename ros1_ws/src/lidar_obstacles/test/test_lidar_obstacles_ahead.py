@@ -84,3 +84,26 @@ def test_what_is_just_outside_of_the_vehicle_is_an_obstacle(distance_m) -> None:
     found = look(sweep(pole), crab(), Motion(target_enu_m=(0.0, 20.0, 3.0)))
     assert found is not None
     assert found.distance_m == pytest.approx(distance_m, abs=0.05)
+
+
+def test_where_returns_were_just_lost_is_unknown_unless_an_obstacle_is_seen() -> None:
+    rng = np.random.default_rng(8)
+    # The vehicle flies to its left, which is the sensor's x: sector 18 of 36 begins there. Far walls on both sides.
+    walls = np.column_stack([rng.choice([-20.0, 20.0], 900), rng.uniform(-9, 9, 900), rng.uniform(-5, 5, 900)])
+    left, right = Motion(velocity_enu_m_s=(0.0, 1.0, 0.0)), Motion(velocity_enu_m_s=(0.0, -1.0, 0.0))
+    looker = LidarAhead(LidarSettings().ahead)
+
+    def look_with(gone_sectors, motion, points=walls):
+        gone = np.zeros(36, dtype=np.bool_)
+        gone[gone_sectors] = True
+        return looker.look(sweep(points), T_base_lidar=T_BASE_LIDAR, poses=crab(), motion=motion, gone=gone)
+
+    assert look_with([], left).unknown == ""
+    for sector in (16, 17, 18, 19):
+        assert look_with([sector], left).unknown == "the LiDAR has just lost its returns from where the vehicle goes"
+    assert look_with([18], right).unknown == ""
+    assert look_with([0], right).unknown != ""
+    assert look_with([14, 21], left).unknown == ""
+    box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.2, 0.2, (30, 3))
+    seen = look_with([18], left, np.vstack([walls, box]))
+    assert (seen.unknown, seen.nearest is not None) == ("", True)

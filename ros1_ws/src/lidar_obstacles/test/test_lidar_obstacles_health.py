@@ -29,9 +29,11 @@ def room(seed=0, *, yaw=0.0, x=0.0, count=30_000, noise_m=0.02) -> np.ndarray:
     return (local * ranges[:, None]).astype(np.float32)
 
 
-def judge_all(sweeps, **settings):
-    judge = CloudJudge(LidarSettings(**settings).cloud)
-    return [judge.finding(Sweep(NS, points, np.zeros(len(points), np.float32)), self_m=1.0) for points in sweeps]
+def judge_all(sweeps, judge=None):
+    """Return the findings of sweeps that come at 10 Hz."""
+    judge = judge or CloudJudge(LidarSettings().cloud)
+    timed = (Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32)) for k, points in enumerate(sweeps))
+    return [judge.finding(sweep, self_m=1.0) for sweep in timed]
 
 
 def blind(points, low_deg, high_deg) -> np.ndarray:
@@ -45,14 +47,24 @@ def frozen(points, _before) -> np.ndarray:
     return again
 
 
+def lengthened(points, by_m) -> np.ndarray:
+    ranges = np.linalg.norm(points, axis=1, keepdims=True)
+    return (points * (1.0 + by_m / ranges)).astype(np.float32)
+
+
 BREAKS = {
     "dead beams": (lambda points, _: points[:0], FaultKind.RETURNS, "0 returns"),
     "nothing but itself": (lambda points, _: points / 100, FaultKind.RETURNS, "0 returns"),
     "not finite": (lambda points, _: points * np.nan, FaultKind.RETURNS, "0 returns"),
     "one point in 500": (lambda points, _: points[::500], FaultKind.RETURNS, "only 60 returns"),
     "one point in 50": (lambda points, _: points[::50], FaultKind.RETURNS, "returns fell from 30000 to 600"),
+    "one point in 3": (lambda points, _: points[::3], FaultKind.RETURNS, "returns fell from 30000 to 10000"),
+    "every second beam": (lambda points, _: points[15_000:], FaultKind.RETURNS, "returns fell from 30000 to 15000"),
     "front half blind": (lambda points, _: blind(points, -90, 90), FaultKind.SECTOR, "no returns any more from -90 to 90 degrees"),
     "60 degrees blind": (lambda points, _: blind(points, 120, 181), FaultKind.SECTOR, "no returns any more from 120 to 180 degrees"),
+    "40 degrees blind, across sectors": (lambda points, _: blind(points, -15, 25), FaultKind.SECTOR, "no returns any more from"),
+    "0.5 m too far": (lambda points, _: lengthened(points, 0.5), FaultKind.RANGE, "all ranges became at least 0.5 m longer"),
+    "0.5 m too near": (lambda points, _: lengthened(points, -0.5), FaultKind.RANGE, "all ranges became at least 0.5 m shorter"),
     "millimetres": (lambda points, _: points * 1000, FaultKind.RANGE, "are the coordinates in millimetres?"),
     "frozen but for a value": (frozen, FaultKind.FROZEN, "the sweep is the same as the one before"),
 }
@@ -77,6 +89,44 @@ def test_turning_at_90_degrees_a_second_and_flying_out_of_the_hall_is_no_fault()
     assert all(finding.ok for finding in judge_all(turning))
     moving = [room(k, x=1.0 * k) for k in range(19)]
     assert all(finding.ok for finding in judge_all(moving))
+
+
+@pytest.mark.parametrize("low_deg", [-60.0, -57.0, -53.0, 118.0, 125.0])
+def test_40_degrees_are_missed_wherever_the_sectors_borders_are(low_deg) -> None:
+    findings = judge_all([*(room(k) for k in range(4)), blind(room(4), low_deg, low_deg + 40.0)])
+    assert (findings[-1].verdict, findings[-1].fault) == (Verdict.BROKEN, FaultKind.SECTOR)
+
+
+def test_a_narrow_loss_is_no_fault_but_told_for_a_second_or_until_the_returns_are_back() -> None:
+    judge = CloudJudge(LidarSettings().cloud)
+    assert all(finding.ok for finding in judge_all([room(k) for k in range(4)], judge))
+    assert not judge.gone.any()
+
+    def gone_after(sweeps, first) -> list[int]:
+        for k, points in enumerate(sweeps):
+            assert judge.finding(Sweep(NS + (first + k) * NS // 10, points, np.zeros(len(points), np.float32)), self_m=1.0).ok
+        return (np.flatnonzero(judge.gone) * 10 - 180).tolist()
+
+    assert gone_after([blind(room(4), 0, 15)], 4) == [0]
+    assert gone_after([blind(room(k), 0, 15) for k in range(5, 14)], 5) == [0]
+    assert gone_after([blind(room(14), 0, 15)], 14) == []
+    assert gone_after([room(k) for k in range(15, 20)], 15) == []
+    assert gone_after([blind(room(20), 0, 15)], 20) == [0]
+    assert gone_after([room(21)], 21) == []
+
+
+@pytest.mark.parametrize("climb_m_s", [-3.0, 3.0])
+def test_a_climb_over_open_ground_at_full_speed_is_no_error_of_the_ranges(climb_m_s) -> None:
+    heights = 9.0 + climb_m_s * np.arange(10) / 10.0
+    assert all(finding.ok for finding in judge_all(landing(heights)))
+
+
+def test_an_error_of_the_ranges_is_forgotten_when_the_sensor_was_started_again() -> None:
+    judge = CloudJudge(LidarSettings().cloud)
+    findings = judge_all([*(room(k) for k in range(4)), *(lengthened(room(k), 0.5) for k in range(4, 8))], judge)
+    assert [finding.fault for finding in findings[4:]] == [FaultKind.RANGE] * 4
+    again = Sweep(10 * NS, lengthened(room(8), 0.5), np.zeros(30_000, np.float32))
+    assert judge.finding(again, self_m=1.0).ok
 
 
 def landing(heights_m, *, walls_m=np.inf) -> list[np.ndarray]:

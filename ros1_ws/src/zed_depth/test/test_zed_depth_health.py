@@ -114,6 +114,46 @@ def test_a_broken_rig_is_known_within_half_a_second(scene, fx, name) -> None:
     assert all(finding.ok for finding in after)
 
 
+def believed(rig, k, left, right) -> bool:
+    """Return whether the node would call a corridor free by this pair, if nothing is seen in it."""
+    pair = StereoPair(k * NS // 10, left, right)
+    return rig.finding(pair).ok and not rig.depth(pair).doubt
+
+
+@pytest.mark.parametrize(("scene", "fx"), scenes())
+@pytest.mark.parametrize("name", BREAKS)
+@pytest.mark.parametrize("since_check", [0, 2])
+def test_no_pair_of_a_broken_rig_is_believed_wherever_it_falls_between_two_checks(scene, fx, name, since_check) -> None:
+    left, right = scene
+    rig = rig_for(left, fx)
+    good = 5 + since_check  # both images are held against each other at 0, 4, 8: three pairs or one before the next time
+    for k in range(good):
+        assert believed(rig, k, noisy(left, 90 + k), noisy(right, 190 + k)), k
+    change = BREAKS[name][0]
+    last = noisy(left, 89 + good), noisy(right, 189 + good)
+    frozen = name.startswith("frozen")  # at the last good pair
+    broken = [change(*(last if frozen else (left, right)), 300 + 2 * k) for k in range(6)]
+    assert [k for k, pair in enumerate(broken) if believed(rig, good + k, *pair)] == []
+    after = [believed(rig, 20 + k, noisy(left, 90 + k), noisy(right, 190 + k)) for k in range(4)]
+    assert after[-2:] == [True, True]
+
+
+def test_a_scene_with_less_depth_is_in_doubt_until_both_images_were_held_against_each_other() -> None:
+    left, right = wall_pair(9.5, seed=1)
+    rig = rig_for(left, 240.0)
+    sky = noisy(np.full_like(left, 190), 7)
+    half = [np.where(np.arange(270)[:, None] < 135, sky, image) for image in (left, right)]
+    assert believed(rig, 0, left, right)
+    assert believed(rig, 1, noisy(left, 1), noisy(right, 2))
+    pair = StereoPair(2 * NS // 10, noisy(half[0], 3), noisy(half[1], 4))
+    assert rig.finding(pair).ok
+    assert rig.depth(pair).doubt.startswith("only 4")
+    late = StereoPair(NS // 10 + NS // 20, noisy(half[0], 5), noisy(half[1], 6))  # judged before the doubt was known
+    assert rig.depth(late).doubt == ""  # after the clock went back, earlier pairs do not count
+    assert believed(rig, 3, noisy(half[0], 7), noisy(half[1], 8))
+    assert believed(rig, 4, noisy(half[0], 9), noisy(half[1], 10))
+
+
 @pytest.mark.parametrize(("scene", "fx"), scenes())
 @pytest.mark.parametrize("gain", [0.3, 0.6, 1.0, 1.4])
 def test_a_good_rig_is_never_suspected(scene, fx, gain) -> None:

@@ -1,8 +1,8 @@
 """The LiDAR's health, and the nearest obstacle ahead of the motion from its sweeps. The node is in ``lidar_obstacles.node``."""
 
-from lidar_obstacles.ahead import Ahead, AheadSettings, Body, LidarAhead
+from lidar_obstacles.ahead import AheadSettings, Body, LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge, CloudLimits
 from lidar_obstacles.ground import GroundModel, GroundSettings
 from lidar_obstacles.settings import LidarSettings
 
-__all__ = ["Ahead", "AheadSettings", "Body", "CloudJudge", "CloudLimits", "GroundModel", "GroundSettings", "LidarAhead", "LidarSettings"]
+__all__ = ["AheadSettings", "Body", "CloudJudge", "CloudLimits", "GroundModel", "GroundSettings", "LidarAhead", "LidarSettings"]

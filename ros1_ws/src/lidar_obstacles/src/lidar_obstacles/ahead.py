@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidar_obstacles.ground import ASIDE_M, BEHIND_M, GroundModel, GroundSettings
-from perception_core import Corridor, Motion, Nearest, PoseBuffer, Support, Sweep, deskew, direction_of_motion, nearest_obstacle
+from perception_core import Ahead, Corridor, Motion, PoseBuffer, Support, Sweep, deskew, direction_of_motion, nearest_obstacle
 from perception_core.corridor import corridor_coordinates
 
 Floats = NDArray[np.float64]
 BLUR_M = 1.0  # by as much at most a point is moved when its sweep is straightened, within the region that is looked at
 VIEW_DEG = 25.0  # the sensor sees the way ahead if it has returns within this angle of it, seen from above ...
 STEEP_DEG = 60.0  # ... that are not below or above the vehicle
+ASIDE_DEG = 20.0  # from the way ahead to the middle of a sector that lost its returns; an obstacle at 4 m may be as far aside
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Body:
 class AheadSettings:
     """Where to look, what to believe, what is the vehicle itself and what is ground.
 
-    With fewer than ``min_ahead`` returns from the direction of the motion, near or far, nobody knows what is there.
+    With fewer than ``min_ahead`` returns from the direction of the motion, near or far, it is unknown what is there.
     """
 
     corridor: Corridor
@@ -37,14 +38,6 @@ class AheadSettings:
     body: Body
     ground: GroundSettings
     min_ahead: int = 3
-
-
-@dataclass(frozen=True)
-class Ahead:
-    """What is ahead: the nearest obstacle, or None; then ``unknown`` says why the corridor can't be called free, or nothing."""
-
-    nearest: Nearest | None
-    unknown: str = ""
 
 
 class LidarAhead:
@@ -61,8 +54,12 @@ class LidarAhead:
         T_base_lidar: Floats,  # noqa: N803 -- T_target_source
         poses: PoseBuffer,
         motion: Motion,
+        gone: NDArray[np.bool_] | None = None,
     ) -> Ahead:
-        """Return what is ahead of where the vehicle was at the end of the sweep; raise PoseUnavailableError."""
+        """Return what is ahead of where the vehicle was at the end of the sweep; raise PoseUnavailableError.
+
+        ``gone`` are the sectors that have just lost their returns, as of ``CloudJudge``.
+        """
         settings = self._settings
         pose = poses.at([sweep.end_ns]).matrix()
         position = pose[:3, 3]
@@ -74,6 +71,8 @@ class LidarAhead:
         nearest = nearest_obstacle(points, position, direction, settings.corridor, settings.support, heights_m=heights)
         if nearest is None and around.ahead < settings.min_ahead:
             return Ahead(None, f"the LiDAR does not look where the vehicle goes: {around.ahead} returns from there")
+        if nearest is None and gone is not None and _towards(direction @ pose[:3, :3] @ T_base_lidar[:3, :3], gone):
+            return Ahead(None, "the LiDAR has just lost its returns from where the vehicle goes")
         return Ahead(nearest)
 
     def _around(self, sweep: Sweep, pose: Floats, T_base_lidar: Floats, direction: Floats) -> _Around:  # noqa: N803 -- T_target_source
@@ -96,6 +95,16 @@ class LidarAhead:
 class _Around:
     near: Sweep
     ahead: int
+
+
+def _towards(direction: Floats, sectors: NDArray[np.bool_]) -> bool:
+    """Return whether one of these sectors around the sensor's z axis looks along a direction (3,) in the sensor's frame."""
+    if np.hypot(direction[0], direction[1]) < np.cos(np.radians(STEEP_DEG)):
+        return False
+    width_deg = 360.0 / len(sectors)
+    middles_deg = (np.flatnonzero(sectors) + 0.5) * width_deg - 180.0
+    aside_deg = (middles_deg - np.degrees(np.arctan2(direction[1], direction[0])) + 180.0) % 360.0 - 180.0
+    return bool(np.any(np.abs(aside_deg) <= ASIDE_DEG))
 
 
 def _axes(points: NDArray[np.float32], rotation: Floats, origin: Floats) -> NDArray[np.float32]:

@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from perception_core import FINE, FaultKind, Finding, Sweep, broken, unsure
+from lidar_obstacles.range_steps import RangeSteps
+from perception_core import FINE, NS, FaultKind, Finding, Sweep, broken, unsure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
 
-SECTORS = 12
+SECTORS = 36
+LOST_TOGETHER = 3  # neighbouring sectors that no edge of a wall takes away from one sweep to the next
+LONG_AGO_NS = -(10**12)
+GONE_S = 1.0  # for so long the way through a sector that lost its returns counts as not seen
 SAMPLE = 8_000  # points are enough to judge a sweep
 RECENT = 3  # sweeps: a sensor loses a sector from one to the next, a moving one gradually
-SECTOR_RETURNS = 20  # of the sample; a sector with fewer can't be missed
+SECTOR_RETURNS = 50  # of the sample; a sector with fewer can't be missed
 NEAR = 1.5  # of the vehicle's radius: what comes nearer soon is taken for the vehicle, or is too near to be seen
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
@@ -29,20 +33,23 @@ class CloudLimits:
 
     Fewer than ``min_returns`` are nothing; fewer than ``thin_share`` of what came just before is a broken sensor; more than ``far_share``
     of the returns beyond ``max_range_m`` are coordinates in another unit. A sector is lost with less than ``sector_share`` of what it had.
+    Ranges on all sides that change faster than ``max_speed_m_s`` are no motion.
     """
 
     min_returns: int = 100
-    thin_share: float = 0.1
+    thin_share: float = 0.6
     max_range_m: float = 250.0
     far_share: float = 0.05
-    sector_share: float = 0.1
+    sector_share: float = 0.3
+    max_speed_m_s: float = 3.0
 
 
 class CloudJudge:
     """Judge sweeps in their order; not thread-safe.
 
-    A sector whose surfaces came nearer than the sensor sees, as the ground does at a landing, is hidden: nobody can say whether it was
-    lost, and it is not missed before it has returns again.
+    A sector whose surfaces came nearer than the sensor sees, as the ground does at a landing, is hidden: it may be lost or not, and is not
+    missed before it has returns again. One or two neighbouring sectors may lose their returns at the edge of a wall: that is no fault, but
+    ``gone`` tells of them.
     """
 
     def __init__(self, limits: CloudLimits) -> None:
@@ -50,6 +57,10 @@ class CloudJudge:
         self._previous: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
         self._recent: deque[_Sectors] = deque(maxlen=RECENT)
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
+        self._steps = RangeSteps(limits.max_speed_m_s)
+        self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
+        self.gone: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
+        """Sectors (SECTORS,), from -180 degrees around the sensor's z axis on, that lost their returns in the last `GONE_S` seconds."""
 
     def finding(self, sweep: Sweep, *, self_m: float) -> Finding:
         """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own."""
@@ -68,7 +79,11 @@ class CloudJudge:
             return broken(FaultKind.RANGE, far)
         if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
-        return self._against_the_past(sectors, before, stride)
+        off_m = self._steps.offset_m(sample[outside], ranges[outside], sweep.stamp_ns, least_m=NEAR * self_m)
+        if off_m:
+            became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
+            return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
+        return self._against_the_past(sectors, before, stride, sweep.stamp_ns)
 
     def _expected(self) -> Floats:
         """Return how many returns each sector should have at least, (SECTORS,): what it lately had, none where it is hidden."""
@@ -91,15 +106,19 @@ class CloudJudge:
         unit = ": are the coordinates in millimetres?" if middle > self._limits.max_range_m else ""
         return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {middle:.0f} m{unit}"
 
-    def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int) -> Finding:
+    def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int, stamp_ns: int) -> Finding:
         counts = sectors.counts
-        if counts.sum() < self._limits.thin_share * before.sum():
-            return broken(FaultKind.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
         gone = (before >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * before)
-        self._lost = (self._lost & gone) | (gone & (np.roll(gone, 1) | np.roll(gone, -1)))
+        self._lost = (self._lost & gone) | _together(gone)
+        thin = counts.sum() < self._limits.thin_share * before.sum()
+        if thin and (not self._lost.any() or self._lost[before > 0].all()):
+            return broken(FaultKind.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
         if self._lost.any():
             return broken(FaultKind.SECTOR, f"no returns any more from {_angles(self._lost)} around the sensor's z axis")
         self._recent.append(sectors)
+        self._gone_ns[counts >= SECTOR_RETURNS * stride] = LONG_AGO_NS
+        self._gone_ns[gone] = stamp_ns
+        self.gone = np.abs(stamp_ns - self._gone_ns) < GONE_S * NS  # a clock may have gone back
         return FINE
 
 
@@ -120,8 +139,15 @@ def _sectors(sample: NDArray[np.float32], ranges: NDArray[np.float32], stride: i
     return _Sectors(counts.astype(np.float64) * stride, 2 * near > np.bincount(sector, minlength=SECTORS))
 
 
+def _together(gone: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the sectors that are gone with so many neighbours that `LOST_TOGETHER` in a row are."""
+    starts = np.all([np.roll(gone, -k) for k in range(LOST_TOGETHER)], axis=0)
+    together: NDArray[np.bool_] = np.any([np.roll(starts, k) for k in range(LOST_TOGETHER)], axis=0)
+    return together
+
+
 def _frozen(now: NDArray[np.float32], previous: NDArray[np.float32], sample: NDArray[np.float32], returned: NDArray[np.bool_]) -> bool:
-    """Return whether nearly all returns are where they were, whatever else of the message changes."""
+    """Return whether nearly all returns are where they were; the rest of the message may change."""
     if previous.shape != sample.shape or not len(now):
         return False
     same = np.all(now == previous[returned], axis=1)

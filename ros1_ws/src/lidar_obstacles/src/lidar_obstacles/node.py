@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
 import rospy
+from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2
 from uav_msgs.msg import Obstacle
 
-from lidar_obstacles.ahead import Ahead, LidarAhead
+from lidar_obstacles.ahead import LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge
 from lidar_obstacles.settings import LidarSettings
-from perception_core import Finding, Sweep, first_trouble
+from perception_core import Ahead, Finding, Sweep, first_trouble
 from perception_core.clouds import sweep_of_cloud, time_field
 from perception_core.ros import (
     DoneReporter,
@@ -27,6 +31,15 @@ CLOUD = "/lidar/points"
 CLOUD_BYTES = 1 << 23
 
 
+@dataclass(frozen=True)
+class _Item:
+    """A good sweep, its frame, and the sectors that have just lost their returns."""
+
+    frame: str
+    sweep: Sweep
+    gone: NDArray[np.bool_]
+
+
 class LidarObstaclesNode:
     """Convert in, call the core, publish out."""
 
@@ -38,7 +51,7 @@ class LidarObstaclesNode:
         self._done = DoneReporter()
         self._vehicle = Vehicle()
         self._health = HealthReporter("lidar", resource="lidar_status", limits=settings.health, stamps=settings.stamps)
-        self._worker = NewestWorker[tuple[str, Sweep]](self._process)
+        self._worker = NewestWorker[_Item](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled)
         self._tuning = TunableSettings(settings, self._tune)
         self._subscriber = RawSubscriber(CLOUD, PointCloud2, self._on_cloud, self._on_garbage, buffer_bytes=CLOUD_BYTES)
@@ -68,7 +81,7 @@ class LidarObstaclesNode:
         finding = self._judged(sweep)
         self._health.take(finding)
         if finding.ok and self._switch.enabled:
-            self._worker.offer((message.header.frame_id, sweep))
+            self._worker.offer(_Item(message.header.frame_id, sweep, self._judge.gone))
             return
         if not finding.ok:
             self._tell(stamp_ns, Ahead(None, finding.reason))
@@ -79,11 +92,11 @@ class LidarObstaclesNode:
         stamp = self._health.stamp(sweep.end_ns)
         return first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m))
 
-    def _process(self, item: tuple[str, Sweep]) -> None:
-        frame, sweep = item
+    def _process(self, item: _Item) -> None:
+        sweep = item.sweep
         try:
-            poses = self._vehicle.poses_at(sweep.end_ns)
-            ahead = self._ahead.look(sweep, T_base_lidar=self._vehicle.mount(frame), poses=poses, motion=self._vehicle.motion)
+            poses, mount = self._vehicle.poses_at(sweep.end_ns), self._vehicle.mount(item.frame)
+            ahead = self._ahead.look(sweep, T_base_lidar=mount, poses=poses, motion=self._vehicle.motion, gone=item.gone)
             self._tell(sweep.stamp_ns, ahead)
         except LookupError as error:
             self._tell(sweep.stamp_ns, Ahead(None, str(error)))

@@ -22,8 +22,9 @@ class LidarSettings:
     latency_s: float = tunable(0.0, 0.0, 2.0, "that the driver is known to need from the last return to the arrival")
     max_delay_s: float = tunable(0.35, 0.05, 5.0, "by which a sweep may be older than the known latency")
     min_returns: int = tunable(100, 1, 1_000_000, "returns of a sweep; fewer are none")
-    thin_share: float = tunable(0.1, 0.0, 0.9, "of the returns just before; fewer are a broken sensor")
+    thin_share: float = tunable(0.6, 0.0, 0.9, "of the returns just before; fewer are a broken sensor")
     max_range_m: float = tunable(250.0, 1.0, 2000.0, "by the sensor's specification")
+    max_speed_m_s: float = tunable(3.0, 0.5, 100.0, "of the vehicle; ranges on all sides that change faster are wrong")
     # corridor
     body_radius_m: float = tunable(1.0, 0.0, 5.0, "of the vehicle with propellers: returns from inside are its own")
     body_half_height_m: float = tunable(0.6, 0.0, 5.0, "of the vehicle, above and below base_link")
@@ -50,7 +51,9 @@ class LidarSettings:
     @property
     def cloud(self) -> CloudLimits:
         """When a sweep is not believed."""
-        return CloudLimits(min_returns=self.min_returns, thin_share=self.thin_share, max_range_m=self.max_range_m)
+        return CloudLimits(
+            min_returns=self.min_returns, thin_share=self.thin_share, max_range_m=self.max_range_m, max_speed_m_s=self.max_speed_m_s
+        )
 
     @property
     def ahead(self) -> AheadSettings:

@@ -1,6 +1,6 @@
 """Depth from the ZED's stereo pair, and the nearest obstacle ahead. The node is in ``zed_depth.node``."""
 
-from zed_depth.ahead import Ahead, AheadSettings, look_ahead
+from zed_depth.ahead import AheadSettings, look_ahead
 from zed_depth.calibration import CalibrationError, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
 from zed_depth.image_health import ImageJudge, ImageLimits
@@ -11,7 +11,6 @@ from zed_depth.stereo import DisparityRange, MatcherSettings, StereoMatcher, dep
 from zed_depth.view_health import ViewLimits, view_finding
 
 __all__ = [
-    "Ahead",
     "AheadSettings",
     "CalibrationError",
     "Depth",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from perception_core import Corridor, Motion, Nearest, PoseBuffer, Support, direction_of_motion, nearest_obstacle
+from perception_core import Ahead, Corridor, Motion, PoseBuffer, Support, direction_of_motion, nearest_obstacle
 from zed_depth.calibration import StereoGeometry
 from zed_depth.stereo import points_of
 
@@ -22,7 +22,7 @@ class AheadSettings:
     """Where to look, and what to believe.
 
     The range ends where a disparity error of one pixel makes the depth useless: with fx 240 px and 0.12 m between the cameras one pixel is
-    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of the corridor's view nobody knows what is there.
+    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of the corridor's view it is unknown what is there.
     """
 
     corridor: Corridor
@@ -30,14 +30,6 @@ class AheadSettings:
     max_range_m: float = 8.0
     stride_px: int = 2
     min_known: float = 0.05
-
-
-@dataclass(frozen=True)
-class Ahead:
-    """What is ahead: the nearest obstacle, or None; then ``unknown`` says why the corridor can't be called free, or nothing."""
-
-    nearest: Nearest | None
-    unknown: str = ""
 
 
 def look_ahead(

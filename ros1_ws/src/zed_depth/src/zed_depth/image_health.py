@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 THUMB = 8  # pixels of the image averaged into one: noise of 8 grey levels has 1 there, content keeps its contrast
 SATURATED = 250
 STRIDE = 3
+SHARPNESS_FELL = 0.6  # from image to image of a good camera it falls to 0.9 at most
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,14 @@ class ImageJudge:
     def __init__(self, limits: ImageLimits) -> None:
         self._limits = limits
         self._previous: dict[str, Gray] = {}
+        self.sharpness = 0.0
+        """Mean second derivative of the less sharp image of the last pair, grey levels; to be compared among images of one scene only."""
 
     def finding(self, pair: StereoPair) -> Finding:
         """Return what the images of this pair tell; call it once for each pair."""
-        findings = [self._one(side, image) for side, image in (("left", pair.left), ("right", pair.right))]
+        sides = (("left", pair.left), ("right", pair.right))
+        self.sharpness = min(_sharpness(image) for _, image in sides)
+        findings = [self._one(side, image) for side, image in sides]
         return next((finding for finding in findings if not finding.ok), FINE)
 
     def _one(self, side: str, image: Gray) -> Finding:
@@ -64,3 +69,8 @@ class ImageJudge:
         if previous is not None and previous.shape == sample.shape and np.mean(previous != sample) < limits.min_changed:
             return broken(FaultKind.FROZEN, f"{side} image is frozen")
         return FINE
+
+
+def _sharpness(image: Gray) -> float:
+    """Return the mean second derivative of every second row."""
+    return float(cv2.norm(cv2.Laplacian(image[::2], cv2.CV_16S), cv2.NORM_L1)) / max(1, image[::2].size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 from uav_msgs.msg import Obstacle
 
-from perception_core import NS, FaultKind, Finding, broken, first_trouble
+from perception_core import NS, Ahead, FaultKind, Finding, broken, first_trouble
 from perception_core.images import GrayConverter
 from perception_core.ros import (
     DoneReporter,
@@ -27,7 +28,7 @@ from perception_core.ros import (
     obstacle_message,
     read_settings,
 )
-from zed_depth.ahead import Ahead, look_ahead
+from zed_depth.ahead import look_ahead
 from zed_depth.pairing import Pairing, StereoPair
 from zed_depth.rig import Depth, StereoRig
 from zed_depth.settings import ZedSettings
@@ -143,7 +144,7 @@ class ZedDepthNode:
                 motion=self._vehicle.motion,
                 settings=self._settings.ahead,
             )
-            self._tell(pair.stamp_ns, ahead)
+            self._tell(pair.stamp_ns, replace(ahead, unknown=ahead.unknown or depth.doubt))
         except (LookupError, ValueError) as error:
             self._tell(pair.stamp_ns, Ahead(None, str(error)))
             raise

@@ -11,7 +11,7 @@ import numpy as np
 from perception_core import FINE, NS, FaultKind, Finding, broken, first_trouble, unsure
 from zed_depth.calibration import CalibrationError, InfoLike, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
-from zed_depth.image_health import ImageJudge
+from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
 from zed_depth.stereo import DisparityRange, StereoMatcher, depth_of
 from zed_depth.view_health import view_finding
 
@@ -22,14 +22,21 @@ if TYPE_CHECKING:
     from zed_depth.settings import ZedSettings
 
 
+SHARE_FELL = 0.92  # of the pixels that had a depth, or a parallax, in the pair before; with less, it is in doubt
+
+
 @dataclass(frozen=True)
 class Depth:
-    """Depth of the matched left image: ``metres`` (h, w) float32, NaN where nothing is known."""
+    """Depth of the matched left image: ``metres`` (h, w) float32, NaN where nothing is known.
+
+    ``doubt`` says why what is not seen in it must not be taken for free, or nothing.
+    """
 
     metres: NDArray[np.float32]
     geometry: StereoGeometry
     disparity_px: NDArray[np.float32]
     images: tuple[NDArray[np.uint8], NDArray[np.uint8]]
+    doubt: str = ""
 
     def confidence(self) -> NDArray[np.float32]:
         """Return the confidence in each depth, (h, w) in 0 to 1."""
@@ -37,7 +44,12 @@ class Depth:
 
 
 class StereoRig:
-    """Judge pairs and measure depth. ``finding`` and ``depth`` may be called from two threads, each from one only."""
+    """Judge pairs and measure depth. ``finding`` and ``depth`` may be called from two threads, each from one only.
+
+    Both images are held against each other every ``view_period_s``, which takes as long as half a matching. A fault in between shows by
+    what each pair tells at little cost: images that lost their sharpness are held against each other at once; where fewer pixels have a
+    depth or a parallax than in the pair before, the pair is in doubt, and so are those after it until both images were found to fit again.
+    """
 
     def __init__(self, settings: ZedSettings) -> None:
         self._settings = settings
@@ -49,7 +61,10 @@ class StereoRig:
         self._matcher: tuple[StereoGeometry, StereoMatcher] | None = None
         self._view = FINE
         self._view_ns: int | None = None
+        self._sharpness: float | None = None  # of the images that were last held against each other
         self._valid = FINE
+        self._shares: dict[str, float] = {}  # of the pixels with a depth and with a parallax, in the last pair that was not in doubt
+        self._doubted_ns: int | None = None  # the first pair in doubt
 
     def take_info(self, side: str, info: InfoLike) -> None:
         """Take a camera_info of the side ``left`` or ``right``; the calibration is rebuilt only when it changes."""
@@ -72,6 +87,7 @@ class StereoRig:
             finding = broken(FaultKind.INFO, str(error))
         with self._lock:
             self._calibration, self._info_finding, self._view_ns, self._valid = calibration, finding, None, FINE
+            self._shares, self._doubted_ns = {}, None
 
     def finding(self, pair: StereoPair) -> Finding:
         """Return what this pair tells of the rig; call it once for each pair, in order."""
@@ -81,15 +97,26 @@ class StereoRig:
         if calibration is None or not images.ok:
             self._view_ns = None  # what comes after the trouble is looked at at once
             return first_trouble(info, images)
-        due = self._view_ns is None or not self._view.ok or not 0 <= pair.stamp_ns - self._view_ns < self._settings.view_period_s * NS
-        if due:
+        if self._due(pair):
             try:
                 prepared = calibration.prepared(pair.left, pair.right)
             except CalibrationError as error:
                 return broken(FaultKind.INFO, str(error))
             self._view = view_finding(*prepared, offset_px=calibration.geometry.offset_px, limits=self._settings.view)
-            self._view_ns = pair.stamp_ns
+            self._sharpness = self._images.sharpness
+            with self._lock:
+                self._view_ns = pair.stamp_ns
         return first_trouble(self._view, valid)
+
+    def _due(self, pair: StereoPair) -> bool:
+        """Return whether both images must be held against each other now."""
+        with self._lock:
+            checked_ns, doubted_ns = self._view_ns, self._doubted_ns
+        if checked_ns is None or not self._view.ok or (doubted_ns is not None and checked_ns <= doubted_ns):
+            return True
+        if self._sharpness is not None and self._images.sharpness < SHARPNESS_FELL * self._sharpness:
+            return True
+        return not 0 <= pair.stamp_ns - checked_ns < self._settings.view_period_s * NS
 
     def depth(self, pair: StereoPair) -> Depth:
         """Measure the depth of a pair; raise CalibrationError."""
@@ -102,14 +129,30 @@ class StereoRig:
         disparity = matcher.disparity(*images)
         share = float(np.mean(np.isfinite(disparity)))
         finding = FINE if share >= self._settings.min_valid else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
+        nearer = float(np.mean(disparity > calibration.geometry.offset_px + self._settings.view.min_parallax_px))
         with self._lock:
             self._valid = finding
-        return Depth(depth_of(disparity, calibration.geometry), calibration.geometry, disparity, images)
+            doubt = self._doubt({"depth": share, "parallax": nearer}, pair.stamp_ns)
+        return Depth(depth_of(disparity, calibration.geometry), calibration.geometry, disparity, images, doubt)
+
+    def _doubt(self, shares: dict[str, float], stamp_ns: int) -> str:
+        """Return why a pair with these shares of pixels is in doubt, or an empty text; with the lock held."""
+        before, doubted_ns, checked_ns = self._shares, self._doubted_ns, self._view_ns
+        fits = doubted_ns is not None and checked_ns is not None and doubted_ns < checked_ns <= stamp_ns
+        again = doubted_ns is not None and stamp_ns < doubted_ns  # the clock went back
+        fell = [name for name in before if shares[name] < SHARE_FELL * before[name]]
+        if fits or again or not fell:
+            self._shares, self._doubted_ns = shares, None
+            return ""
+        if doubted_ns is None:
+            self._doubted_ns = stamp_ns
+        return f"only {shares[fell[0]]:.0%} of the image has a {fell[0]}, {before[fell[0]]:.0%} had one just before"
 
     def rest(self) -> None:
         """Forget the share of valid depth: no depth is measured for a while."""
         with self._lock:
             self._valid = FINE
+            self._shares, self._doubted_ns = {}, None
 
     def _matcher_for(self, geometry: StereoGeometry) -> StereoMatcher:
         if self._matcher is None or self._matcher[0] != geometry:

@@ -1,0 +1,79 @@
+"""Did all ranges become longer, or all shorter, from one sweep to the next? No motion among surfaces does that, an error of the sensor may.
+
+A vehicle that moves comes nearer to what is ahead of it and farther from what is behind. Where it has surfaces on one side only, as over
+open ground, the nearest one comes or goes at the vehicle's speed at most. So a step of most ranges, the shortest included, that is faster
+than the vehicle is the sensor's. A constant error that is there from the start, or that grows slowly, can't be told by this: a sweep of a
+larger room looks the same.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from perception_core import NS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+AROUND, UP = 36, 18  # cells of 10 degrees
+CELL_RETURNS = 5
+CELLS = 8  # that both sweeps have returns in; with fewer nothing is said
+LONGEST_PAUSE_S = 1.0  # after which sweeps aren't compared, and an error that was found is forgotten: the sensor was started again
+QUARTILES = (25.0, 75.0)
+NEAREST = 10.0  # percent of the cells
+FEW = 1.0  # percent of the returns: specks of dust or rain
+OBLIQUE = 1.2  # by which the range along a ray changes faster than the distance of a surface that the ray meets at 56 degrees
+
+
+class RangeSteps:
+    """Compare sweeps in their order, and remember the error that they began with; not thread-safe."""
+
+    def __init__(self, max_speed_m_s: float) -> None:
+        self._max_speed_m_s = max_speed_m_s
+        self._before: tuple[int, Floats] | None = None
+        self._offset_m = 0.0
+
+    def offset_m(self, points: NDArray[np.float32], ranges_m: NDArray[np.float32], stamp_ns: int, *, least_m: float) -> float:
+        """Return by how much the ranges (N,) of the points (N, 3) are too long; 0 where no step was seen, or it was taken back.
+
+        Where the nearest surfaces are nearer than ``least_m``, as on the ground, the sensor may not see the very nearest, and small motions
+        change all ranges along the rays by much: nothing new is found there.
+        """
+        now = _mean_ranges(points, ranges_m)
+        if np.count_nonzero(np.isfinite(now)) < CELLS:
+            return self._offset_m
+        before, self._before = self._before, (stamp_ns, now)
+        if before is None or not 0 < stamp_ns - before[0] <= LONGEST_PAUSE_S * NS:
+            self._offset_m = 0.0
+            return 0.0
+        step_m, limit_m = _step(before[1], now), OBLIQUE * self._max_speed_m_s * (stamp_ns - before[0]) / NS
+        if abs(step_m) > limit_m and np.percentile(ranges_m, FEW) > least_m:
+            offset_m = self._offset_m + step_m
+            self._offset_m = offset_m if abs(offset_m) > limit_m / 2.0 else 0.0
+        return self._offset_m
+
+
+def _step(before_m: Floats, now_m: Floats) -> float:
+    """Return by how much three quarters of the ranges and half of the nearest ones grew at least; negative: shrank; 0 if neither."""
+    both = np.isfinite(before_m) & np.isfinite(now_m)
+    if np.count_nonzero(both) < CELLS:
+        return 0.0
+    before_m, now_m = before_m[both], now_m[both]
+    change_m = now_m - before_m
+    of_nearest_m = float(np.median(change_m[before_m <= np.percentile(before_m, NEAREST)]))
+    low_m, high_m = (float(value) for value in np.percentile(change_m, QUARTILES))
+    return max(0.0, min(low_m, of_nearest_m)) + min(0.0, max(high_m, of_nearest_m))
+
+
+def _mean_ranges(points: NDArray[np.float32], ranges_m: NDArray[np.float32]) -> Floats:
+    """Return the mean range in each cell of directions, (AROUND * UP,), NaN where returns are few."""
+    around = np.arctan2(points[:, 1], points[:, 0]) * np.float32(AROUND / (2.0 * np.pi))
+    up = np.arcsin(np.clip(points[:, 2] / ranges_m, -1.0, 1.0)) * np.float32(UP / np.pi)
+    cell = np.floor(around).astype(np.intp) % AROUND * UP + np.clip(np.floor(up + UP / 2), 0, UP - 1).astype(np.intp)
+    counts = np.bincount(cell, minlength=AROUND * UP)
+    sums = np.bincount(cell, weights=ranges_m, minlength=AROUND * UP)
+    return np.where(counts >= CELL_RETURNS, sums / np.maximum(counts, 1), np.nan)
