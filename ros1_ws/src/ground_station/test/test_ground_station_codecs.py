@@ -29,8 +29,8 @@ def test_all_have_the_same_bits(rows):
         assert row.kbit_s == pytest.approx(RATE_BPS / 1e3, rel=0.1), row
 
 
-def test_ours_looks_like_ffmpeg_s_and_better_than_a_preset_that_saves_time(rows):
-    assert rows[OURS].ssim > rows[FFMPEG].ssim - 0.01
+def test_ours_looks_no_worse_than_ffmpeg_s_and_better_than_a_preset_that_saves_time(rows):
+    assert rows[OURS].ssim >= rows[FFMPEG].ssim
     assert rows[OURS].ssim > rows["quick"].ssim
     assert rows[OURS].ssim < 1.0
 

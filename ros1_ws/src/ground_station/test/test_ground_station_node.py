@@ -82,7 +82,7 @@ class Tamperer:
             chance.shuffle(mixed)
             for data in mixed:
                 self._socket.sendto(data, ("127.0.0.1", self._to))
-            # The same rubbish, and what is right in another place, into the ports that nobody but the radio should use.
+            # The same rubbish, and what is right in another place, into the ports that only the radio should use.
             for port in self._others:
                 for data in (bytes(forged), chance.randbytes(40), chance.choice(self.heard)):
                     self._socket.sendto(data, ("127.0.0.1", port))

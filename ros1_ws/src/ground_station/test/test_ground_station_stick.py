@@ -49,7 +49,7 @@ class Scene:
         return math.hypot(*self.flown.body.velocity)
 
     def run(self, seconds: float, stick: Deflection | None = None) -> None:
-        """Let time pass; ``stick``: where somebody holds it, None: it says nothing."""
+        """Let time pass with the telepilot's stick held at ``stick``; None: no stick is heard of."""
         for tick in range(round(seconds / TICK_S)):
             self.now_s += TICK_S
             now_ns = round(self.now_s * NS)
@@ -115,7 +115,7 @@ def test_when_the_radio_stays_away_the_failsafe_flies_home_and_is_not_fought(sce
     scene.run(1.0, CENTRED)
     assert scene.mode is Mode.RTL
     scene.run(1.0, FORWARD)
-    assert scene.mode is Mode.LOITER, "whoever moves it again takes over again"
+    assert scene.mode is Mode.LOITER, "a telepilot who moves the stick again takes over again"
 
 
 def test_giving_back_is_guided_with_a_centred_stick_on_the_way(scene):

@@ -50,7 +50,7 @@ def test_the_bucket_holds_the_rate():
     carried_bps = sum((len(data) + OVERHEAD_BYTES) * 8 for _, _, data in arrived) / 20.0
     assert carried_bps == pytest.approx(1e6, rel=0.02)
     assert channel.dropped > 0, "what does not fit is dropped at the tail"
-    assert max(at - sent for sent, at, _ in arrived) / NS < 0.5 + 0.05 + 0.1, "nobody waits longer than the queue"
+    assert max(at - sent for sent, at, _ in arrived) / NS < 0.5 + 0.05 + 0.1, "no packet waits longer than the queue lasts"
 
 
 def test_what_fits_is_carried_whole_and_in_order():

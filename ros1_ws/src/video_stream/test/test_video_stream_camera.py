@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import threading
 import time
@@ -16,6 +15,7 @@ from video_stream.camera import Camera, CameraError, CameraSource, CameraThread
 from video_stream.recorder import Film
 from video_stream.wire import Seal, VideoPacket
 
+from alula_testing.ros1 import refusal_of_node
 from alula_testing.waits import until
 
 NODE = Path(__file__).parents[1] / "scripts/video_stream_node"
@@ -23,7 +23,7 @@ SIZE, FRAMES, PERIOD_S = (320, 180), 10, 0.05
 
 
 class Clock:
-    """Time that passes when somebody waits for it."""
+    """A clock whose time passes only by waits."""
 
     def __init__(self, end_s: float) -> None:
         self.now_s = 100.0
@@ -97,17 +97,8 @@ def test_a_source_that_ends_tells_why(film, tmp_path):
 
 
 def test_a_missing_device_ends_the_node_with_one_line(ros_master):
-    done = subprocess.run(
-        [sys.executable, str(NODE), "_source:=/dev/video97", "_report_port:=0"],
-        env={**os.environ, "ROS_MASTER_URI": ros_master},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "camera /dev/video97 can't be opened: No such file or directory" in done.stderr
+    said = refusal_of_node([sys.executable, str(NODE), "_source:=/dev/video97", "_report_port:=0"], ros_master)
+    assert "camera /dev/video97 can't be opened: No such file or directory" in said
 
 
 def test_the_node_streams_a_source_in_real_time(ros_master, start_node, film):

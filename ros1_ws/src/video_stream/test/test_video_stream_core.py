@@ -217,7 +217,7 @@ def test_a_full_radio_is_given_time_but_asked_now_and_then():
     sender.feedback(Report(1, 0, newest_id=-1).pack(SEAL), 0)
     sent = [n for n in range(40) if sender.frame(picture(n), n * STEP_NS, n * STEP_NS) is not None]
     gaps = np.diff(sent)
-    assert max(gaps) * 0.05 <= 0.45, "somebody has to find out that the way is free again"
+    assert max(gaps) * 0.05 <= 0.45, "a frame has to find out that the way is free again"
     assert len(sent) < 25
 
 

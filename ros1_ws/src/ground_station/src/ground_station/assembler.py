@@ -110,7 +110,7 @@ class Assembler:
         partial = None if self._next_id is None else self._partial.get(self._next_id)
         if partial is not None and partial.whole:
             return self._next_id
-        # A whole key frame needs nobody; it overtakes only what has been waited for long enough.
+        # A whole key frame needs no other frame; it overtakes only what has been waited for long enough.
         keys = [frame_id for frame_id, p in self._partial.items() if p.whole and p.key and frame_id > self._given_id]
         late = self._late(now_ns)
         if self._next_id is not None and late:

@@ -37,7 +37,7 @@ class Moment:
 class Rehearsal:
     """Runs a stream. ``camera(n)``: the n-th picture, 20 a second; ``radio(t_s)``: how the radio is at a time.
 
-    ``tamper``: what somebody does to the datagrams on their way to the ground; by default nothing.
+    ``tamper``: what is done to the datagrams on their way to the ground; by default nothing.
     """
 
     camera: Callable[[int], Rgb]

@@ -75,7 +75,7 @@ class MissionLoop(Generic[Item]):
         os.eventfd_write(self._wake, 1)
 
     def send(self, data: bytes, port: int, *, by: int = 0) -> None:
-        """Send a datagram to a port of loopback, whether somebody listens there or not; answers come to the socket that it is sent by."""
+        """Send a datagram to a port of loopback, whether a socket is bound there or not; answers come to the socket that it is sent by."""
         try:
             self.sockets[by].sendto(data, (LOOPBACK, port))
         except OSError as error:
@@ -101,7 +101,7 @@ class MissionLoop(Generic[Item]):
             except BlockingIOError:
                 return
             except OSError:
-                continue  # what was sent to a port where nobody listens comes back as an error here
+                continue  # a datagram to a port without a socket comes back as an error here
             if self._on_datagram is not None:
                 self._on_datagram(number, data)
 

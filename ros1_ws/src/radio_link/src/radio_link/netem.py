@@ -6,7 +6,6 @@ delay, jitter and loss (netem) in the air; what leaves the ground, alike. Addres
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -125,8 +124,3 @@ def _write(radio: Radio, part: str, name: str, value: str, *, optional: bool = F
     path = f"/proc/sys/net/{name}"
     script = f"echo {value} > {path}"
     return ("ip", "netns", "exec", radio.namespace(part), "sh", "-c", f"[ ! -e {path} ] || {script}" if optional else script)
-
-
-def words(commands: Sequence[Command]) -> str:
-    """Return commands as one would type them, a line each."""
-    return "\n".join(" ".join(command) for command in commands)

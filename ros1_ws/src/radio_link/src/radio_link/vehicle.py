@@ -28,7 +28,7 @@ class Vehicle:
         self.lift_off_s = lift_off_s
 
     def guided(self, point: Point, landed_state: int, now_s: float) -> None:
-        """Take what the guidance believes: on a real vehicle nobody knows better."""
+        """Take what the guidance believes: on a real vehicle there is no better source."""
         if self._simulated:
             return
         self.point = point

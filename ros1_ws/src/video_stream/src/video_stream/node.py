@@ -164,7 +164,7 @@ class VideoStreamNode:
     def _publish_state(self, now_ns: int, *, up: bool) -> None:
         report, watch, sender = self._sender.report, self._watch, self._sender
         message = VideoState(header=Header(stamp=rospy.Time(*divmod(now_ns, NS))), streaming=watch is not None)
-        # What nobody confirms is not seen.
+        # A picture that the ground station does not confirm was not seen.
         message.fps = report.fps if report is not None and up else 0.0
         message.quality = report.quality if report is not None else 0.0
         if report is not None:

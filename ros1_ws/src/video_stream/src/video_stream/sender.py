@@ -15,7 +15,7 @@ KEPT_FRAMES = 40
 RESEND_AFTER_NS = 150_000_000
 GRAIN_NS = 15_000_000  # by so much may a frame come early: cameras are not quite even
 UNDER_WAY_S = 0.3  # a frame that was sent so long ago and has not come yet: the radio is full
-PROBE_S = 0.4  # one goes out then all the same, or nobody would ever learn that the way is free again
+PROBE_S = 0.4  # one goes out then all the same: only a frame that arrives tells that the way is free again
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,7 @@ def pack_message(kind: str, values: Sequence[object], seal: Seal) -> bytes:
 
 
 def unpack_message(kind: str, data: bytes, seal: Seal) -> list[Any]:
-    """Return the values of a sealed message of a kind; raise WireError. Whoever has the key is believed to keep to the format."""
+    """Return the values of a sealed message of a kind; raise WireError. A sender that has the key is believed to keep to the format."""
     tag, text = data[:TAG_BYTES], data[TAG_BYTES:]
     if not seal.holds(text, tag):
         raise WireError("the tag of a message is wrong")
