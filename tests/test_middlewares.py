@@ -45,7 +45,7 @@ class Player:
         self._process.stdin.flush()
 
     def answer(self) -> dict[str, Any]:
-        # After a script that failed elsewhere, an answer may be left that nobody read.
+        # After a script that failed elsewhere, an answer may be left unread.
         while self._asked:
             self._asked -= 1
             trace = json.loads(self._process.stdout.readline())

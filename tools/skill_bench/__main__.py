@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; return the exit code."""
     options = parse_arguments(arguments)
-    # So that whoever ends this process has the blocks left in which the others run.
+    # SIGTERM unwinds the blocks in which the other processes run, which end with them.
     signal.signal(signal.SIGTERM, _end)
     try:
         sys.stdout.write(run(options))

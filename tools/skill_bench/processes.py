@@ -1,4 +1,4 @@
-"""The processes of the benchmark: started, asked, and ended with whoever started them; and what one has taken."""
+"""The processes of the benchmark: started, asked, and ended with their parent; and what one has taken."""
 
 from __future__ import annotations
 

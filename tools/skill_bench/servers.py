@@ -77,7 +77,7 @@ def serve_bare(connection: Connection, _: object) -> None:
         end_s = time.monotonic() + DISCOVERED_S
         while not topic.get_subscription_count():
             if time.monotonic() > end_s:
-                raise TimeoutError(f"nobody has subscribed to {BARE_TOPIC} within {DISCOVERED_S:g} s")
+                raise TimeoutError(f"no subscriber of {BARE_TOPIC} within {DISCOVERED_S:g} s")
             time.sleep(PACE_S)
 
     follow(connection, {"ready": ready, "publish": publish})

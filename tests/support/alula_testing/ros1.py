@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from xmlrpc.client import ServerProxy
 
@@ -16,6 +16,8 @@ from alula_common.network import free_port
 
 StartNode = Callable[..., "subprocess.Popen[bytes]"]
 MASTER_START_S = 120.0
+END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
+"""Of util-linux: the command ends with the thread that started it, also where tests are killed."""
 
 
 def wait_until(condition: Callable[[], bool], *, timeout_s: float, what: str) -> None:
@@ -38,6 +40,14 @@ def end_process(process: subprocess.Popen[bytes], *, patience_s: float = 5.0) ->
             process.wait()
 
 
+def refusal_of_node(command: Sequence[str], master: str) -> str:
+    """Run a node that can't start, to its end, and return the one line in which it says why; fail where it ends otherwise."""
+    env = {**os.environ, "ROS_MASTER_URI": master}
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), f"ended with {done.returncode}: {done.stderr}"
+    return done.stderr
+
+
 @contextmanager
 def running_master(node: str) -> Iterator[str]:
     """Run a ROS master on a port of its own, with this process as a node of it, and return its URI."""
@@ -47,7 +57,7 @@ def running_master(node: str) -> Iterator[str]:
     uri = f"http://127.0.0.1:{port}"
     os.environ["ROS_MASTER_URI"] = uri
     os.environ["ROS_IP"] = "127.0.0.1"
-    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], start_new_session=True, stdout=subprocess.DEVNULL)
+    master = subprocess.Popen([*END_WITH_PARENT, "rosmaster", "--core", "-p", str(port)], start_new_session=True, stdout=subprocess.DEVNULL)
 
     def answers() -> bool:
         try:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 LOOK_S = 0.002
-"""How often (wall clock) a condition is looked at: conditions read states of libraries that tell nobody when these change."""
+"""How often (wall clock) a condition is looked at: conditions read states of libraries that do not tell when these change."""
 
 
 def until(condition: Callable[[], object], what: str, timeout_s: float) -> None:

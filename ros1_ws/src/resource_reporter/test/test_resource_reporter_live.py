@@ -1,4 +1,4 @@
-"""The reporter on a live graph: at once, until it agrees, again after a restart, without ever blocking who reports."""
+"""The reporter on a live graph: at once, until it agrees, again after a restart, without ever blocking the caller."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_refused_state_does_not_stand_in_the_way_of_the_next(skillset, reporte
     becomes(skillset, "BROKEN")
 
 
-def test_a_hanging_service_blocks_nobody_for_long(skillset, reporter):
+def test_a_hanging_service_blocks_no_caller_for_long(skillset, reporter):
     skillset.hangs = threading.Event()
     skillset.serve()
     reporter.report("zed_status", "OK")

@@ -10,7 +10,7 @@ import pytest
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus
 from geometry_msgs.msg import Point
-from navigation_interfaces.msg import TakeoffAction, TakeoffActionGoal, TakeoffActionResult, TakeoffGoal
+from navigation_interfaces.msg import LandActionResult, TakeoffAction, TakeoffActionGoal, TakeoffActionResult, TakeoffGoal
 from navigation_managers.client import NavigationClient
 from navigation_managers.inputs import GotoStraightInputs
 from skillset_interfaces.msg import Event
@@ -22,6 +22,7 @@ from alula_testing.navigation import FLYING, check_interrupt_and_violation, chec
 from skill_model.execution_state import ExecutionState
 from skill_model.json_form import from_json
 from skill_runtime.waiting import CannotWaitError
+from skillset_ros1.actions import RESULTS_KEPT
 
 S = ExecutionState
 
@@ -161,6 +162,20 @@ def test_who_subscribes_late_hears_all_events(navigation):
     assert json.loads(first.inputs_json) == {"target": {"x": 1.0, "y": 2.5, "z": 3.0}, "speed": 1.0}
 
 
+def test_the_last_results_of_a_skill_are_kept_for_plain_subscribers_however_late(navigation):
+    client = navigation.client
+    handles = [client.start("land") for _ in range(RESULTS_KEPT + 1)]
+    assert all(handle.wait(SOON_S) for handle in handles)
+    # Subscribers of one process share a connection: the first one's must go, or none would be late.
+    client.close()
+    heard = []
+    late = rospy.Subscriber(navigation.name("skill/land/result"), LandActionResult, heard.append)
+    until(lambda: len(heard) == RESULTS_KEPT, "the history comes")
+    late.unregister()
+    assert [one.status.goal_id.id for one in heard] == [handle.id for handle in handles[1:]]
+    assert {(one.status.status, one.result.outcome) for one in heard} == {(GoalStatus.REJECTED, "NOT_READY")}
+
+
 def test_description_and_data(navigation):
     assert from_json(navigation.service(Describe, "describe").model_json) == navigation.managers.engine.skillset
     assert navigation.client.model == navigation.managers.engine.skillset
@@ -254,8 +269,10 @@ def test_a_stop_that_takes_too_long_becomes_an_emergency(ros_master):
     until(lambda: handle.state is S.INTERRUPTING or handle.done, "the stop has begun")
     assert handle.wait(SOON_S)
     assert handle.state is S.INTERRUPTED
-    assert navigation.hooks["goto_straight"].calls.count("on_emergency") == 1
+    # A hook is called beside the execution's end, which waits for none.
+    until(lambda: "on_emergency" in navigation.hooks["goto_straight"].calls, "the emergency stop")
     navigation.close()
+    assert navigation.hooks["goto_straight"].calls.count("on_emergency") == 1
 
 
 def test_data_are_followed_without_generated_code(navigation):

@@ -14,7 +14,7 @@ HookT = TypeVar("HookT", bound=Callable[..., object])
 
 
 def unwritten(hook: HookT) -> HookT:
-    """Mark a hook that does nothing until somebody overrides it: managers that find it so give it no thread of its own."""
+    """Mark a hook that does nothing until a subclass overrides it: managers that find it so give it no thread of its own."""
     hook.unwritten = True  # type: ignore[attr-defined]
     return hook
 

@@ -261,7 +261,7 @@ class Middleware(Protocol):
         ...
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
-        """Have ``callback(value)`` called for each value; the returned function tells whether somebody publishes to here."""
+        """Have ``callback(value)`` called for each value; the returned function tells whether the topic has a publisher."""
         ...
 
     def serve(self, service: str, handler: Serve) -> None:

@@ -99,7 +99,7 @@ class Access(Protocol):
         ...
 
     def last(self, skill: str) -> Ended[Any, Any] | None:
-        """Return how the skill's last execution ended, whoever asked for it."""
+        """Return how the skill's last execution ended, of any caller."""
         ...
 
     def why(self, skill: str, inputs: Mapping[str, object] | None = None) -> Pending[Why]:
@@ -111,11 +111,11 @@ class Access(Protocol):
         ...
 
     def data_feed(self, name: str) -> DataFeed:
-        """Return the values of a data, followed from the first time that somebody asks."""
+        """Return the values of a data, followed from the first time that they are asked for."""
         ...
 
     def moment(self) -> Pending[Any]:
-        """Return an answer that nobody has given yet, to be waited for as all others of this client."""
+        """Return an answer that is not given yet, to be waited for as all others of this client."""
         ...
 
 
@@ -132,7 +132,7 @@ class Skill(Generic[OutputsT, ResultT]):
 
     @property
     def last(self) -> Ended[OutputsT, ResultT] | None:
-        """How the last execution ended, whoever asked for it and whenever: also before this client was there."""
+        """How the last execution ended, of any caller and at any time: also before this client was there."""
         return self._client.last(self.name)
 
     def why(self, inputs: Mapping[str, object] | None = None) -> Pending[Why]:

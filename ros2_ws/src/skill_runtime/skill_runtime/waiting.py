@@ -27,7 +27,7 @@ class Host(Protocol):
         """Wait for the event; None: until it comes or can't come any more.
 
         Raises:
-            CannotWaitError: this thread is the one that would have to bring the event, or nobody brings events any more.
+            CannotWaitError: this thread is the one that would have to bring the event, or no events are brought any more.
         """
         ...
 
@@ -104,7 +104,7 @@ class Waitable:
 
 
 class Moment(Waitable):
-    """A moment that comes when somebody says so."""
+    """A moment that comes when it is told."""
 
     def come(self) -> None:
         """Be there, now."""

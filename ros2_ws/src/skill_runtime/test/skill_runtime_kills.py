@@ -57,7 +57,7 @@ class Mission:
         self.executor.add_node(self.node)
         self.thread = threading.Thread(target=self.executor.spin, daemon=True)
         self.thread.start()
-        assert self.client.wait_ready(READY_S)
+        assert self.client.wait_ready(READY_S), self.client.missing
 
     def pid(self, part: str) -> int:
         """The process of a part; waits while it is being restarted."""

@@ -10,7 +10,7 @@ pytest.importorskip("rclpy")
 
 from skill_runtime.ros2 import calls as calls_module
 from skill_runtime.ros2.alarms import Alarms
-from skill_runtime.ros2.calls import AGAIN_S, LOOK_S, QUEUE, WINDOW, Calls
+from skill_runtime.ros2.calls import AGAIN_S, LOOK_S, QUEUE, UNSEEN_S, WINDOW, Calls, Discovery
 
 
 class Future:
@@ -107,6 +107,59 @@ def test_a_service_that_is_not_there_is_told_and_one_that_comes_is_asked(bench):
     bench.service.there = True
     bench.run_for(LOOK_S)
     assert [future.request for future in bench.service.sent] == ["b"]
+
+
+def test_a_service_that_the_graph_never_tells_of_is_asked_all_the_same(bench):
+    bench.service.there = False
+    for request in ("a", "b"):
+        bench.ask(request, timeout_s=20.0)
+    bench.run_for(UNSEEN_S - LOOK_S)
+    assert bench.service.sent == []
+    bench.run_for(2 * LOOK_S)
+    assert [future.request for future in bench.service.sent] == ["a"]
+    bench.service.sent[0].answer("yes")
+    assert bench.calls.ready
+    assert [future.request for future in bench.service.sent] == ["a", "b"]
+    bench.ask("c")
+    assert [future.request for future in bench.service.sent] == ["a", "b", "c"]
+
+
+def test_a_service_that_went_is_waited_for_whether_the_graph_told_of_it_or_not(bench):
+    bench.ask("a")
+    bench.service.there = False
+    bench.service.sent[0].answer("its last answer")
+    bench.ask("b", timeout_s=20.0, once=True)
+    assert [future.request for future in bench.service.sent] == ["a"]
+    bench.run_for(UNSEEN_S + LOOK_S)
+    bench.service.sent[1].answer("unseen")
+    bench.ask("c", timeout_s=20.0)
+    bench.run_for(AGAIN_S + LOOK_S)
+    bench.ask("d", timeout_s=20.0, once=True)
+    assert [future.request for future in bench.service.sent] == ["a", "b", "c"]
+    assert not bench.calls.ready
+    bench.service.there = True
+    bench.run_for(LOOK_S)
+    assert "d" in [future.request for future in bench.service.sent]
+
+
+def test_a_request_that_must_not_be_made_twice_is_sent_unseen_once_and_given_up_in_its_time(bench):
+    bench.service.there = False
+    bench.ask("a", once=True)
+    bench.run_for(5.0 + 2 * LOOK_S)
+    assert len(bench.service.sent) == 1
+    assert bench.answers == ["service ask did not answer within 5 s"]
+
+
+def test_an_end_is_taken_for_connected_when_the_graph_tells_of_it_or_has_had_time_to(bench):
+    told = SimpleNamespace(there=False)
+    discovery = Discovery(lambda: told.there)
+    assert not discovery()
+    bench.run_for(UNSEEN_S + LOOK_S)
+    assert discovery()
+    told.there = True
+    assert discovery()
+    told.there = False
+    assert not discovery(), "an end that went gets its time again"
 
 
 def test_a_burst_goes_through_a_window_and_no_request_is_lost(bench):

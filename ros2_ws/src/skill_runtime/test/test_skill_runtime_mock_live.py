@@ -59,7 +59,8 @@ class Caller:
     def wait(self, what, limit_s: float = 30.0) -> None:
         end = time.monotonic() + limit_s
         while not what():
-            assert time.monotonic() < end, "it did not come"
+            missing = {name: client.missing for name, client in self.clients.items()}
+            assert time.monotonic() < end, f"it did not come; missing: {missing}"
             self._executor.spin_once(timeout_sec=0.05)
 
     def close(self) -> None:

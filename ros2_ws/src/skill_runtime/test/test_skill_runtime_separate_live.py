@@ -77,7 +77,7 @@ def test_the_death_of_the_resource_manager_stops_functions_and_hangs_nobody(miss
     os.kill(mission.pid("resources"), signal.SIGKILL)
     assert handle.wait(END_S)
     assert handle.state is S.FAILED
-    # The skill manager's words, or the client's, whoever notices first; or the client hears the restarted managers before that.
+    # The reason is the skill manager's or the client's, the one that notices first; or the client hears the restarted managers before that.
     assert "gone: " in handle.message or "were restarted" in handle.message
     until(lambda: any(line.startswith(f"stopped {SKILL}: the resource manager") for line in mission.told), "the function is stopped", END_S)
     assert runs(mission).state is S.RUNNING

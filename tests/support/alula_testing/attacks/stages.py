@@ -85,7 +85,7 @@ class LocalStage:
         self._world.run_for(1.0)
 
     def freeze(self, seconds: float) -> None:
-        """Do nothing: in one process nobody stands still alone."""
+        """Do nothing: in one process all stand still together."""
 
     def close(self) -> dict[str, Any]:
         """Return what the managers could not do."""

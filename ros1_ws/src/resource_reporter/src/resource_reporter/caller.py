@@ -69,7 +69,7 @@ class TransitionCaller:
             self._proxy = rospy.ServiceProxy(self._name, Transition, persistent=True)
         try:
             attempt.response = self._proxy(call.resource, call.to)
-        except Exception as error:  # noqa: BLE001  # rospy lets through whatever the sockets below it raise
+        except Exception as error:  # noqa: BLE001  # rospy lets through all that the sockets below it raise
             attempt.error = f"{self._name}: {error}"
         finally:
             attempt.done.set()

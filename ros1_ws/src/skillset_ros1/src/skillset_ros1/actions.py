@@ -25,6 +25,7 @@ from skillset_ros1.names import QUEUE, ActionTypes
 OnGoal = Callable[[ServerGoalHandle], None]
 RECALLED_EARLY = "interrupted before it arrived"
 RESULTS_KEPT = 10
+"""So many of a skill, until others take their place, however long ago they came."""
 _WAITING = {GoalStatus.PENDING, GoalStatus.RECALLING}
 _FEEDBACK_FIELDS = ("progress", "state")
 _RESULT_FIELDS = ("outcome", "result", "message")
@@ -56,7 +57,7 @@ class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # n
             super().publish_result(status, result)
 
     def peer_subscribe(self, topic_name: str, topic_publish: OnValue, peer_publish: OnValue) -> None:  # noqa: ARG002
-        """Send the last results to somebody who has just subscribed."""
+        """Send the last results to a new subscriber."""
         with self.lock:
             for result in self._results:
                 peer_publish(result)
@@ -179,7 +180,7 @@ class RospyLink:
         self._cancels.publish(GoalID(id=goal_id))
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:  # noqa: ARG002 - nothing is answered
-        """Cancel all goals: that is what an id and a stamp of nothing mean. ROS 1 tells nobody how many there were."""
+        """Cancel all goals: that is what an id and a stamp of nothing mean. ROS 1 does not tell how many there were."""
         self._cancels.publish(GoalID())
         self._base.submit(lambda: on_count(None))
 

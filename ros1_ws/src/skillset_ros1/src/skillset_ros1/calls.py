@@ -25,7 +25,7 @@ class ServiceCallError(SkillRuntimeError):
 
 
 class _Call:
-    """One call on a thread of its own; whoever closes it first, answer or deadline, decides."""
+    """One call on a thread of its own; what closes it first, answer or deadline, decides."""
 
     def __init__(self, name: str, kind: Any, request: Any, timeout_s: float) -> None:
         self._name, self._kind, self._request, self._timeout_s = name, kind, request, timeout_s

@@ -26,7 +26,7 @@ from skillset_ros1.calls import call
 from skillset_ros1.names import QUEUE, action_types, now_ns
 
 ALIVE_PERIOD_S = 0.5
-"""Managers give a sign of life so often (wall clock), whatever their hooks do: ROS 1 itself tells nobody of a node that died."""
+"""Managers give a sign of life so often (wall clock), whatever their hooks do: ROS 1 itself does not tell of a node that died."""
 LEASE_S = 2.0
 """Without a sign of life for so long (wall clock), managers are doubted, as in the ROS 2 world."""
 BROKEN_LEASE_S = 1.5 * ALIVE_PERIOD_S
@@ -205,7 +205,7 @@ class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
             self._publisher.publish(message)
 
     def peer_subscribe(self, topic_name: str, topic_publish: OnValue, peer_publish: OnValue) -> None:  # noqa: ARG002
-        """Send the history to somebody who has just subscribed."""
+        """Send the history to a new subscriber."""
         with self._lock:
             for message in self._history:
                 peer_publish(message)

@@ -55,6 +55,11 @@ class Client:
         return self._connection.ready.is_set()
 
     @property
+    def missing(self) -> str:
+        """What the managers can't be called without, and has not come so far, for a message to people; empty when nothing is missing."""
+        return self._connection.missing
+
+    @property
     def model(self) -> Skillset:
         """Return the model that the managers execute; raise RuntimeError before ``wait_ready``."""
         if self._connection.model is None:
@@ -85,7 +90,7 @@ class Client:
         return {} if self._connection.gone else dict(self._news.skills)
 
     def last(self, skill: str) -> Ended[dict[str, Any], str] | None:
-        """Return how the skill's last execution ended, whoever asked for it and whenever; None when none has.
+        """Return how the skill's last execution ended, of any caller and at any time; None when none has.
 
         Raises:
             ValueError: there is no such skill.
@@ -148,7 +153,7 @@ class Client:
         return tracker.handle
 
     def interrupt_all(self, skill: str) -> Pending[int]:
-        """Ask for the end of all executions of a skill, whoever asked for them; the answer is how many there were."""
+        """Ask for the end of all executions of a skill, of any caller; the answer is how many there were."""
         self._check_skill(skill)
         pending = self._open_question()
         if pending.done:
@@ -201,7 +206,7 @@ class Client:
         return self._ask("get_data", {"name": name}, lambda reading, _: reading)
 
     def moment(self) -> Pending[Any]:
-        """Return an answer that nobody has given yet; it fails when the managers go."""
+        """Return an answer that is not given yet; it fails when the managers go."""
         return self._news.moment()
 
     # --- inside ------------------------------------------------------------------------------------------------------
@@ -224,7 +229,7 @@ class Client:
         return pending
 
     def _open_question(self) -> Pending[Any]:
-        """Return an answer to wait for; it has failed already where nobody can give one."""
+        """Return an answer to wait for; it has failed already where none can be given."""
         pending = self.moment()
         if self._news.closed or self._connection.gone:
             pending.fail(self._news.closed or self._not_there())

@@ -17,7 +17,7 @@ RIVALS_NS = 1_000_000_000
 
 
 class Connection:
-    """Follows the life of the managers; all of it happens on the middleware's loop, ``ready`` may be waited for by anybody.
+    """Follows the life of the managers; all of it happens on the middleware's loop, ``ready`` may be waited for on any thread.
 
     A starved process may only be late: before managers are taken for dead they are asked, and it is their answer that counts.
 
@@ -92,7 +92,7 @@ class Connection:
             self._ask(DOUBT_S)
 
     def close(self) -> None:
-        """Call nobody any more."""
+        """Make no more callbacks."""
         self._alive = False
         self.ready.clear()
 
@@ -140,6 +140,17 @@ class Connection:
         self._looking = False
         if self._known and self._connected:
             self.ready.set()
+
+    @property
+    def missing(self) -> str:
+        """What the managers can't be called without, and has not come so far; empty when nothing is missing."""
+        if not self._alive:
+            return "a sign of life"
+        if not self._known:
+            return "their description" if self._described != self.life else "the states of their resources"
+        if not all(connected() for connected in self.subscriptions):
+            return "a connection to their topics"
+        return ", ".join(f"the action {skill}" for skill, link in list(self.links.items()) if not link.connected)
 
     @property
     def _known(self) -> bool:

@@ -1,7 +1,7 @@
 """What a client hears of the managers of one skillset, dealt with in one order on the middleware's loop.
 
 Topics come in no order with one another. The managers number their events, and tell with their states after which event these are;
-so whoever is told of an execution's end can see the resources as they are after it.
+so a caller that is told of an execution's end can see the resources as they are after it.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class ClientNews:
             tracker.link.release(tracker.handle.id)
 
     def moment(self) -> Pending[Any]:
-        """Return an answer that nobody has given yet; it fails when the managers go."""
+        """Return an answer that is not given yet; it fails when the managers go."""
         pending: Pending[Any] = Pending(self._middleware.host)
         with self._lock:
             self._pending.add(pending)

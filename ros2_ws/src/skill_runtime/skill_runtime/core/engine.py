@@ -95,9 +95,9 @@ class SkillsetEngine:
     Args:
         skillset: the model.
         clock_ns: the mission clock, nanoseconds.
-        hooks: one a skill, or whoever calls them elsewhere.
+        hooks: one a skill, or the caller of hooks that are elsewhere.
         listener: gets the events of each step.
-        defer: runs a stop hook that a step of somebody else has made necessary; by default in the thread of that step. It
+        defer: runs a stop hook that a step of another caller has made necessary; by default in the thread of that step. It
             should not wait for other hooks: emergencies come this way.
         on_error: gets one text for each error that no execution can carry.
         interrupt_timeout_s: how long a stop may take where the model does not say, mission clock.
@@ -167,7 +167,7 @@ class SkillsetEngine:
     def run(self, execution_id: str, submit: Submit = run_at_once) -> None:
         """Have a registered request validated and started, unless it has ended meanwhile.
 
-        ``submit`` runs ``validate`` and ``on_dispatch``, which may wait, where somebody wrote them; all else is done in this thread.
+        ``submit`` runs ``validate`` and ``on_dispatch``, which may wait, where they are written; all else is done in this thread.
         """
         with self._lock:
             entry = self._context.open(execution_id)

@@ -29,7 +29,7 @@ class Controller(Protocol):
 
 
 class Execution:
-    """One execution of a skill. Its attributes are written by the engine only; anybody may read them.
+    """One execution of a skill. Its attributes are written by the engine only, and read from any thread.
 
     ``result`` is the result's name in the model when TERMINATED, the precondition's when NOT_READY, the invariant's when
     RESOURCE_INVARIANT_VIOLATED, else empty.

@@ -28,7 +28,7 @@ Then = Callable[[HookAnswer], None]
 
 
 class HookCaller(Protocol):
-    """What the engine needs of whoever has the hooks."""
+    """What the engine needs of the owner of the hooks."""
 
     def call(self, execution: Execution, hook: str, then: Then) -> None:
         """Call a hook of the execution's skill; ``then`` gets the answer, once, in this call or later, from any thread.
@@ -38,7 +38,7 @@ class HookCaller(Protocol):
         ...
 
     def written(self, skill: str, hook: str) -> bool:
-        """Tell whether somebody wrote the hook (see ``hooks.unwritten``): then it may wait; else it need not be called."""
+        """Tell whether the hook is written (see ``hooks.unwritten``): then it may wait; else it need not be called."""
         ...
 
 
@@ -54,7 +54,7 @@ class LocalHooks:
         then(call_hook(self._hooks[execution.skill], execution, hook))
 
     def written(self, skill: str, hook: str) -> bool:
-        """Tell whether somebody wrote the hook."""
+        """Tell whether the hook is written."""
         return not getattr(getattr(self._hooks[skill], hook), "unwritten", False)
 
 

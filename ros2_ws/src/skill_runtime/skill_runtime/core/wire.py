@@ -114,7 +114,7 @@ def _stopped(value: object) -> object:
 
 
 def _nothing(_: object) -> None:
-    """Drop what nobody asks for."""
+    """Drop what is not asked for."""
 
 
 _RETURNS: Mapping[str, tuple[str, Callable[[Any], object]]] = {

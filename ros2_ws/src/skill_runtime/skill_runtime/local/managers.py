@@ -1,4 +1,4 @@
-"""All managers of one skillset in the process of whoever runs the world."""
+"""All managers of one skillset in the process that runs the world."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class VirtualMiddleware:
         bus: the world's.
         skillset: its name.
         model: of the managers' side.
-        on_raise: gets what a job raises; by default it goes on to whoever lets the world run.
+        on_raise: gets what a job raises; by default it goes on to the caller that lets the world run.
     """
 
     def __init__(
@@ -188,7 +188,7 @@ class VirtualMiddleware:
         on_reply: OnReply,
         on_error: OnError,
         *,
-        timeout_s: float = CALL_S,  # noqa: ARG002 - there is an answer, or nobody to give one
+        timeout_s: float = CALL_S,  # noqa: ARG002 - there is an answer at once, or none
         once: bool = False,  # noqa: ARG002 - no answer gets lost
     ) -> None:
         """Call a service."""

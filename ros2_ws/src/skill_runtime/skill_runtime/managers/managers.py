@@ -66,7 +66,7 @@ class Managers:
         self.middleware = middleware
         self.life = uuid.uuid4().hex[:12]
         self.on_step: list[OnStep] = []
-        """Called at each step, within it, before it is told to anybody else."""
+        """Called at each step, within it, before it is told to others."""
         make = make_inputs or _maker(hooks)
         self.engine = SkillsetEngine(
             skillset,

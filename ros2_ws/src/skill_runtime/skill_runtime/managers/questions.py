@@ -16,7 +16,7 @@ HOOK_ANSWERS_S = 10.0
 
 
 class Questions:
-    """Serves the questions; a hook that takes its time holds up nobody else."""
+    """Serves the questions; a hook that takes its time holds up no other caller."""
 
     def __init__(
         self,

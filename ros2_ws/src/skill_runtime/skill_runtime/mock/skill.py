@@ -132,7 +132,7 @@ class MockSkill(SkillHooks):
             self._move(run, _part(self._state.host.now_s - run.started_s, run.delay_s))
 
     def forget(self, execution_id: str) -> None:
-        """Take note that somebody else has ended an execution: what it moves has got there, what was still to come does not come."""
+        """Take note that an execution was ended from elsewhere: what it moves has got there, what was still to come does not come."""
         with self._state.lock:
             run = self._runs.pop(execution_id, None)
             if run is not None:

@@ -9,7 +9,7 @@ import functools
 import os
 import threading
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from action_msgs.msg import GoalInfo
 from action_msgs.srv import CancelGoal
@@ -22,13 +22,13 @@ from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnValue
 from skill_runtime.ros2.base import ID_DIGITS, RclpyBase
+from skill_runtime.ros2.calls import Calls, Discovery, Withdraw
 from skill_runtime.ros2.convert import fields_of, fill, ros_types, values_of
 from skill_runtime.ros2.names import SERVICE
 
-if TYPE_CHECKING:
-    from skill_runtime.ros2.calls import Calls, Withdraw
-
 UUID_BYTES = 16
+RESULTS_KEPT_S = 900
+"""How long after an execution's end (mission clock) its result can be asked for: rclpy's own default, whatever rcl's is."""
 GOAL_S = 60.0
 """How long a goal is offered to managers that don't answer; who has offered it gives up before."""
 _FEEDBACK_FIELDS = ("progress", "state")
@@ -81,6 +81,7 @@ class RclpyServer:
             goal_service_qos_profile=SERVICE,
             result_service_qos_profile=SERVICE,
             cancel_service_qos_profile=SERVICE,
+            result_timeout=RESULTS_KEPT_S,
         )
 
     def inputs_of(self, plain: Mapping[str, object]) -> dict[str, object]:
@@ -140,6 +141,7 @@ class RclpyLink:
         self._offers: dict[str, Withdraw] = {}
         place = f"skill/{skill}/_action"
         self._send = base.calls(f"{place}/send_goal", action.Impl.SendGoalService)
+        self._discovered = Discovery(lambda: self._send.ready)
         self._follow = base.resting_subscription(f"{place}/feedback", action.Impl.FeedbackMessage, self._on_feedback)
 
     @functools.cached_property
@@ -153,7 +155,7 @@ class RclpyLink:
     @property
     def connected(self) -> bool:
         """Tell whether the action is there; its other services are met when they are used first."""
-        return self._send.ready
+        return self._discovered()
 
     @property
     def input_types(self) -> dict[str, str]:
@@ -239,4 +241,4 @@ def _nothing(reason: str) -> None:
 
 
 def _unexpected(handle: Any) -> Any:
-    raise RuntimeError(f"goal {execution_id(handle.goal_id)} was executed by somebody else")
+    raise RuntimeError(f"goal {execution_id(handle.goal_id)} was executed elsewhere")

@@ -11,7 +11,7 @@ SERVICES = ("why", "pause", "transition", "get_data")
 
 
 class SkillsetClient(Client):
-    """The client of a skillset, served by whoever spins a node.
+    """The client of a skillset, served by the executor that spins a node.
 
     Args:
         node: whose executor serves the client.

@@ -1,7 +1,7 @@
 """Ends a busy loop of rclpy's executor over Fast DDS.
 
 A reader's status condition may be set after its message was taken already, because another entity had woken the executor: rmw_fastrtps
-8.4.3 then returns from each wait at once, with nothing ready, until the reader is taken from again (issue 833 of ros2/rmw_fastrtps).
+8.4.3 then returns from each wait at once, with nothing ready, until the reader is taken from again (rmw_fastrtps, issue 833).
 For a topic that is quiet for long, that is a core at work for nothing.
 """
 

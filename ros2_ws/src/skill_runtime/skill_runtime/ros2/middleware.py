@@ -19,6 +19,7 @@ from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, O
 from skill_runtime.plain import message_class
 from skill_runtime.ros2.actions import RclpyLink, RclpyServer
 from skill_runtime.ros2.base import RclpyBase
+from skill_runtime.ros2.calls import Discovery
 from skill_runtime.ros2.names import ALIVE, SERVICE, SOURCE, action_type, latched
 from skill_runtime.views import Sample
 
@@ -59,7 +60,7 @@ class RclpyMiddleware(RclpyBase):
             codec = TOPICS[topic.name]
             self.listen(self.name(topic.name), codec.kind, lambda message: callback(codec.decode(message)), latched(topic.keep))
             publishers = self.node.resolve_topic_name(self.name(topic.name))
-            return lambda: bool(self.node.count_publishers(publishers))
+            return Discovery(lambda: bool(self.node.count_publishers(publishers)))
         take: OnValue = lambda message: callback(Sample(message.data if topic.wrapped else message, None))  # noqa: E731
         if topic.outside:
             self.listen(topic.name, message_class(topic.type_name), take, SOURCE, events=None)

@@ -38,7 +38,7 @@ class RobotClient:
     def wait_ready(self, timeout_s: float, skillsets: Sequence[str] = ()) -> bool:
         """Wait (wall clock) until the skillsets (with none named: all) can be called; tell whether they can.
 
-        Spins the node when nobody does. Raises CannotWaitError on the thread that spins it.
+        Spins the node when no executor does. Raises CannotWaitError on the thread that spins it.
         """
         end = time.monotonic() + timeout_s
         names = skillsets or tuple(self.clients)

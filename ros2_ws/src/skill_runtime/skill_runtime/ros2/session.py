@@ -38,7 +38,7 @@ class Session:
         atexit.register(self.close)
 
     def follow_clock(self) -> None:
-        """Take the mission clock of ``/clock`` where somebody publishes one."""
+        """Take the mission clock of ``/clock`` where one is published."""
         if self.node.count_publishers("/clock"):
             self.node.set_parameters([Parameter("use_sim_time", value=True)])
 

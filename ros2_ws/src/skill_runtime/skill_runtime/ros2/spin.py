@@ -167,7 +167,7 @@ def nothing_more() -> None:
 def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop: Callable[[], None] = nothing_more) -> None:
     """Spin a node in a thread of its own until ``stop``; then end its executions while it still spins.
 
-    A callback that raises (most are of hooks) fails what runs, for nobody knows whose function is without its watch now;
+    A callback that raises (most are of hooks) fails what runs, as it is not known whose function is without its watch now;
     the managers live on.
     """
     # rclpy 7.1.6's EventsExecutor should be lighter, but knows no guard conditions and idles at 60 % of a core with action servers.

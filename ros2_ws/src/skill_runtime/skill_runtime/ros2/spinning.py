@@ -1,4 +1,4 @@
-"""How a thread waits for what an rclpy node brings: as long as somebody spins the node, and never for itself."""
+"""How a thread waits for what an rclpy node brings: as long as the node is spun, and never by its own spinning thread."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from skill_runtime.waiting import CannotWaitError
 LOOK_S = 0.5
 """How often (wall clock) a wait looks whether the node is still spun."""
 SPIN_S = 5.0
-"""How long (wall clock) a wait spins a node that nobody else spins, before it looks again."""
+"""How long (wall clock) a wait spins a node that no other thread spins, before it looks again."""
 PULSE_S = 30.0
 """A node whose executor turns nothing for so long (wall clock) is not spun any more."""
 
@@ -40,7 +40,7 @@ def spins_here(executor: object) -> bool:
 
 
 class SpunHost:
-    """Waits while others spin the node; spins it when nobody does."""
+    """Waits while others spin the node; spins it when it is not spun."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -71,7 +71,7 @@ class SpunHost:
         return event.is_set()
 
     def _spin(self, event: threading.Event, time_s: float) -> None:
-        """Spin the node in an executor of its own until the event, the time, or until somebody else takes the node."""
+        """Spin the node in an executor of its own until the event, the time, or until another executor takes the node."""
         executor = SingleThreadedExecutor(context=self._node.context)
         executor.add_node(self._node)
         end = time.monotonic() + time_s
