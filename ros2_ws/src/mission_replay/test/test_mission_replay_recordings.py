@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -93,25 +94,31 @@ plan = mapping.plan
 """
 
 
-@pytest.mark.parametrize("depth", ["skills", "functional"])
-def test_a_tree_with_its_branches_in_the_wrong_order_is_told(depth, tmp_path, capsys, monkeypatch):
+@pytest.mark.parametrize(("depth", "name"), [("skills", "mapping"), ("functional", "mapping"), ("sensors", "mapping-sensors")])
+def test_a_tree_with_its_branches_in_the_wrong_order_is_told(depth, name, tmp_path, capsys, monkeypatch):
     pytest.importorskip("uav_msgs")
     monkeypatch.setattr(mapping, "MappingMission", mapping.MappingMission)  # put back afterwards
     (tmp_path / "tree.py").write_text(WRONG_ORDER)
-    assert main([str(RECORDINGS / "mapping"), "--from", depth, "--tree", str(tmp_path / "tree.py")]) == OTHERWISE
+    assert main([str(RECORDINGS / name), "--from", depth, "--tree", str(tmp_path / "tree.py")]) == OTHERWISE
     said = capsys.readouterr().err
+    assert "decisions differ at 2." in said
     assert "then: start perception.zed_depthmap at 2." in said
     assert "now:  start perception.lidar_depthmap at 2." in said
+
+
+def weakened(folder: Path) -> Path:
+    """Write a perception whose depth map goes on without its camera, and return the file."""
+    text = (ALULA_ROOT / "skillsets/uav/perception.skill").read_text()
+    weak = text.replace("zed_ok: resource = (zed_status == OK)", "zed_ok: resource = (zed_status != UNKNOWN)")
+    assert weak != text
+    (folder / "perception.skill").write_text(weak)
+    return folder / "perception.skill"
 
 
 @pytest.mark.parametrize("depth", ["skills", "functional"])
 def test_a_weakened_invariant_is_told(depth, tmp_path, capsys):
     pytest.importorskip("uav_msgs")
-    text = (ALULA_ROOT / "skillsets/uav/perception.skill").read_text()
-    weak = text.replace("zed_ok: resource = (zed_status == OK)", "zed_ok: resource = (zed_status != UNKNOWN)")
-    assert weak != text
-    (tmp_path / "perception.skill").write_text(weak)
-    assert main([str(RECORDINGS / "mapping-zed"), "--from", depth, "--model", str(tmp_path / "perception.skill")]) == OTHERWISE
+    assert main([str(RECORDINGS / "mapping-zed"), "--from", depth, "--model", str(weakened(tmp_path))]) == OTHERWISE
     said = capsys.readouterr().err
     assert "then: interrupt navigation.goto_straight at 6." in said
     assert "now:  nothing" in said
@@ -150,6 +157,21 @@ def test_a_camera_that_is_made_to_die_in_the_measurements_is_decided_as_one_that
     assert decided(tmp_path / "changed") == decided(flown)
     changed, then = mission(tmp_path / "changed"), mission(flown)
     assert (changed["outcome"], changed["reason"].split(" (")[0]) == (then["outcome"], then["reason"].split(" (")[0])
+
+
+def test_an_invariant_that_is_weakened_is_told_when_a_camera_dies_in_the_measurements(tmp_path, capsys):
+    """The depth map ends as its hook finds it silent, two seconds after the invariant would have ended it."""
+    pytest.importorskip("uav_msgs")
+    words = ["--from", "sensors", "--fail", "zed@6", "--model", str(weakened(tmp_path))]
+    expected = RECORDINGS / "mapping-zed" / "expect.yaml"
+    assert main([str(RECORDINGS / "mapping-sensors"), *words, "--expect", str(expected)]) == OTHERWISE
+    said = capsys.readouterr().err
+    assert re.search(r"decisions differ at (7\.9|8\.0)", said), said
+    assert "now:  interrupt navigation.goto_straight" in said
+    line = next(number for number, text in enumerate(expected.read_text().splitlines(), 1) if "RESOURCE_INVARIANT_VIOLATED zed_ok" in text)
+    broken = next(text for text in said.splitlines() if text.startswith(f"{expected}:{line}: perception.zed_depthmap"))
+    assert broken.endswith("it never happens")
+    assert "perception.zed_depthmap TERMINATED LOST besides" in said
 
 
 def test_a_flight_whose_measurements_were_not_recorded_is_not_perceived_again(capsys):

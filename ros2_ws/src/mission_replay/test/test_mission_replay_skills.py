@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -84,15 +85,20 @@ def mapping_over_mocks(out: Path) -> MockedMission:
     return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(route), out=out)
 
 
+def pause_between(mission: MockedMission, *, pause_s: float, resume_s: float) -> None:
+    """Have the operator pause a mission and let it go on, seconds of its clock from now."""
+
+    def tell(command: str, act: Callable[[], object]) -> None:
+        mission._record.told(command, "")
+        act()
+
+    mission.world.clock.after(pause_s, lambda: tell("pause", mission.director.pause))
+    mission.world.clock.after(resume_s, lambda: tell("resume", mission.director.resume))
+
+
 def test_a_pause_is_decided_as_it_was(tmp_path):
     mission = mapping_over_mocks(tmp_path / "run")
-
-    def tell(command: str) -> None:
-        mission._record.told(command, "")
-        (mission.director.pause if command == "pause" else mission.director.resume)()
-
-    mission.world.clock.after(15.0, lambda: tell("pause"))
-    mission.world.clock.after(75.0, lambda: tell("resume"))
+    pause_between(mission, pause_s=15.0, resume_s=75.0)
     assert mission.run().outcome is Outcome.ACCOMPLISHED
     asked = [(kind, skill) for kind, _, skill, _ in requests(tmp_path / "run") if kind in {"pause", "resume"}]
     assert asked.count(("pause", "zed_depthmap")) == 3  # no mock can hold
@@ -107,13 +113,7 @@ def test_skills_hold_in_a_replay_where_they_held_then(tmp_path, monkeypatch):
     mission = mapping_over_mocks(tmp_path / "run")
     monkeypatch.setattr(MockSkill, "on_pause", lambda _self, execution: "" if execution.skill == "goto_straight" else "no")
     monkeypatch.setattr(MockSkill, "on_resume", lambda _self, _execution: "")
-
-    def tell(command: str) -> None:
-        mission._record.told(command, "")
-        (mission.director.pause if command == "pause" else mission.director.resume)()
-
-    mission.world.clock.after(15.0, lambda: tell("pause"))
-    mission.world.clock.after(18.0, lambda: tell("resume"))
+    pause_between(mission, pause_s=15.0, resume_s=18.0)
     assert mission.run().outcome is Outcome.ACCOMPLISHED
     asked = [(kind, skill) for kind, _, skill, _ in requests(tmp_path / "run") if kind in {"pause", "resume"}]
     assert (asked.count(("pause", "goto_straight")), asked.count(("resume", "goto_straight"))) == (1, 1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from alula_common.record import EVENTS, FILE, RecordError, RecordFollower
+from alula_common.record import EVENTS, FILE, MISSION, RecordError, RecordFollower
 from run_analysis.errors import AnalysisError
 from skill_runtime.core.events import EXECUTION, TRANSITION, EngineEvent, read_event
 
@@ -84,7 +84,7 @@ def _event(value: dict[str, Any], place: str) -> Logged:
 
 
 def _read_record(path: Path) -> Log | None:
-    """Return the log of a record; None where the file is an MCAP of something else."""
+    """Return the log of a record, empty where no skill was ever started; None where the file is an MCAP of something else."""
     follower = RecordFollower(path)
     try:
         entries = follower.poll()
@@ -92,7 +92,7 @@ def _read_record(path: Path) -> Log | None:
         raise AnalysisError(str(error)) from None
     cut = "" if follower.ended else follower.broken or "it was cut off"
     told = [entry for entry in entries if entry.topic == EVENTS]
-    if not told and follower.ended:
+    if follower.ended and not any(entry.topic in {EVENTS, MISSION} for entry in entries):
         return None
     return Log(path, tuple(_event(dict(entry.value), f"{path}: message at {entry.stamp_s:.3f} s") for entry in told), cut)
 

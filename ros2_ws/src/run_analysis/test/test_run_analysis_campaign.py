@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
+import signal
 import subprocess
 import sys
-import time
 from collections import Counter
 from dataclasses import asdict
 
@@ -16,7 +15,7 @@ from run_analysis_mocks import fly_recorded
 from alula_common.record import read_record
 from run_analysis.campaign.__main__ import main
 from run_analysis.campaign.coverage import cover, is_troubled, processes
-from run_analysis.campaign.failures import ARROW, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
+from run_analysis.campaign.failures import ARROW, FAULT, INVARIANT, PROCESS, RESULT, Failure, Way, failures_by, failures_in, ways_to_fail
 from run_analysis.campaign.flying import fly
 from run_analysis.campaign.plan import MOCKS, Flight, load_campaign
 from run_analysis.campaign.table import ROWS, Table
@@ -36,7 +35,21 @@ draw:
   at_s: [0, 60]
   lasts_s: [5, 9]
 """
-KILLED_AFTER_S = 120.0
+# The campaign's process is killed in the moment in which its first rows are in the table.
+KILLED_AFTER_FIRST_ROWS = """
+import os, signal, sys
+from run_analysis.campaign import __main__ as command
+from run_analysis.campaign.table import Table
+
+class Killed(Table):
+    def add(self, rows):
+        super().add(rows)
+        os.kill(os.getpid(), signal.SIGKILL)
+
+if __name__ == "__main__":
+    command.Table = Killed
+    sys.exit(command.main())
+"""
 
 
 def campaign_file(path, text):
@@ -59,6 +72,32 @@ def test_drawn_flights_are_those_of_the_file_and_more_of_them_change_none(tmp_pa
     assert all(4.8 <= seconds <= 9.2 for seconds in lasting)
 
 
+IN_TURN = """
+scenarios: [inspection, mapping, inspection]
+flights: 12
+draw:
+  in_turn:
+    mapping: [[], zed, [zed, lidar]]
+    inspection: [[{"radio:out": 5}], ["encoder:hung", {control: 0.5}], radio]
+  at_s: [3, 60]
+  lasts_s: [5, 9]
+"""
+
+
+def test_flights_take_the_lists_of_their_scenario_in_turn(tmp_path):
+    flights = load_campaign(campaign_file(tmp_path / "a.yaml", IN_TURN)).flights
+    taken = {scenario: [one.requests for one in flights if one.scenario == scenario] for scenario in ("mapping", "inspection")}
+    names = {scenario: [sorted(f"{fault.what}:{fault.how}" for fault in one) for one in several] for scenario, several in taken.items()}
+    assert names["mapping"] == [[], ["zed:"], ["lidar:", "zed:"], []]
+    assert names["inspection"] == ([["radio:out"], ["control:", "encoder:hung"], ["radio:"]] * 3)[:8]
+    lasting = {f"{fault.what}:{fault.how}": set() for one in taken["inspection"] for fault in one}
+    for fault in (fault for one in taken["inspection"] for fault in one):
+        lasting[f"{fault.what}:{fault.how}"].add(None if fault.end_s is None else round(fault.end_s - fault.begin_s, 6))
+    assert (lasting["radio:out"], lasting["control:"]) == ({5.0}, {0.5})
+    begins = [fault.begin_s for several in taken.values() for one in several for fault in one]
+    assert len(set(begins)) > len(begins) / 2, "times are drawn"
+
+
 def test_listed_flights_are_every_combination(tmp_path):
     text = "scenarios: [mapping]\nseeds: [1, 2]\nfaults: [[], [zed@30], [zed@30, lidar@40-50]]\n"
     flights = load_campaign(campaign_file(tmp_path / "a.yaml", text)).flights
@@ -78,8 +117,18 @@ WRONG = {
     "flights: 2\ndraw: {faults: [zed@3]}": "a.yaml:2: `zed@3` has a time",
     "flights: 2\ndraw: {faults: [zed], at_s: [9, 3]}": "a.yaml:2: `at_s` should be [from, to]",
     "flights: 2\nscenarios: [mapping, inspection]\ndraw: {faults: {mapping: zed}}": "a.yaml:3: `faults` says nothing of inspection",
+    "flights: 2\ndraw: {at_s: [0, 9]}": "a.yaml:2: `draw` needs `faults`, of which it draws, or `in_turn`",
+    "flights: 2\ndraw: {faults: [zed], in_turn: [zed]}": "a.yaml:2: `draw` needs `faults`, of which it draws, or `in_turn`",
+    "flights: 2\ndraw: {in_turn: [zed], most: 2}": "a.yaml:2: `most` says how many of `faults` are drawn",
+    "flights: 2\ndraw: {in_turn: []}": "a.yaml:2: `in_turn` has no list for mapping",
+    "flights: 2\ndraw: {in_turn: [zed@3]}": "a.yaml:2: `zed@3` has a time",
+    "flights: 2\ndraw: {in_turn: [{zed: 3, lidar: 4}]}": "a.yaml:2: a fault with its time is `{NAME: SECONDS}`",
+    "flights: 2\ndraw: {in_turn: [{zed: 0}]}": "a.yaml:2: how long a fault lasts should be a number from 0.1",
     "faults: [[zed@3-1]]": "a.yaml:1: fault 'zed@3-1'",
     "behaviour: no.yaml": "a.yaml:1: there is no file ",
+    "worlds: {mapping: no.yaml}": "a.yaml:1: `worlds` says where the simulator flies; mocks have none",
+    "over: simulator\nworlds: {mapping: no.yaml}": "a.yaml:2: there is no file ",
+    "over: simulator\nworlds: {inspection: no.yaml}": "a.yaml:2: `worlds` has no `inspection`; it may have mapping",
     "over: simulator\nbehaviour: no.yaml": "a.yaml:2: `behaviour` says what mocks do",
     "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has zed",
 }
@@ -145,22 +194,56 @@ def test_the_branch_that_answers_is_the_first_node_that_leads_elsewhere():
     assert (places.answer("a", "?"), places.answer("?", "a"), Places().answer("a", None)) == ("", "", "")
 
 
+def test_a_fault_is_answered_as_the_first_failure_after_it_and_before_the_next():
+    lost, blocked, unused = (Way(RESULT, f"navigation.goto {name}") for name in ("LOST", "BLOCKED", "ABORTED"))
+    failures = [
+        Failure(unused, 9.0, "not in use", "not in use"),
+        Failure(lost, 11.0, "come down", "navigation.hover", 0.5),
+        Failure(blocked, 31.0, "given up"),
+    ]
+    causes = [(Way(FAULT, name), at_s) for name, at_s in (("zed", 8.0), ("radio:out", 10.0), ("lidar", 20.0), ("control", 40.0))]
+    found = [(one.way.name, one.answered_by, one.skill, one.after_s) for one in failures_by(causes, failures)]
+    assert found == [
+        ("zed", "nothing failed", "nothing failed", None),
+        ("radio:out", "come down", "navigation.hover", 1.5),
+        ("lidar", "given up", "no skill", None),
+        ("control", "nothing failed", "nothing failed", None),
+    ]
+
+
+def test_the_rows_of_flights_over_mocks_tell_of_their_faults():
+    rows = fly([Flight(0, "mapping", 0, ("zed@10-20", "lidar@3000"))], MOCKS, (), "")
+    (fault,) = [failure for failure in rows[0]["failures"] if failure["kind"] == FAULT]
+    assert (fault["name"], fault["at_s"], fault["answered_by"]) == ("zed, ends again", 10.0, "LiDAR navigation")
+    assert 0.0 < fault["after_s"] < 1.0, "the fault that never came is none"
+
+
 def row(number=0, **other):
-    known = {"flight": number, "outcome": "degraded", "landed": True, "open": [], "problems": [], "collisions": 0, "conforms": True}
-    return {**known, "min_clearance_m": 1.0, "died": [], "failures": [], **other}
+    known = {
+        "flight": number,
+        "faults": [],
+        "outcome": "degraded",
+        "landed": True,
+        "open": [],
+        "problems": [],
+        "collisions": 0,
+        "conforms": True,
+    }
+    return {**known, "min_clearance_m": 1.0, "died": [], "exit_code": 0, "failures": [], **other}
 
 
 def test_the_coverage_counts_answers_and_keeps_the_worst():
     way, never = Way(INVARIANT, "a.b c"), Way(RESULT, "a.b BAD")
     failure = {"kind": way.kind, "name": way.name, "at_s": 3.0, "answered_by": "fall back", "skill": "a.hover", "after_s": 0.5}
     rows = [
-        row(0, failures=[failure]),
+        row(0, failures=[failure], faults=["zed:dark@900"]),
         row(1, failures=[{**failure, "after_s": 0.7}, {**failure, "answered_by": "come down", "after_s": 0.1}], min_clearance_m=0.4),
-        row(2, died=["mission"], outcome="given_up", conforms=False),
+        row(2, failures=[{**failure, "kind": PROCESS, "name": "mission"}], outcome="given_up", conforms=False),
     ]
     coverage = cover(rows, [way, never])
     told = coverage.as_dict()
-    assert told["tried"][0] == {
+    late = {"kind": FAULT, "name": "zed:dark"}
+    assert told["tried"][1] == {
         "kind": INVARIANT,
         "name": "a.b c",
         "times": 3,
@@ -169,17 +252,26 @@ def test_the_coverage_counts_answers_and_keeps_the_worst():
         "worst_recovery_s": 0.7,
         "worst_clearance_m": 0.4,
     }
-    assert (told["tried"][1]["name"], told["never"], told["troubled"]) == ("mission", [vars(never)], [2])
+    assert (told["tried"][0]["name"], told["never"], told["troubled"]) == ("mission", [late, vars(never)], [2])
     assert told["outcomes"] == {"degraded": 2, "given_up": 1}
     text, page = as_text(coverage), as_page(coverage, "a < b")
-    assert "never tried (1):\n  result: a.b BAD" in text
+    assert "never tried (2):\n  fault: zed:dark\n  result: a.b BAD" in text
     assert "2 fall back, 1 come down" in text
     assert "<title>a &lt; b</title>" in page
     assert page.count("<tr>") == 3
 
 
 @pytest.mark.parametrize(
-    "other", [{"conforms": False}, {"open": ["x"]}, {"collisions": 1}, {"landed": False}, {"problems": ["x"]}, {"outcome": "not_started"}]
+    "other",
+    [
+        {"conforms": False},
+        {"open": ["x"]},
+        {"collisions": 1},
+        {"landed": False},
+        {"problems": ["x"]},
+        {"outcome": "not_started"},
+        {"exit_code": 1},
+    ],
 )
 def test_what_must_not_be_is_trouble(other):
     assert not is_troubled(row())
@@ -213,13 +305,11 @@ def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(
 
 def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp_path):
     path, out = campaign_file(tmp_path / "a.yaml", DRAWN.replace("flights: 12", "flights: 14")), tmp_path / "out"
-    words = [sys.executable, "-m", "run_analysis.campaign", str(path), "--out", str(out)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=dict(os.environ)) as killed:
-        end = time.monotonic() + KILLED_AFTER_S
-        while not ((out / ROWS).is_file() and (out / ROWS).read_bytes().count(b"\n")):
-            assert time.monotonic() < end, "no flight was flown"
-            time.sleep(0.02)
-        killed.kill()
+    words = [str(path), "--out", str(out)]
+    killed = subprocess.run([sys.executable, "-c", KILLED_AFTER_FIRST_ROWS, *words], capture_output=True, timeout=300, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert 0 < (out / ROWS).read_bytes().count(b"\n") < 14
+    words = [sys.executable, "-m", "run_analysis.campaign", *words]
     assert subprocess.run(words, capture_output=True, timeout=300, check=False).returncode in {0, 1}
     flights = load_campaign(path).flights
     there = [json.loads(line) for line in (out / ROWS).read_text(encoding="utf-8").splitlines()]

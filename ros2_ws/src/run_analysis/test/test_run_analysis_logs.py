@@ -13,7 +13,7 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from alula_common.faults import parse_fault
-from alula_common.record import EVENTS, FILE, RecordWriter
+from alula_common.record import EVENTS, FILE, MISSION, RecordWriter
 from run_analysis.conform import main
 from run_analysis.logs import MESSAGE, read_log
 from run_analysis.mock_flights import load_flights
@@ -85,6 +85,14 @@ def test_every_kind_of_log_says_the_same(tmp_path, flown, capsys):
 def test_flights_of_the_whole_stack_conform(name, capsys):
     assert main([str(ROOT / "tests" / "recordings" / name)]) == 0
     assert ": conforms: " in capsys.readouterr().out
+
+
+def test_a_run_that_never_started_has_no_events_and_that_is_what_is_told(tmp_path, capsys):
+    writer = RecordWriter(tmp_path / FILE)
+    writer.write(MISSION, 0, {"scenario": "inspection"})
+    writer.close()
+    assert main([str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"alula conform: {tmp_path / FILE}: has no events of skillsets\n"
 
 
 def test_what_does_not_conform_is_told_and_ends_with_1(tmp_path, flown, capsys):

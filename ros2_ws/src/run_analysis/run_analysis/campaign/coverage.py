@@ -10,9 +10,13 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from run_analysis.campaign.failures import KINDS, NOBODY, PROCESS, Way
+from alula_common.faults import parse_fault
+from run_analysis.campaign.failures import FAULT, KINDS, Way, name_of
 
 Row = Mapping[str, Any]
+
+EXIT_CODES = {"accomplished": 0, "degraded": 0, "given_up": 1, "aborted": 1, "not_started": 2}
+"""How ``./alula fly`` ends, by the outcome of the mission."""
 
 
 @dataclass
@@ -45,7 +49,8 @@ class Coverage:
     flights: int
     outcomes: Mapping[str, int]
     troubled: Sequence[int]
-    """Flights that did not come to an end or conform, left something open, collided, did not land, or had problems."""
+    """Flights that did not come to an end or conform, left something open, collided, did not land, had problems, or an exit code that
+    does not say their outcome."""
 
     @property
     def never(self) -> list[Way]:
@@ -70,12 +75,12 @@ def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
         outcomes[str(row["outcome"])] += 1
         if is_troubled(row):
             troubled.append(int(row["flight"]))
+        for asked in row["faults"]:  # one that never came, because the flight was over before, has not been tried
+            way = Way(FAULT, name_of(parse_fault(asked)))
+            covers.setdefault(way, Cover(way))
         for failure in row["failures"]:
             way = Way(failure["kind"], failure["name"])
             _count(covers.setdefault(way, Cover(way)), row, str(failure["answered_by"]), failure["after_s"])
-        for name in row["died"]:
-            way = Way(PROCESS, name)
-            _count(covers.setdefault(way, Cover(way)), row, NOBODY, None)
     ordered = sorted(covers.values(), key=lambda one: (KINDS.index(one.way.kind), one.way.name))
     return Coverage(ordered, flights, dict(outcomes.most_common()), troubled)
 
@@ -83,7 +88,8 @@ def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
 def is_troubled(row: Row) -> bool:
     """Tell whether something is wrong with a flight, whatever failed in it."""
     unfinished = row["outcome"] in {"not_started", "running", None}
-    return bool(unfinished or not row["conforms"] or row["open"] or row["collisions"] or row["landed"] is False or row["problems"])
+    wrong = row["open"] or row["collisions"] or row["landed"] is False or row["problems"]
+    return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, EXIT_CODES.get(str(row["outcome"]))})
 
 
 def _count(one: Cover, row: Row, answer: str, after_s: float | None) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from alula_common.faults import FaultRequest
 from run_analysis.tree import Places
 from skill_model.conditions import NO_DATA, judge
 from skill_model.execution_state import ExecutionState as S
@@ -13,10 +15,12 @@ from skill_model.model import Invariant, Resource, ResourceIs, Result, ResultKin
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from skill_runtime.mock.behaviour import UNHAPPY_WORDS
 
-RESULT, INVARIANT, ARROW, PROCESS = "result", "invariant", "extern arrow", "process"
-KINDS = (RESULT, INVARIANT, ARROW, PROCESS)
-NOBODY = "no skill"
+FAULT, PROCESS, RESULT, INVARIANT, ARROW = "fault", "process", "result", "invariant", "extern arrow"
+KINDS = (FAULT, PROCESS, RESULT, INVARIANT, ARROW)
+NO_SKILL = "no skill"
 """The mission started none any more."""
+NO_FAILURE = "nothing failed"
+"""A fault, or the end of a process, after which no skill failed."""
 NO_NEED = "not in use"
 """A transition that broke no invariant: nothing that ran hung on it."""
 _EXTERN = "extern"
@@ -24,7 +28,11 @@ _EXTERN = "extern"
 
 @dataclass(frozen=True, order=True)
 class Way:
-    """One way to fail: ``name`` is ``skillset.skill RESULT``, ``skillset.skill invariant``, ``skillset.resource A -> B`` or a process."""
+    """One way to fail.
+
+    ``name`` is ``skillset.skill RESULT``, ``skillset.skill invariant``, ``skillset.resource A -> B``, a process, or a fault of the
+    command line without its times.
+    """
 
     kind: str
     name: str
@@ -43,8 +51,8 @@ class Failure:
 
     way: Way
     at_s: float
-    answered_by: str = NOBODY
-    skill: str = NOBODY
+    answered_by: str = NO_SKILL
+    skill: str = NO_SKILL
     after_s: float | None = None
 
 
@@ -100,6 +108,32 @@ def failures_in(events: Sequence[EngineEvent], known: Iterable[Way], places: Pla
     return [_answered(way, events, at, places) for at, way in told]
 
 
+def name_of(fault: FaultRequest) -> str:
+    """Return a fault without its times; one that ends is another than one that stays."""
+    return f"{replace(fault, begin_s=None, end_s=None)}{'' if fault.end_s is None else ', ends again'}"
+
+
+def failures_by(causes: Sequence[tuple[Way, float]], failures: Sequence[Failure]) -> list[Failure]:
+    """Return what failed by faults, or by processes that ended, as one failure each.
+
+    Each is answered as the first failure after it and before the next cause; its recovery counts from the cause.
+
+    Args:
+        causes: each with its time, seconds of mission clock, in the order of time.
+        failures: of the flight, in the order of time.
+    """
+    found: list[Failure] = []
+    for number, (way, at_s) in enumerate(causes):
+        until_s = causes[number + 1][1] if number + 1 < len(causes) else math.inf
+        first = next((one for one in failures if at_s <= one.at_s < until_s and one.answered_by != NO_NEED), None)
+        if first is None:
+            found.append(Failure(way, at_s, NO_FAILURE, NO_FAILURE))
+        else:
+            after_s = None if first.after_s is None else first.at_s - at_s + first.after_s
+            found.append(Failure(way, at_s, first.answered_by, first.skill, after_s))
+    return found
+
+
 def _ways_of(event: EngineEvent) -> Iterator[Way]:
     if isinstance(event, TransitionEvent):
         if event.cause == _EXTERN:
@@ -118,7 +152,7 @@ def _answered(way: Way, events: Sequence[EngineEvent], at: int, places: Places) 
     started = _started(events[at + 1 :])
     branch = places.answer(failed, None if started is None else started.id)
     if started is None:
-        return Failure(way, begun_s, branch or NOBODY)
+        return Failure(way, begun_s, branch or NO_SKILL)
     skill = f"{started.skillset}.{started.skill}"
     return Failure(way, begun_s, branch or skill, skill, started.stamp_s - begun_s)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import os
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from alula_common.record import RecordError, read_record
-from run_analysis.campaign.failures import Way, as_dict, failures_in, ways_to_fail
+from run_analysis.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
 from run_analysis.campaign.plan import SIMULATOR, Flight
 from run_analysis.conformance import Monitor
 from run_analysis.errors import AnalysisError
@@ -43,7 +44,7 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
     monitor = Monitor(scenario.skillsets)
     landed = _landed(flown.events)
     found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
-    found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": []}
+    found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
     return _row(flight, found, flown.events, monitor, ways, flown.places)
 
 
@@ -69,7 +70,11 @@ def _row(
     """Return a row; ``found`` is how the flight went besides its events."""
     for event in events:
         monitor.take(event)
-    failures = failures_in(events, ways, places)
+    failures, origin_s = failures_in(events, ways, places), origin_of(events)
+    ended_s = events[-1].stamp_s if events else -math.inf
+    begun = [(Way(FAULT, name_of(fault)), origin_s + (fault.begin_s or 0.0)) for fault in flight.requests]
+    died = [(Way(PROCESS, one["name"]), origin_s + (one["when_s"] or 0.0)) for one in found["died"]]
+    every = [*failures_by([cause for cause in begun if cause[1] <= ended_s], failures), *failures_by(died, failures), *failures]
     return {
         "flight": flight.number,
         "scenario": flight.scenario,
@@ -79,7 +84,7 @@ def _row(
         "duration_s": round(events[-1].stamp_s - events[0].stamp_s, 6) if events else 0.0,
         "events": len(events),
         "conforms": monitor.verdict.conforms,
-        "failures": [as_dict(failure, origin_of(events)) for failure in failures],
+        "failures": [as_dict(failure, origin_s) for failure in every],
     }
 
 
@@ -94,20 +99,24 @@ def _simulated(flight: Flight, out: Path) -> Row:
             break
         folder = out / f"flight-{flight.number:05d}-{number}"
     words = [str(Path(os.environ["ALULA_ROOT"]) / "alula"), "fly", flight.scenario, "--seed", str(flight.seed), "--rate", "0"]
+    if flight.world is not None:
+        words += ["--world", str(flight.world.absolute())]
     for fault in flight.faults:
         words += ["--fail", fault]
     done = subprocess.run([*words, "--out", str(folder)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        run, places = load_run(folder), places_in(read_record(folder))
-    except (OSError, ValueError, AnalysisError, RecordError):
+    except (OSError, ValueError):
         said = (done.stderr.strip() or done.stdout.strip()).splitlines()
-        summary, run = {"outcome": "not_started", "reason": said[-1] if said else ""}, Run(folder, ())
-        places = Places()
+        summary = {"outcome": "not_started", "reason": said[-1] if said else ""}
+    try:
+        run, places = load_run(folder), places_in(read_record(folder))
+    except (AnalysisError, RecordError):  # no skill was ever started
+        run, places = Run(folder, ()), Places()
     names = dict.fromkeys(event.skillset for event in run.events)
     ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
     found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
-    found |= {"problems": summary.get("problems") or [], "died": [one["name"] for one in summary.get("died") or ()]}
+    found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
     models = models_of(names)
     return _row(flight, found, run.events, Monitor(models), ways_to_fail(models), places)

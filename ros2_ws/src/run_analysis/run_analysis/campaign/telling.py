@@ -17,7 +17,7 @@ _HEAD = ("way to fail", "times", "answered by", "outcomes", "worst recovery", "w
 
 
 def counted(names: dict[str, int]) -> str:
-    """Return ``12 navigation.hover, 3 nobody``."""
+    """Return ``12 navigation.hover, 3 no skill``."""
     return ", ".join(f"{times} {name}" for name, times in names.items())
 
 
