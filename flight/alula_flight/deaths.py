@@ -16,7 +16,7 @@ class Consequence(Enum):
 
     GO_ON = "go on"  # roslaunch starts it again, or the run can do without
     ABORT = "abort the mission"  # the mission can still land the vehicle
-    LAND = "land the vehicle"  # nobody decides any more
+    LAND = "land the vehicle"  # no mission decides any more
     END = "end the run"  # there is nothing left to fly
 
 
@@ -30,7 +30,7 @@ CONSEQUENCES = {
 
 @dataclass(frozen=True)
 class Death:
-    """A process that ended although nobody had told it to.
+    """A process that ended without being told to.
 
     ``when_s``: absolute mission clock, None before it runs. ``respawned``: the launch file has it started again.
     """

@@ -128,7 +128,7 @@ def parse(arguments: list[str]) -> RunSpec:
         run_id=uuid.uuid4().hex,
         seed=given.seed,
         rate=1.0 if given.rate is None else given.rate,
-        faults=read_faults(given.fail, None if given.mock else {**FAULTS, **dict(scenario.faults)}),
+        faults=read_faults(given.fail, {**FAULTS, **dict(scenario.faults)}, others=given.mock),
         world=read_world(given.world or scenario.world),
         autopilot=given.autopilot,
         sensors=read_sensors(given.sensors or ""),
@@ -252,7 +252,7 @@ class Front:
                 self._supervisor_died(supervisor.returncode, live)
             live.show_new()
         finally:
-            # At the second Ctrl-C nobody is asked: a supervisor that is told politely would still try to land.
+            # At the second Ctrl-C the run is ended at once: a supervisor that is told politely would still try to land.
             end_run(self._spec.run_id, patience_s=0.0 if self._interrupts.at_once else PATIENCE_S)
             supervisor.wait()
             sweep_shared_memory()

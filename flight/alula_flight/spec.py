@@ -32,10 +32,10 @@ def read_scenario(name: str) -> Scenario:
         raise RequestError(str(error)) from None
 
 
-def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:
-    """Check what `--fail` asks for, and return it as everybody writes it. ``known`` None: somebody else knows what there is to break."""
+def read_faults(texts: Sequence[str], known: Mapping[str, Sequence[str]], *, others: bool = False) -> tuple[str, ...]:
+    """Check what `--fail` asks for, and return it in the form that all parts read. ``others``: mocks may have things to break besides."""
     try:
-        return tuple(str(parse_fault(text, known)) for text in texts)
+        return tuple(str(parse_fault(text, None if others and parse_fault(text).what not in known else known)) for text in texts)
     except FaultError as error:
         raise RequestError(f"--fail: {error}") from None
 

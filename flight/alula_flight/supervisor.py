@@ -124,7 +124,7 @@ class Supervisor:
 
     @property
     def front_died(self) -> bool:
-        """Tell whether nobody is left who makes the report."""
+        """Tell whether the front, which makes the report, has died."""
         return self._front_died
 
     def run(self) -> int:
@@ -207,7 +207,7 @@ class Supervisor:
                 os.kill(mission.popen.pid, signal.SIGINT)
 
     def _land(self) -> None:
-        """Land through the guidance, because nobody decides any more; return when the vehicle is down or it takes too long.
+        """Land through the guidance, because no mission decides any more; return when the vehicle is down or it takes too long.
 
         Nothing is done where the vehicle is down already, or where the pilot has it.
         """

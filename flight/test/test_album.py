@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
-import time
+from collections.abc import Callable
 from pathlib import Path
+from queue import Queue
 from types import SimpleNamespace
 
 import cv2
@@ -59,23 +60,43 @@ def test_pictures_of_hours_are_not_many_more() -> None:
     assert count(4 * 3600.0) < 1600
 
 
-def test_a_camera_is_followed_from_when_it_publishes(ros_master: str, tmp_path: Path) -> None:
-    import rospy
-    from sensor_msgs.msg import Image
+class Camera:
+    """A camera that publishes one image to each subscriber as it comes, stamped with the time of its coming."""
 
-    Album(tmp_path).listen()
-    publisher = rospy.Publisher(CAMERAS["depth"], Image, queue_size=1)
-    metres = np.full((36, 64), 5.0, np.float32)
-    message = Image(height=36, width=64, encoding="32FC1", step=256, data=metres.tobytes())
-    path, end = tmp_path / "pictures.jsonl", time.monotonic() + 60.0
-    connected: list[int] = []
-    while (not path.exists() or path.read_text().count("\n") < 2) and time.monotonic() < end:
+    def __init__(self, topic: str) -> None:
+        import rospy
+        from sensor_msgs.msg import Image
+
+        listener = rospy.SubscribeListener()
+        listener.peer_subscribe = self._subscribed
+        self.stamps_s: list[float] = []
+        self._publisher = rospy.Publisher(topic, Image, subscriber_listener=listener, queue_size=1)
+
+    def _subscribed(self, _topic: str, _publish: object, publish_to_it: Callable[[object], None]) -> None:
+        import rospy
+        from sensor_msgs.msg import Image
+
+        metres = np.full((36, 64), 5.0, np.float32)
+        message = Image(height=36, width=64, encoding="32FC1", step=256, data=metres.tobytes())
         message.header.stamp = rospy.Time.now()
-        publisher.publish(message)
-        connected.append(publisher.get_num_connections())
-        rospy.sleep(0.02)
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
+        self.stamps_s.append(message.header.stamp.to_sec())
+        publish_to_it(message)
+
+
+def test_a_camera_is_subscribed_to_for_one_image_a_second(ros_master: str, tmp_path: Path) -> None:
+    written: Queue[float] = Queue()
+
+    class Watched(Album):
+        def add(self, camera: str, stamp_s: float, message: object) -> None:
+            super().add(camera, stamp_s, message)
+            written.put(stamp_s)
+
+    Watched(tmp_path).listen()
+    camera = Camera(CAMERAS["depth"])
+    stamps_s = [written.get(timeout=60.0) for _ in range(2)]
+    lines = [json.loads(line) for line in (tmp_path / "pictures.jsonl").read_text().splitlines()]
     assert [line["camera"] for line in lines] == ["depth"] * 2
-    assert lines[1]["stamp_s"] - lines[0]["stamp_s"] >= 0.9
+    assert [line["stamp_s"] for line in lines] == [round(stamp_s, 3) for stamp_s in stamps_s]
+    assert stamps_s[1] - stamps_s[0] >= 0.9
     assert base64.b64decode(lines[0]["jpeg"])[:2] == b"\xff\xd8"
-    assert 0 in connected[connected.index(1) :], "it listens for one image at a time"
+    assert camera.stamps_s[:2] == pytest.approx(stamps_s), "each image was asked for by a subscription of its own"

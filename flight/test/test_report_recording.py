@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 from pathlib import Path
@@ -51,6 +52,15 @@ def test_what_the_page_is_told_of_the_bag(tmp_path):
         (HEALTH, LIFT_OFF_S, {"sensor": "zed", "ok": True, "fault": "", "reason": ""}),
         (HEALTH, LIFT_OFF_S + 5.3, {"sensor": "zed", "ok": False, "fault": "silent", "reason": "it is silent"}),
     ]
+
+
+def test_the_page_is_told_of_sensors_and_processes_that_were_made_to_fail_in_the_order_of_time(tmp_path):
+    faults = [{"sensor": "zed", "mode": mode, "t_s": LIFT_OFF_S + t_s} for mode, t_s in (("dark", 3.0), ("ok", 7.0))]
+    write_bag(tmp_path / "functional.bag", poses=STRAIGHT, states=[{**STATE, "faults": faults}])
+    killed = (FaultChange("encoder", "killed", LIFT_OFF_S + 5.0),)
+    recording = dataclasses.replace(read_recording(tmp_path, Problems()), processes=killed)
+    told = [(t_s - LIFT_OFF_S, value["sensor"], value["mode"]) for topic, t_s, value in page_entries(recording, None) if topic == FAULT]
+    assert told == [(3.0, "zed", "dark"), (5.0, "encoder", "killed"), (7.0, "zed", "ok")]
 
 
 def test_the_last_whole_state_of_the_simulator_counts(tmp_path):

@@ -9,6 +9,7 @@ from alula_flight.report.events import History
 from alula_flight.report.phases import Phases
 from alula_flight.report.recording import FaultChange, Recording
 from alula_flight.report.recovery import find_recovery
+from alula_flight.report.timeline import make_timeline
 from alula_flight.report.video import RadioState, Video, radio_lost_s
 
 LIFT_OFF_S = 100.0
@@ -35,8 +36,10 @@ def test_a_stream_that_no_criterion_ended_lost_no_radio():
     assert radio_lost_s(Video(radio=(RadioState(1.0, "out", "", 0.0),), end_s=22.0), Phases()) is None
 
 
-@pytest.mark.parametrize(("killed_s", "failure_s"), [(110.0, 110.0), (None, 112.5)])
-def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s):
+@pytest.mark.parametrize(("killed_s", "failure_s", "failed"), [(110.0, 110.0, "ground_station"), (None, 112.5, "radio")])
+def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s, failed):
     killed = () if killed_s is None else (FaultChange("ground_station", "killed", killed_s),)
     recovery = find_recovery(load_scenario("inspection"), History(), Recording(processes=killed), Phases(), radio_lost_s=112.5)
-    assert recovery.failure_s == failure_s
+    assert (recovery.failure_s, recovery.failed) == (failure_s, failed)
+    (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery)["marks"]
+    assert (mark["t_s"], mark["label"]) == (failure_s - 100.0, f"{failed} fails")

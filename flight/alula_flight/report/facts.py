@@ -9,7 +9,7 @@ from typing import TypedDict
 
 
 class Death(TypedDict):
-    """A process that ended although nobody had told it to. ``when_s``: absolute mission clock, None if unknown."""
+    """A process that ended without being told to. ``when_s``: absolute mission clock, None if unknown."""
 
     name: str
     when_s: float | None

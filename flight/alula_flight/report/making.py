@@ -17,7 +17,7 @@ from alula_flight.report.mocked import MockSummary, read_mock
 from alula_flight.report.page import page_entries
 from alula_flight.report.phases import Phases, find_phases
 from alula_flight.report.recording import Recording, read_process_faults, read_recording
-from alula_flight.report.recovery import Recovery, find_recovery, injected
+from alula_flight.report.recovery import Recovery, find_recovery
 from alula_flight.report.summary import Summary, summarise
 from alula_flight.report.timeline import make_timeline
 from alula_flight.report.timeline_picture import draw_timeline
@@ -53,8 +53,8 @@ class Account:
 
     @property
     def failed(self) -> str:
-        """The first sensor that was made to fail, or nothing."""
-        return next((fault.sensor for fault in injected(self.recording)), "")
+        """What failed first, or nothing."""
+        return "" if self.recovery is None else self.recovery.failed
 
 
 def make_report(facts: RunFacts) -> Summary:
@@ -107,7 +107,7 @@ def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account
 def _draw_pictures(facts: RunFacts, account: Account, truth: Truth, problems: Problems) -> None:
     folder, title = facts.out_dir, _title(facts)
     with problems.survive("timeline"):
-        timeline = make_timeline(account.history, account.phases, account.recovery, account.failed)
+        timeline = make_timeline(account.history, account.phases, account.recovery)
         write_json(folder / "timeline.json", timeline)
         write_aside(folder / "timeline.svg", lambda aside: draw_timeline(timeline, aside, title=title))
         if account.video.frames:

@@ -3,7 +3,7 @@
 What was in reach depends on the planned route alone, never on what was flown. A surface patch is in reach if, from some point
 of the route, it lies beside the leg (within 30 degrees of the plane across it), within 10 m horizontally, hidden by nothing
 and not seen edge-on. Beside, because a survey sweeps across its legs: what lies before the first point and behind the last
-is nobody's. 10 m, because that is what one leg is for: the LiDAR reaches 25 m, but there it meets the ground at a grazing
+belongs to no leg. 10 m, because that is what one leg is for: the LiDAR reaches 25 m, but there it meets the ground at a grazing
 angle, with gaps wider than the patches.
 """
 

@@ -1,4 +1,4 @@
-"""When a flight left the ground, began to fly, began to land and touched down, from whoever can tell."""
+"""When a flight left the ground, began to fly, began to land and touched down, from the records that tell it."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ class Recording:
 
     @property
     def path(self) -> Track | None:
-        """The true path, or the estimated one on a vehicle whose true path nobody knows."""
+        """The true path, or the estimated one on a vehicle whose true path is not known."""
         return self.truth or self.estimate
 
 

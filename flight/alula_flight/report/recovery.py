@@ -22,12 +22,13 @@ STAMP_TOLERANCE_S = 0.05
 
 @dataclass(frozen=True)
 class Recovery:
-    """Absolute seconds of mission clock; None: not known, or it did not happen."""
+    """Absolute seconds of mission clock; None: not known, or it did not happen. ``failed``: what failed; empty: not known."""
 
     failure_s: float | None
     detected_s: float | None
     fallback_running_s: float | None
     moving_again_s: float | None
+    failed: str = ""
 
 
 def injected(recording: Recording) -> tuple[FaultChange, ...]:
@@ -48,22 +49,23 @@ def find_recovery(
     broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN]
     if not faults and not broken and radio_lost_s is None:
         return None
-    failure_s = _failure(recording, radio_lost_s)
+    failure_s, failed = _failure(recording, radio_lost_s)
     since_s = -np.inf if failure_s is None else failure_s - STAMP_TOLERANCE_S
     violated = [e.end_s for e in history.executions if (e.outcome == VIOLATED or e.result == LOST) and e.end_s is not None]
     detected_s = _first([*broken, *violated], since_s)
     fallback_s = _fallback(scenario.fallback, history.executions, since_s if detected_s is None else detected_s)
     motion_s = None if fallback_s is None else _first(_running_stamps(history, scenario.motion), fallback_s)
     moving_s = None if motion_s is None or recording.path is None else moving_again(recording.path, motion_s, phases.landing_s)
-    return Recovery(failure_s, detected_s, fallback_s, moving_s)
+    return Recovery(failure_s, detected_s, fallback_s, moving_s, failed)
 
 
-def _failure(recording: Recording, radio_lost_s: float | None) -> float | None:
-    """Return when the first failure happened; a process that died is not told as the radio, whatever that was like."""
+def _failure(recording: Recording, radio_lost_s: float | None) -> tuple[float | None, str]:
+    """Return when the first failure happened, and of what; a process that died is not told as the radio, whatever that was like."""
     dead = [fault.t_s for fault in recording.processes if fault.mode != MENDED]
-    if dead or radio_lost_s is None:
-        return min((fault.t_s for fault in injected(recording)), default=None)
-    return radio_lost_s
+    if radio_lost_s is not None and not dead:
+        return radio_lost_s, "radio"
+    first = next(iter(injected(recording)), None)
+    return (None, "") if first is None else (first.t_s, first.sensor)
 
 
 def _running_stamps(history: History, skills: tuple[str, ...]) -> list[float]:

@@ -74,15 +74,15 @@ class Timeline(TypedDict):
     marks: list[Mark]
 
 
-def make_timeline(history: History, phases: Phases, recovery: Recovery | None, failed: str) -> Timeline:
-    """Arrange the history; ``failed`` names the sensor that broke first (empty: none, or unknown)."""
+def make_timeline(history: History, phases: Phases, recovery: Recovery | None) -> Timeline:
+    """Arrange the history."""
     begin_s, end_s = phases.since(history.first_s) or 0.0, phases.since(history.last_s) or 0.0
     return Timeline(
         begin_s=begin_s,
         end_s=end_s,
         skills=_skill_rows(skills(history, phases), end_s),
         resources=_resource_rows(history.transitions, phases, begin_s, end_s),
-        marks=_marks(phases, recovery, failed),
+        marks=_marks(phases, recovery),
     )
 
 
@@ -118,11 +118,11 @@ def _resource_rows(transitions: tuple[TransitionEvent, ...], phases: Phases, beg
     return sorted(rows.values(), key=lambda row: skillsets.index(row["skillset"]))
 
 
-def _marks(phases: Phases, recovery: Recovery | None, failed: str) -> list[Mark]:
+def _marks(phases: Phases, recovery: Recovery | None) -> list[Mark]:
     if recovery is None:
         return []
     moments = [
-        (recovery.failure_s, "failure", f"{failed or 'sensor'} fails"),
+        (recovery.failure_s, "failure", f"{recovery.failed or 'sensor'} fails"),
         (recovery.detected_s, "detected", "detected"),
         (recovery.fallback_running_s, "fallback", "fallback runs"),
         (recovery.moving_again_s, "moving", "moves again"),

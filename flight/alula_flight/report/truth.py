@@ -84,7 +84,7 @@ def _cruise_begins(track: Track, height: NDArray[np.float64], phases: Phases) ->
 
 
 def _landing_begins(track: Track, height: NDArray[np.float64], phases: Phases) -> float:
-    """Return the beginning of the landing; if nobody told of one, the last moment above 2 m, if the flight ended at all."""
+    """Return the beginning of the landing; if none was recorded, the last moment above 2 m, if the flight ended at all."""
     if phases.landing_s is not None:
         return phases.landing_s
     high = track.t_s[height >= CRUISE_HEIGHT_M]

@@ -1,4 +1,4 @@
-"""Who may see the page, and who may talk to its server."""
+"""Which requests may see the page and talk to its server."""
 
 from __future__ import annotations
 

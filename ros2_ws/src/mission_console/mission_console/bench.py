@@ -28,6 +28,8 @@ from alula_common.files import write_json
 from alula_common.network import free_port
 from alula_common.record import DATA, EVENTS, FILE, TREE, RecordWriter
 
+QUICK_HOURS, QUICK_S = 0.5, 10.0
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -186,7 +188,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--rate", type=float, default=20.0, help="entries a second while it goes on (default 20)")
     parser.add_argument("--seconds", type=float, default=30.0, help="how long it goes on (default 30)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
+    parser.add_argument("--quick", action="store_true", help="half an hour, gone on with for 10 s: for a first look, not for comparing")
     options = parser.parse_args(arguments)
+    if options.quick:
+        options.hours, options.seconds = QUICK_HOURS, QUICK_S
     with tempfile.TemporaryDirectory(prefix="alula-bench-") as folder:
         figures = measure(Path(folder), options)
     for name, value in asdict(figures).items():

@@ -1,4 +1,4 @@
-"""What viewers may ask the server to do: who commands, what the request means, and what of it goes into the run's record."""
+"""What viewers may ask the server to do: what a request means, and what of it goes into the run's record."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run's viewers share: its entries so far, as JSON. Each viewer is sent them from where it is; nothing is queued for anybody."""
+"""What a run's viewers share: its entries so far, as JSON. Each viewer is sent them from where it is; no viewer has a queue."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Place:
 
 
 class Feed:
-    """The entries of one run. ``session`` names this life of the feed: who comes with another one begins again."""
+    """The entries of one run. ``session`` names this life of the feed: a viewer that comes with another one begins again."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

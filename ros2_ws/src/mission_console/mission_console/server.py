@@ -43,7 +43,7 @@ SHOWN_RUNS = 20
 
 @dataclass(eq=False)
 class Viewer:
-    """One that watches. ``key`` is its own secret: who comes back with it is the same."""
+    """A connection that watches. ``key`` is its own secret: a connection that comes back with it is the same viewer."""
 
     connection: ServerConnection
     key: str
@@ -173,7 +173,7 @@ class Console:
     async def _serve_viewer(self, connection: ServerConnection) -> None:
         with contextlib.suppress(ConnectionClosed, TimeoutError, ValueError):
             hello = _object(await asyncio.wait_for(connection.recv(), HELLO_S))
-            viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "somebody")[:40])
+            viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "a viewer")[:40])
             viewer.run, viewer.hands = str(hello.get("run") or ""), hello.get("hands") is True
             self._viewers.add(viewer)
             self._commander = self._commander or viewer.key

@@ -1,4 +1,4 @@
-"""A console that is served, and those who talk to it over real sockets on loopback."""
+"""A console that is served, and clients that talk to it over real sockets on loopback."""
 
 from __future__ import annotations
 

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mission_console_records import HOSTILE, LIFT_OFF_S, Story, failing_story, tree, write_record
+from mission_console_records import HOSTILE, LIFT_OFF_S, Story, execution, failing_story, transition, tree, write_record
 
 from alula_common.network import free_port
 from alula_common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
+from mission_console.acts import ActError, Flight
 from mission_console.admission import Admission
 from mission_console.page import REPORT, write_report
 from mission_console.server import Console
@@ -101,13 +102,20 @@ UNNAMED = (
     "!(one.textContent.trim() || one.getAttribute('aria-label') || one.alt || one.closest('label'))).map((one) => one.outerHTML)"
 )
 """Controls and pictures that a screen reader has no name for."""
+ANSWERS = (
+    "[...document.querySelectorAll('#answers tbody tr')].map((row) => [...row.children].map((cell) =>"
+    "(cell.tagName === 'TH' ? cell.firstChild : cell).textContent).join(' | '))"
+)
+"""The rows of what failed, when, what was done, what it cost."""
 
 
 def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser: Any, tmp_path: Path) -> None:
     page = Page(browser, make_report(tmp_path))
     page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
     assert page.text("#headline") == "Mission accomplished in degraded mode"
+    assert page.text("#reason") == "zed failed (dead, injected) at 29.90 s"
     assert "The zed was made to fail (dead)." in page.text("#lines")
+    assert "perception.zed_depthmap was stopped, its invariant zed_ok was violated: zed_status is BROKEN." in page.text("#lines")
     assert "29.80 sThe process zed_depth died: signal 11." in page.text("#lines li")
     steps = page.text(".chain li").split(" | ")
     assert [step.partition("2")[0] for step in steps[:1]] == ["failure"]
@@ -117,7 +125,11 @@ def test_the_report_says_what_failed_when_what_was_done_and_what_it_cost(browser
     assert "perception.zed_status: OK → BROKEN, reported by the functional layer" in steps[2]
     assert "“ZED navigation” failed" in steps[5]
     assert "“navigate” went on with “LiDAR navigation”" in steps[6]
-    assert "0.10 s from the failure to its detection | 0.60 s from the failure until the fallback watched" in page.text("#costs li")
+    rows = [row.split(" | ") for row in page.run(ANSWERS)]
+    assert [row[:2] for row in rows] == [["zed failed (dead, injected)", "29.90 s"], ["the whole mission", ""]]
+    assert "the mission fell back from “ZED navigation” to “LiDAR navigation”; started lidar_depthmap" in rows[0][2]
+    assert rows[0][3] == "noticed after 0.10 s; the fallback ran after 0.60 s; the vehicle moved on after 4.10 s"
+    assert rows[1][2:] == ["mission accomplished in degraded mode; landed", "no waypoint was missed; nothing was hit"]
     assert page.complaints() == []
 
 
@@ -212,11 +224,133 @@ def test_a_failure_in_a_pause_is_told_with_what_was_done_when_the_mission_went_o
     chain = page.text(".chain b").split(" | ")
     assert chain[-3:] == ["branch", "decision", "started"]
     assert page.text("#lines li").count("The mission is paused") == 1
-    assert "69.9 s paused" in page.text("#costs li")
-    assert "90.00 sReaction: “navigate” went on with “LiDAR navigation”" in page.text("#lines li")
+    rows = [row.split(" | ") for row in page.run(ANSWERS)]
+    paused = ["no failure: the operator had the mission pause", "20.00 s until 89.90 s", "navigation.goto holds", "69.9 s paused"]
+    assert rows[0] == paused
+    assert rows[1][0] == "zed failed (dead, injected)"
+    assert "90.00 sReaction: the mission fell back from “ZED navigation” to “LiDAR navigation”" in page.text("#lines li")
     assert "paused 20.00 s" in page.text("#timeline text")
     assert "goes on 89.90 s" in page.text("#timeline text")
     assert page.complaints() == []
+
+
+def lost_video() -> Story:
+    """Return the entries of an inspection whose ground station is killed; the autopilot's failsafe overtakes the reaction."""
+    start, why = LIFT_OFF_S, "sdk_authority: SDK_authority is UNAVAILABLE"
+    inspect, lost = ({"kind": "sequence", "skill": "", "message": "", "children": []} for _ in range(2))
+
+    def shape(first: str, second: str, third: str) -> dict[str, Any]:
+        stream = {**inspect, "name": "send the video", "kind": "skill", "skill": "video.stream", "status": first}
+        land = {**lost, "name": "land", "kind": "skill", "skill": "navigation.land", "status": second}
+        branches = [
+            {**inspect, "name": "inspect", "status": first, "children": [stream]},
+            {**lost, "name": "the video was lost", "status": second, "children": [land]},
+            {**lost, "name": "given up", "status": third},
+        ]
+        return {**inspect, "name": "inspection", "kind": "selector", "status": "RUNNING", "children": branches}
+
+    def guided(t_s: float, mode: str) -> tuple[float, str, dict[str, Any]]:
+        return (start + t_s, "/data", {"skillset": "navigation", "data": "guidance_state", "value": {"mode": mode}, "stamp_s": 0.0})
+
+    picture = {"skillset": "video", "data": "picture", "value": {"fps_margin": -6}, "stamp_s": 1.0}
+    low = execution("video.stream", "RESOURCE_INVARIANT_VIOLATED", 2, result="enough_frames", message="picture.fps_margin is -6 for 1 s")
+    return [
+        (start - 3, MISSION, {"scenario": "inspection", "outcome": "running", "reason": "", "waypoints": 10, "waypoints_reached": 0}),
+        (start, EVENTS, transition("navigation.flight_status", "ON_GROUND", "IN_AIR")),
+        (start + 1, EVENTS, execution("video.stream", "RUNNING", 1)),
+        (start + 2, EVENTS, execution("navigation.goto", "RUNNING", 1)),
+        (start + 1, TREE, shape("RUNNING", "INVALID", "INVALID")),
+        guided(2.0, "GUIDED"),
+        (start + 40, "/fault", {"sensor": "ground_station", "mode": "killed"}),
+        (start + 43, "/data", picture),
+        (start + 43, EVENTS, low),
+        (start + 43, TREE, shape("FAILURE", "RUNNING", "INVALID")),
+        (start + 43.02, EVENTS, execution("navigation.goto", "INTERRUPTED", 2)),
+        (start + 43.04, EVENTS, execution("navigation.hover", "RUNNING", 3)),
+        (start + 43.06, EVENTS, execution("navigation.hover", "FAILED", 4, message="refused")),  # the reaction before is not its own
+        guided(45.0, "RTL"),
+        (start + 45, EVENTS, transition("navigation.SDK_authority", "AVAILABLE", "UNAVAILABLE")),
+        (start + 45, EVENTS, execution("navigation.land", "NOT_READY", 3, result="sdk_authority", message=why)),
+        (start + 45, TREE, shape("FAILURE", "FAILURE", "RUNNING")),
+        (start + 57, EVENTS, transition("navigation.flight_status", "IN_AIR", "ON_GROUND")),
+        (start + 58, MISSION, {"outcome": "given_up", "reason": why, "waypoints": 10, "waypoints_reached": 2, "end_s": start + 58}),
+    ]
+
+
+def make_story_report(folder: Path, story: Story, summary: dict[str, Any]) -> str:
+    """Write the report of a story: the record, and what other recordings tell."""
+    told = [entry for entry in story if entry[1] == "/fault"]
+    write_record(folder, [entry for entry in story if entry[1] != "/fault"])
+    (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    (folder / "run.json").write_text(json.dumps({"scenario": "inspection", "seed": 1, "world": ""}), encoding="utf-8")
+    write_report(folder, [(topic, t_s, value) for t_s, topic, value in told], title="inspection")
+    return f"file://{folder / REPORT}"
+
+
+def test_what_follows_from_one_failure_is_one_row_with_what_the_autopilot_did(browser: Any, tmp_path: Path) -> None:
+    page = Page(browser, make_story_report(tmp_path, lost_video(), {"outcome": "given_up", "reason": "", "landed": True, "collisions": 0}))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    assert page.text("#reason") == "ground station failed (killed, injected) at 40.00 s"
+    rows = [row.split(" | ") for row in page.run(ANSWERS)]
+    assert [row[:2] for row in rows] == [["ground station failed (killed, injected)", "40.00 s"], ["the whole mission", ""]]
+    assert rows[0][2] == (
+        "the mission fell back from “inspect” to “the video was lost”; interrupted goto; started hover; "
+        "the mission fell back from “the video was lost” to “given up”; the autopilot changed to RTL: it flies home and lands by itself"
+    )
+    assert rows[0][3] == "noticed after 3.00 s"
+    assert rows[1][2:] == ["mission given up; landed", "8 of 10 waypoints were not reached; nothing was hit"]
+    assert "enough_frames was violated: picture.fps_margin is -6 (fps is 6 1/s below its limit) for 1 s." in page.text("#lines")
+    assert "navigation.land could not start, its precondition sdk_authority was not met: SDK_authority" in page.text("#lines")
+    assert "57.00 sLanded." in page.text("#lines li")
+    assert page.text(".chain li").startswith("before40.00 sground station failed (killed, injected) | measurement43.00 s")
+    assert page.complaints() == []
+
+
+@pytest.mark.parametrize(
+    ("asked", "what", "when", "sentence"),
+    [
+        ("radio@40", "radio failed (injected)", "40.00 s", "The radio was made to fail."),
+        ("radio:out@40-41", "radio failed (out, injected)", "40.00 s until 41.00 s", "The radio works again."),
+    ],
+)
+def test_a_failure_that_only_the_request_tells_of_is_told(
+    browser: Any, tmp_path: Path, asked: str, what: str, when: str, sentence: str
+) -> None:
+    story = [entry for entry in lost_video() if entry[1] != "/fault"]
+    make_story_report(tmp_path, story, {"outcome": "given_up", "reason": "", "landed": True, "injected": []})
+    (tmp_path / "run.json").write_text(json.dumps({"scenario": "inspection", "faults": [asked, "lidar@900"], "world": ""}))
+    write_report(tmp_path, title="inspection")
+    page = Page(browser, f"file://{tmp_path / REPORT}")
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    assert page.text("#reason") == f"{what} at 40.00 s"
+    assert sentence in page.text("#lines")
+    assert "lidar" not in page.text("#story").replace("lidar@900", "")  # the flight was over before
+    assert page.run(ANSWERS)[0].startswith(f"{what} | {when} | ")
+
+
+def test_an_abort_is_no_failure_and_says_what_followed(browser: Any, tmp_path: Path) -> None:
+    start = LIFT_OFF_S
+    story: Story = [
+        (start - 3, MISSION, {"outcome": "running", "reason": "", "waypoints": 5, "waypoints_reached": 0}),
+        (start - 2, TREE, tree("INVALID", "INVALID")),
+        (start, EVENTS, transition("navigation.flight_status", "ON_GROUND", "IN_AIR")),
+        (start + 1, EVENTS, execution("navigation.goto", "RUNNING", 1)),
+        (start + 19, EVENTS, execution("perception.lidar_depthmap", "FAILED", 1, message="too dark")),
+        (start + 20, OPERATOR, {"command": "abort", "by": "mission", "reason": "aborted by the operator"}),
+        (start + 20.1, EVENTS, execution("navigation.goto", "INTERRUPTED", 2)),
+        (start + 20.2, EVENTS, execution("navigation.hover", "RUNNING", 3)),
+        (start + 23, EVENTS, execution("navigation.land", "RUNNING", 4)),
+        (start + 30, MISSION, {"outcome": "aborted", "reason": "aborted by the operator", "waypoints": 5, "waypoints_reached": 1}),
+    ]
+    page = Page(browser, make_story_report(tmp_path, story, {"outcome": "aborted", "reason": "aborted by the operator", "landed": True}))
+    page.wait("alula.run.count > 0 && document.querySelector('#timeline svg') !== null")
+    assert (page.text("#headline"), page.text("#reason")) == ("Mission aborted", "aborted by the operator")
+    assert page.run(ANSWERS) == [
+        "perception.lidar_depthmap: failed | 19.00 s | nothing followed | ",
+        "no failure: aborted by the operator | 20.00 s | started: hover, land | the rest of the mission",
+        "the whole mission |  | mission aborted; landed | 4 of 5 waypoints were not reached",
+    ]
+    assert page.text(".chain b") == "skill"
 
 
 def test_keys_go_from_event_to_event(browser: Any, tmp_path: Path) -> None:
@@ -313,8 +447,11 @@ def served(fixed: Path) -> Iterator[Served]:
         console.stop()
 
 
-def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(browser: Any, make_run: Callable[..., Path]) -> None:
+def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
     story = failing_story()
+    monkeypatch.setattr("mission_console.commands.is_live", lambda run: not (run / "summary.json").exists())
     early = [entry for entry in story if entry[0] < LIFT_OFF_S + 20]
     folder = make_run("live", story=[])
     writer = write_record(folder, early, over=False)
@@ -332,17 +469,82 @@ def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(browser
         console.stop()
         page.wait("document.querySelector('#link').dataset.state === 'stale'")
         assert "disconnected" in page.text("#link")
-        assert page.run("document.querySelector('#operator .danger:not(:disabled)') === null")
+        assert page.run("document.querySelector('#flight .danger:not(:disabled)') === null")
         writer.write(MISSION, round((LIFT_OFF_S + 61) * 1e9), story[-1][2])
         console.start()
         page.wait("document.querySelector('#link').dataset.state !== 'stale'")
         page.wait("document.querySelector('#headline').textContent === 'Mission accomplished in degraded mode'")
-        assert "made to fail" not in page.text("#lines")
-        (folder / "summary.json").write_text(json.dumps({**SUMMARY, "injected": [{"sensor": "zed", "mode": "dead", "t_s": 29.9}]}))
+        assert "30.00 sThe zed was made to fail." in page.text("#lines li")  # as asked for
+        assert page.run("document.querySelector('#operator form select').value") != "mapping"
+        page.run("document.querySelector('#operator form select').value = 'mapping'")
+        lift_off = {"stamp_s": LIFT_OFF_S - 0.5, "source": "simulator"}
+        injected = [{"sensor": "zed", "mode": "dead", "t_s": 30.4}]
+        (folder / "summary.json").write_text(json.dumps({**SUMMARY, "injected": injected, "lift_off": lift_off}))
         page.wait("document.querySelector('#lines').textContent.includes('The zed was made to fail (dead).')")
-        assert page.text(".chain b").startswith("failure | resource | invariant")
+        chain = page.text(".chain li")
+        assert chain.startswith("failure30.40 szed failed (dead, injected) | resource30.50 s")  # all times count from the same lift-off
+        assert page.run("document.querySelector('#operator form select').value") == "mapping", "another lift-off leaves the form alone"
     writer.close()
     assert [line for line in page.complaints() if "WebSocket connection" not in line and "ERR_" not in line] == []
+
+
+def test_a_run_that_ends_without_a_verdict_is_not_said_to_be_under_way(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, live = make_run("live", story=[]), [True]
+    monkeypatch.setattr("mission_console.commands.is_live", lambda _run: live[0])
+    writer = write_record(folder, [entry for entry in failing_story() if entry[0] < LIFT_OFF_S + 20], over=False)
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/")
+        page.wait("document.querySelector('#headline').textContent === 'The mission is under way' && alula.live.state === 'live'")
+        live[0] = False
+        page.wait("document.querySelector('#headline').textContent === 'The mission\\'s process ended before the mission did'")
+        page.wait("document.querySelector('#link').dataset.state === 'over'")
+        assert page.run("document.querySelector('#flight .danger:not(:disabled)') === null")
+        assert page.complaints() == []
+    writer.close()
+
+
+def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from selenium.webdriver.support.ui import Select
+
+    first, asked = make_run("first"), []
+
+    def start(flight: Flight) -> Path:
+        asked.append(flight)
+        if flight.world:
+            raise ActError(f"there is no world {flight.world}")
+        return make_run("second", story=[])
+
+    monkeypatch.setattr("mission_console.acts.start", start)
+    with served(first) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/")
+        page.wait("document.querySelectorAll('#operator form select option').length > 3 && alula.live.state === 'over'")
+        browser.find_element("css selector", "#operator summary").click()
+        scenario, vehicle = browser.find_elements("css selector", "#operator form select")
+        Select(scenario).select_by_visible_text("mapping")
+        Select(vehicle).select_by_visible_text("mocks")
+        world = browser.find_element("css selector", "#operator form input[list]")
+        world.send_keys(HOSTILE)
+        seed = browser.find_element("css selector", "#operator form input[type=number]")
+        seed.clear()
+        seed.send_keys("7")
+        browser.find_element("css selector", "#operator form input[aria-label^=failures]").send_keys("zed@30, lidar@60")
+        button = browser.find_element("css selector", "#operator form .go")
+        button.click()
+        assert asked == []
+        button.click()
+        page.wait("document.querySelector('#flight output').textContent.includes('refused: there is no world')")
+        assert page.run("document.querySelector('#operator details').open") is True
+        world.clear()
+        button.click()
+        button.click()
+        page.wait("alula.live.link.status.run === 'second'")
+        assert page.run("document.querySelector('#operator details').open") is False
+        assert page.complaints() == []
+    assert asked[1] == Flight("mapping", 7, ("zed@30", "lidar@60"), "", "mocks", "")
 
 
 def test_an_act_needs_two_presses_and_everything_off_a_word(
@@ -354,20 +556,43 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
         monkeypatch.setattr(f"mission_console.acts.{act}", lambda run, act=act: done.append((act, run.name)) or f"{act} is done")
     with served(folder) as console:
         page = Page(browser, f"http://127.0.0.1:{console.port}/")
-        abort, off = (f"[...document.querySelectorAll('#operator .danger')][{index}]" for index in (1, 2))
+        abort, off = (f"[...document.querySelectorAll('#flight .danger')][{index}]" for index in (1, 2))
         page.wait(f"{abort} !== undefined && !{abort}.disabled")
         page.run(f"{abort}.click()")
         assert page.run(f"{abort}.textContent") == "press again: stop and land"
         assert done == []
         page.run(f"{abort}.click()")
-        page.wait("document.querySelector('#operator output').textContent.includes('abort is done')")
+        page.wait("document.querySelector('#flight output').textContent.includes('abort is done')")
         assert page.run(f"{off}.disabled") is True
-        page.browser.find_element("css selector", "#operator input[placeholder='type OFF']").send_keys("off")
+        page.browser.find_element("css selector", "#flight input[placeholder='type OFF']").send_keys("off")
         page.run(f"{off}.click(), {off}.click()")
-        page.wait("document.querySelector('#operator output').textContent.includes('everything_off is done')")
-        page.wait("document.querySelector('#lines').textContent.includes('The operator: off')")
+        page.wait("document.querySelector('#flight output').textContent.includes('everything_off is done')")
+        page.wait("document.querySelector('#lines').textContent.includes('The operator switched everything off')")
         assert page.complaints() == []
     assert done == [("abort", "live"), ("everything_off", "live")]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_acts_on_a_flight_stay_in_sight_and_an_answer_moves_nothing(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
+    folder = make_run("live")
+    monkeypatch.setattr("mission_console.commands.is_live", lambda _run: True)
+    monkeypatch.setattr("mission_console.acts.pause", lambda _run: "held: " + "a skill that goes on, " * 40)
+    pause = "[...document.querySelectorAll('#flight button')][0]"
+    with served(folder) as console:
+        page = Page(browser, f"http://127.0.0.1:{console.port}/", size)
+        page.wait(f"{pause} !== undefined && !{pause}.disabled && document.querySelector('.row') !== null")
+        page.run("scrollTo(0, document.documentElement.scrollHeight / 2)")
+        page.wait("document.querySelector('#flight').getBoundingClientRect().top === 0")
+        buttons = "[...document.querySelectorAll('#flight button:not([hidden])')]"
+        assert page.run(f"{buttons}.every((one) => one.getBoundingClientRect().top < 120)")
+        page.run("scrollTo(0, 0)")
+        before = page.run("document.querySelector('main').getBoundingClientRect().top")
+        page.run(f"{pause}.click(), {pause}.click()")
+        page.wait("document.querySelector('#flight output').textContent.includes('a skill that goes on')")
+        assert page.run("document.querySelector('main').getBoundingClientRect().top") == before
+        assert page.complaints() == []
 
 
 def test_what_the_mission_needs_to_start_is_shown_and_turns_green(browser: Any, make_run: Callable[..., Path]) -> None:
@@ -379,6 +604,7 @@ def test_what_the_mission_needs_to_start_is_shown_and_turns_green(browser: Any, 
         page.wait("document.querySelectorAll('#operator .checks li').length === 2")
         assert page.text("#operator .checks li") == f"not met: the home point is not valid | met: a fence {HOSTILE}"
         assert page.run("document.querySelectorAll('#operator .checks li.met').length") == 1
+        assert "before the start: 1 of 2 conditions met" in page.text("#operator summary")
         writer.write(TICKS, 2_000_000_000, {"unmet": [], "conditions": [[ready[0], ""], fence]})
         writer.write(TICKS, 3_000_000_000, {"unmet": []})
         page.wait("document.querySelectorAll('#operator .checks li.met').length === 2")
@@ -394,7 +620,7 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
     monkeypatch.setattr("mission_console.commands.is_live", lambda _run: True)
     for act in ("pause", "resume"):
         monkeypatch.setattr(f"mission_console.acts.{act}", lambda run, act=act: done.append(f"{act} {run.name}") or act)
-    button = "[...document.querySelectorAll('#operator button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
+    button = "[...document.querySelectorAll('#flight button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
     with served(folder) as console:
         page = Page(browser, f"http://127.0.0.1:{console.port}/")
         page.wait(f"{button.format('pause')} !== undefined")
@@ -402,7 +628,7 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
         page.run(f"{button.format('pause')}.click()")
         assert done == []
         page.run(f"{button.format('press again: pause')}.click()")
-        page.wait("document.querySelector('#operator output').textContent === 'pause: pause'")
+        page.wait("document.querySelector('#flight output').textContent === 'pause: pause'")
         writer.write(OPERATOR, round(33e9), {"command": "paused", "by": "mission", "reason": "navigation.goto holds"})
         page.wait("document.querySelector('.held').textContent === 'The mission is paused. navigation.goto holds'")
         page.wait("document.querySelector('#headline').textContent === 'The mission is paused'")

@@ -21,6 +21,7 @@ from mission_console import commands
 from mission_console import hands as hands_module
 from mission_console.acts import ActError
 from mission_console.hands import Hands
+from skill_panel.watcher import wait_for
 
 HOSTILE = "<script>document.title='owned'</script>"
 
@@ -72,8 +73,8 @@ def test_skills_are_shown_started_paused_interrupted_and_the_record_says_so(run_
         ask = lambda act, **more: answer_to(viewer, command="skill", run="live", act=act, root="/navigation", skill="takeoff", **more)  # noqa: E731
         takeoff = skill_of(await heard(viewer, lambda message: bool(skill_of(message, "takeoff"))), "takeoff")
         assert [(one["name"], one["kind"], one["said"]) for one in takeoff["inputs"]] == [
-            ("height", "float64", "< h_geo_fence"),
-            ("speed", "float64", ""),
+            ("height", "float64", "m, < h_geo_fence"),
+            ("speed", "float64", "m/s"),
         ]
         assert any("SDK_authority" in reason for reason in takeoff["unmet"])
         await make_ready(viewer)
@@ -158,10 +159,27 @@ def test_transitions_that_the_model_lacks_are_refused_by_the_managers(hands: Han
     assert answer.startswith("refused: ")
 
 
+def test_progress_is_shown_of_an_execution_that_another_client_started(hands: Hands, skillset: int) -> None:
+    def takeoff() -> dict[str, Any]:
+        return skill_of({"hands": hands.describe()}, "takeoff")
+
+    mission = Hands(skillset)
+    try:
+        assert wait_for(lambda: bool(mission.describe()["skillsets"]), WAIT_S)
+        for resource, to in (("SDK_authority", "AVAILABLE"), ("homepoint_status", "VALID")):
+            mission.do({"root": "/navigation", "act": "transition", "resource": resource, "to": to})
+        assert wait_for(lambda: takeoff()["unmet"] == [], WAIT_S)
+        asked = {"root": "/navigation", "skill": "takeoff", "texts": {"height": "3.0", "speed": "1.0"}}
+        assert mission.do({**asked, "act": "start"})[1] == "takeoff is RUNNING"
+        assert wait_for(lambda: [one["progress"] for one in takeoff()["running"]] == [0.5], WAIT_S)
+        mission.do({**asked, "act": "interrupt"})
+        assert wait_for(lambda: takeoff()["running"] == [], WAIT_S)
+    finally:
+        mission.close()
+
+
 @pytest.fixture(scope="module")
 def hands(skillset: int) -> Iterator[Hands]:
-    from skill_panel.watcher import wait_for
-
     made = Hands(skillset)
     assert wait_for(lambda: bool(made.describe()["skillsets"]), WAIT_S)
     yield made

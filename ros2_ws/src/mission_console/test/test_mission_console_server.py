@@ -76,7 +76,7 @@ def test_several_runs_can_be_watched_at_once(make_run: Callable[..., Path]) -> N
     serve(play)
 
 
-# --- who commands ----------------------------------------------------------------------------------------------------------
+# --- commands ------------------------------------------------------------------------------------------------------------
 
 
 def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -187,7 +187,7 @@ def test_a_flight_that_does_not_start_says_why(make_run: Callable[..., Path], tm
         acts.start(Flight("mapping", 0, vehicle="mocks"))
 
 
-# --- who is let in -----------------------------------------------------------------------------------------------------------
+# --- admission --------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from skill_panel.watcher import Watched
 from skill_panel.widgets import FORM_KEYS, DataLines, ResourceLine, ResourceList, SkillForm, SkillsetBar, SkillTable
 
 REFRESH_S = 0.1
-NOBODY = """No skillset is running {where}.
+NO_SKILLSET = """No skillset is running {where}.
 
 Start one in another terminal:
   ./alula fly mapping            a flight in the simulator; this panel finds it: ./alula panel --run latest
@@ -68,7 +68,7 @@ class Panel(App[None]):
         """Lay out the screen."""
         yield Header()
         yield SkillsetBar(id="skillsets")
-        yield Static(id="nobody")
+        yield Static(id="no-skillset")
         with Horizontal(id="middle"):
             with Vertical(id="left"):
                 yield SkillTable(id="skills")
@@ -104,18 +104,18 @@ class Panel(App[None]):
             return
         watched = self._source.watched
         self._refresh_bar([one.root for one in watched])
-        somebody = bool(watched)
+        found = bool(watched)
         for name in ("skillsets", "middle", "log"):
-            self.query_one(f"#{name}").display = somebody
-        self.query_one("#nobody").display = not somebody
-        if not somebody:
-            self.query_one("#nobody", Static).update(Text(self._nobody()))
+            self.query_one(f"#{name}").display = found
+        self.query_one("#no-skillset").display = not found
+        if not found:
+            self.query_one("#no-skillset", Static).update(Text(self._no_skillset()))
         elif self.current is not None:
             await self._refresh_skillset(self.current)
 
-    def _nobody(self) -> str:
+    def _no_skillset(self) -> str:
         others = "".join(f"{line}\n" for line in (*self._source.problems, *self._others))
-        return NOBODY.format(where=self._where, others=f"{others}\n" if others else "")
+        return NO_SKILLSET.format(where=self._where, others=f"{others}\n" if others else "")
 
     def _refresh_bar(self, roots: Sequence[str]) -> None:
         if self._root not in roots and roots:

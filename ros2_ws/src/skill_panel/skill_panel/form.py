@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import yaml
 
-from skill_model.model import Skill
+from skill_model.model import Parameter, Skill
+from skill_model.units import KIND_OF_UNIT
 
 FLOATS = ("float64", "float32")
+UNIT_OF_NAME: Mapping[str, str] = {
+    **dict.fromkeys(("height", "altitude", "distance", "length", "radius"), "m"),
+    **dict.fromkeys(("speed", "velocity"), "m/s"),
+    **dict.fromkeys(("heading", "yaw", "angle"), "rad"),
+    **dict.fromkeys(("yaw_rate",), "rad/s"),
+    **dict.fromkeys(("duration", "timeout"), "s"),
+}
+"""The unit of an input whose comment names none, as of the paper's takeoff: messages carry SI units (REP 103)."""
 TRUE, FALSE = ("true", "yes", "1", "on"), ("false", "no", "0", "off")
 
 
@@ -20,7 +30,7 @@ class FormError(ValueError):
 
 @dataclass(frozen=True)
 class Field:
-    """One input: ``kind`` as ROS names it (``float64``, ``geometry_msgs/Point``), ``said`` what the model says of it."""
+    """One input: ``kind`` as ROS names it (``float64``, ``geometry_msgs/Point``), ``said`` its unit and what the model says of it."""
 
     name: str
     kind: str
@@ -29,7 +39,7 @@ class Field:
 
     @property
     def label(self) -> str:
-        """Name, type and the model's comment."""
+        """Name, type, and what is said of it."""
         return f"{self.name} ({self.kind}{f', {self.said}' if self.said else ''})"
 
 
@@ -40,8 +50,16 @@ def fields(skill: Skill, kinds: Mapping[str, str], remembered: Mapping[str, str]
     for name, kind in kinds.items():
         parameter = said.get(name)
         text = remembered.get(name) or (parameter.default if parameter and parameter.default else default_text(kind))
-        made.append(Field(name, kind, parameter.comment if parameter else "", text))
+        made.append(Field(name, kind, _said(parameter, kind) if parameter else "", text))
     return made
+
+
+def _said(parameter: Parameter, kind: str) -> str:
+    """Return the comment, with the unit that the name tells in front of it where the comment begins with none."""
+    unit = UNIT_OF_NAME.get(parameter.name, "") if kind in FLOATS else ""
+    first = re.split(r"[,;:]", parameter.comment, maxsplit=1)[0].strip()
+    told = first in KIND_OF_UNIT or first in UNIT_OF_NAME.values()
+    return parameter.comment if told else ", ".join(part for part in (unit, parameter.comment) if part)
 
 
 def default_text(kind: str) -> str:

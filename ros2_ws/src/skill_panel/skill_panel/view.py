@@ -43,7 +43,7 @@ class DataRow:
 
 @dataclass(frozen=True)
 class Running:
-    """An execution that has not ended; ``progress`` (0 to 1) is known of those that this panel has started."""
+    """An execution that has not ended; ``progress`` (0 to 1) is None until its manager has reported one."""
 
     id: str
     skill: str
@@ -114,7 +114,7 @@ class SkillsetView:
             self.version += 1
 
     def heard_progress(self, execution_id: str, progress: float) -> None:
-        """Take the progress of an execution that this panel has started."""
+        """Take the progress (0 to 1) of an execution; that of one that is not known to run is ignored."""
         with self._lock:
             if execution_id in self._running:
                 self._running[execution_id] = replace(self._running[execution_id], progress=progress)

@@ -9,14 +9,17 @@ from typing import Any, TypeVar
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
+from skill_model.model import Skillset
 from skill_panel.view import SkillsetView
 from skill_runtime.core.events import EngineEvent
 from skill_runtime.core.records import SkillRecord
 from skill_runtime.core.why import Why
-from skill_runtime.handle import Report, SkillHandle
+from skill_runtime.handle import SkillHandle
+from skill_runtime.ros2.actions import execution_id
 from skill_runtime.ros2.client import SkillsetClient
-from skill_runtime.ros2.names import action_module
+from skill_runtime.ros2.names import action_module, action_type
 from skill_runtime.ros2.session import Session
 from skill_runtime.views import DataReading
 from skill_runtime.waiting import Pending
@@ -26,6 +29,7 @@ LOOK_S = 0.5
 DATA_S = 0.5
 QUIET_S = 1.0
 """So long (wall clock) after the last of several things was found, they are taken for all."""
+FEEDBACK_DEPTH = 10
 T = TypeVar("T")
 
 
@@ -50,6 +54,7 @@ class Watched:
         self.client = SkillsetClient(node, name, namespace=space or "/")
         self.view: SkillsetView | None = None
         self._handles: dict[str, SkillHandle] = {}
+        self._node, self._name = node, name
         self._heard: list[EngineEvent] = []
         self._asked: dict[str, Pending[DataReading]] = {}
         self.client.on_event(self._on_event)
@@ -67,6 +72,15 @@ class Watched:
             for event in self._heard:
                 view.heard_event(event)
             self.view = view
+            self._follow_progress(view.model)
+
+    def _follow_progress(self, model: Skillset) -> None:
+        """Listen to the feedback of all executions: a client by itself hears only that of the executions that it started."""
+        actions = action_module(self._name)
+        for skill in model.skills:
+            topic = f"{self.root}/skill/{skill.name}/_action/feedback"
+            kind: Any = action_type(actions, skill.name)
+            self._node.create_subscription(kind.Impl.FeedbackMessage, topic, self._on_feedback, QoSProfile(depth=FEEDBACK_DEPTH))
 
     def ask_for_data(self) -> None:
         """Ask for the value of each data that no answer is awaited of."""
@@ -83,12 +97,11 @@ class Watched:
         """Start a skill; raise ValueError."""
         handle = self.client.start(skill, **inputs)
         self._handles[handle.id] = handle
-        handle.on_report(lambda report: self._on_report(handle, report))
         handle.add_done_callback(self._on_end)
         return handle
 
     def interrupt(self, skill: str) -> None:
-        """Ask for the end of all that runs of a skill, whoever started it."""
+        """Ask for the end of all executions of a skill, also of those that other clients started."""
         self.client.interrupt_all(skill).add_done_callback(lambda answer: self._say_failure(f"interrupt {skill}", answer))
 
     def set_paused(self, skill: str) -> None:
@@ -158,9 +171,9 @@ class Watched:
             reading = answer.value
             self.view.heard_data(name, value_json=reading.value_json, stamp_ns=reading.stamp_ns, stale=reading.stale)
 
-    def _on_report(self, handle: SkillHandle, report: Report[dict[str, Any]]) -> None:
-        if self.view is not None and not report.state.terminal:
-            self.view.heard_progress(handle.id, report.progress)
+    def _on_feedback(self, message: Any) -> None:
+        if self.view is not None:
+            self.view.heard_progress(execution_id(message.goal_id), message.feedback.progress)
 
     def _on_end(self, handle: SkillHandle) -> None:
         self._handles.pop(handle.id, None)
@@ -215,7 +228,7 @@ class Watcher:
                 self._meet(space, name, root)
         for one in list(self._watched.values()):
             one.look()
-        if not self.node.get_clock().ros_time_is_active:  # who publishes the clock may be found later than the skillsets
+        if not self.node.get_clock().ros_time_is_active:  # the clock's publisher may be found later than the skillsets
             self._session.follow_clock()
 
     def _meet(self, space: str, name: str, root: str) -> None:

@@ -164,12 +164,12 @@ async def managers_may_go(screen: Screen, served) -> None:
     await screen.until(lambda: "the managers of navigation are not there" in screen.log, "and says so when asked to")
 
 
-def test_nobody_there(watcher):
+def test_no_skillset_is_there(watcher):
     async def drive() -> None:
         app = Panel(watcher, where="in DDS domain 7", others=["A run is under way: ./alula panel --run here"])
         async with app.run_test(size=SIZE) as pilot:
             await pilot.pause()
-            said = str(app.query_one("#nobody", Static).content)
+            said = str(app.query_one("#no-skillset", Static).content)
             assert "No skillset is running in DDS domain 7." in said
             assert "./alula fly mapping" in said
             assert "A run is under way: ./alula panel --run here" in said
@@ -188,8 +188,9 @@ def test_wrong_input_is_one_line_and_exit_code_2(tmp_path, capsys):
     assert "a number from 0 to 232" in capsys.readouterr().err
 
 
-def test_the_list_says_what_runs(skillset, ros2_domain):
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(ros2_domain)}
+def test_the_list_says_what_runs(skillset, ros2_domain, tmp_path):
+    # No run of the checkout is listed, whichever domain it had.
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(ros2_domain), "ALULA_ROOT": str(tmp_path)}
     end = time.monotonic() + READY_S
     said = ""
     while "/panel_test/navigation" not in said:
@@ -207,7 +208,7 @@ def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watc
     from skill_runtime.ros2.session import Session
 
     assert wait_for(lambda: bool(watcher.watched), READY_S)
-    assert watcher.now_ns > 1_000_000_000_000_000_000, "nobody has published a clock yet"
+    assert watcher.now_ns > 1_000_000_000_000_000_000, "no clock was published yet"
     session = Session("clock_test", domain=watcher.domain)
     try:
         clock = session.node.create_publisher(Clock, "/clock", 10)

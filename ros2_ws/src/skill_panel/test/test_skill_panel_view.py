@@ -87,7 +87,7 @@ def test_skills_show_what_runs_and_how_it_ended(view):
     view.heard_states({"door": "OPEN"})
     view.heard_skills(skills(go=([execution("1", "RUNNING")], []), wait=([], [execution("0", "TERMINATED", "DONE")])))
     view.heard_progress("1", 0.5)
-    view.heard_progress("9", 0.5)  # of nobody
+    view.heard_progress("9", 0.5)  # of no execution that is known
     go, wait = view.skill_rows()
     assert (go.running, go.status) == ((Running("1", "go", "RUNNING", 0.5),), "RUNNING")
     assert (wait.last, wait.status) == ("TERMINATED DONE", "ready")
@@ -123,6 +123,22 @@ def test_fields_begin_with_what_was_last_used_or_the_models_default():
     made = fields(GO, KINDS, {"speed": "2.5", "gone": "1"})
     assert [field.text for field in made] == ["2.5", "3"]
     assert values(made, {"speed": " 1e-1 ", "tries": "4"}) == {"speed": 0.1, "tries": 4}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "comment", "said"),
+    [
+        ("height", "float64", "< h_geo_fence", "m, < h_geo_fence"),  # the paper's takeoff
+        ("speed", "float32", "", "m/s"),
+        ("speed", "float64", "km/h, over the ground", "km/h, over the ground"),
+        ("rate", "float64", "rad/s, > 0", "rad/s, > 0"),
+        ("height", "string", "", ""),
+        ("gain", "float64", "0 to 1", "0 to 1"),
+    ],
+)
+def test_an_input_without_a_unit_in_its_comment_is_told_in_the_si_unit_of_its_name(name, kind, comment, said):
+    skill = Skill("go", inputs=(Parameter(name, kind, comment=comment),))
+    assert [field.said for field in fields(skill, {name: kind}, {})] == [said]
 
 
 @pytest.mark.parametrize(

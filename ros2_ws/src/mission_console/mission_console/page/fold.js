@@ -37,6 +37,7 @@ const last = (list) => list[list.length - 1];
 
 function newRun() {
   return {
+    over: false, // whether the server says that nothing of the run is under way any more
     begin: null, // first and last moment, seconds of mission clock
     end: null,
     count: 0,
@@ -211,7 +212,7 @@ const ENDINGS = {
   running: { words: "runs", mark: "…" },
   success: { words: "ended by itself", mark: "✓" },
   interrupted: { words: "was interrupted", mark: "◦" },
-  violated: { words: "lost an invariant", mark: "✗" },
+  violated: { words: "invariant violated", mark: "✗" },
   failure: { words: "failed or was refused", mark: "!" },
 };
 

@@ -148,7 +148,7 @@ class HandsView {
     });
   }
 
-  /** Switches the acts on for who commands a run that is under way. */
+  /** Switches the acts on for the viewer that commands a run under way. */
   enable(may) {
     if (may === this.may) return;
     this.may = may;

@@ -31,8 +31,9 @@ function show() {
 }
 
 function showStory() {
-  if (showStory.news === run.news) return;
-  showStory.news = run.news;
+  const news = `${run.news} ${run.over} ${faultsOf(run).length}`;
+  if (showStory.news === news) return;
+  showStory.news = news;
   const { text, tone, reason } = headline(run);
   setText(byId("headline"), text);
   setText(byId("reason"), reason);
@@ -45,16 +46,18 @@ function showStory() {
   const zero = origin(run);
   const go = (t) => el("button", { type: "button", onclick: () => choose(t), "aria-label": `go to ${seconds(t - zero)}` }, seconds(t - zero, 2));
   rewrite(byId("lines"), story(run), ({ t, text: sentence, kind }) => el("li", { class: kind }, go(t), el("span", {}, sentence)));
-  rewrite(byId("costs"), costs(run), (sentence) => el("li", {}, sentence));
-  byId("cost-title").hidden = !byId("costs").firstChild;
+  const rows = answers(run);
+  const cell = (label, ...content) => el("td", { "data-label": label }, ...content);
+  rewrite(byId("answers").tBodies[0], rows, ({ what, why, t, until, done, cost }) => el("tr", {}, el("th", { scope: "row" }, what, why ? el("p", { class: "hint" }, why) : null), cell("when", ...(t === null ? [] : [go(t)]), ...(until == null ? [] : [" until ", go(until)])), cell("what was done", done), cell("what it cost", cost)));
+  byId("answers").hidden = !rows.length;
   const chains = failures(run).map((failure) => chainOf(run, failure));
   rewrite(byId("chains"), chains.length ? chains : [null], (chain) => (chain ? el("ol", { class: "chain" }, ...chain.map(({ step, t, text: sentence }) => el("li", {}, el("b", {}, step), go(t), el("span", {}, sentence)))) : el("p", {}, "No skill failed.")));
   rewrite(byId("problems"), run.facts["/summary"]?.problems ?? [], (sentence) => el("li", {}, sentence));
 }
 
-/** Rebuilds a list only when what it shows has changed. */
+/** Rebuilds a list only when what it shows has changed: the values, or the moment that times count from. */
 function rewrite(node, values, make) {
-  const key = JSON.stringify(values);
+  const key = `${origin(run)} ${JSON.stringify(values)}`;
   if (node.dataset.shown === String(key.length) && node.shown === key) return;
   [node.shown, node.dataset.shown] = [key, key.length];
   node.replaceChildren(...values.map(make));
@@ -218,12 +221,14 @@ class Link {
     }
     if (said.answer !== undefined) {
       (said.command === "skill" ? this.hands : this.bar).say(`${said.command}: ${said.answer}`);
-      if (said.started) this.run = said.started;
+      if (said.started) [this.run, this.bar.starting.open] = [said.started, false];
     }
     if (said.status) {
       this.status = said.status;
       if (this.run && said.status.run !== this.run && !said.status.runs.includes(this.run)) this.run = "";
-      this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null);
+      if (run.over === said.status.live) draw();
+      run.over = !said.status.live;
+      this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null, run.departure !== null);
     }
     if (said.status && (!said.status.live || this.hands.run !== said.status.run)) this.hands.forget();
     if (said.hands && said.hands.run === this.status?.run) this.hands.show(said.hands);
@@ -249,7 +254,7 @@ class Link {
 function clear() {
   Object.assign(run, newRun());
   cursor = null;
-  showStory.news = -1;
+  showStory.news = "";
   for (const view of views) view.news = -1;
 }
 

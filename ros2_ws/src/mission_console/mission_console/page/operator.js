@@ -1,7 +1,17 @@
-// The operator's acts, on the live page: who commands, start, pause, stop and land, everything off. Each needs more than a slip of the
-// finger: two presses in turn, and for everything off a word that is typed.
+// The operator's acts, on the live page: take over, start, pause, stop and land, everything off. Each needs more than a slip of the
+// finger: two presses in turn, and for everything off a word that is typed. The acts on a flight under way stay in sight.
 
 const ARMED_MS = 4000;
+
+/** Fills a select or a datalist with names; what was chosen stays chosen. */
+function offer(node, names) {
+  const key = JSON.stringify(names);
+  if (node.offered === key) return;
+  const chosen = node.value;
+  node.offered = key;
+  node.replaceChildren(...names.map((name) => el("option", { value: name }, name)));
+  if (names.includes(chosen)) node.value = chosen;
+}
 
 class OperatorBar {
   constructor(send, watch) {
@@ -22,15 +32,17 @@ class OperatorBar {
       this.word.value = "";
     });
     this.form = this.startForm();
+    this.starting = el("details", {}, el("summary", {}, "start a mission"), this.form);
+    this.met = el("summary", {}, "before the start");
+    this.before = el("details", { open: true }, this.met, this.checks);
     byId("operator").hidden = false;
     byId("operator").append(
       el("div", { class: "acts" }, el("label", {}, "run ", this.runs), this.report, this.role, this.take),
-      el("details", {}, el("summary", {}, "start a mission"), this.form),
-      el("div", { class: "acts" }, this.pause, this.resume, this.abort, this.word, this.off),
-      this.held,
-      this.checks,
-      this.answer,
+      this.starting,
+      this.before,
     );
+    byId("flight").hidden = false;
+    byId("flight").append(el("div", { class: "acts" }, this.pause, this.resume, this.abort, el("span", { class: "off" }, this.word, this.off)), el("div", { class: "said" }, this.held, this.answer));
   }
 
   startForm() {
@@ -80,17 +92,21 @@ class OperatorBar {
     setText(this.answer, text);
   }
 
-  /** How things are; `start`: what the mission needs to start, `held`: what a pause holds, null when there is none. */
-  show(status, start, held) {
+  /** How things are; `start`: what the mission needs to start, `held`: what a pause holds, null when there is none; `flew`: it took off. */
+  show(status, start, held, flew) {
+    if (this.status?.run !== status.run) this.before.open = !flew; // once a run: what is opened later stays so
     [this.status, this.paused] = [status, held !== null];
-    rewrite(this.runs, status.runs, (name) => el("option", { value: name }, name));
+    const met = (start ?? []).filter(([, otherwise]) => !otherwise).length;
+    setText(this.met, start?.length ? `before the start: ${met} of ${start.length} conditions met` : "before the start");
+    offer(this.runs, status.runs);
     if (this.runs.value !== status.run && document.activeElement !== this.runs) this.runs.value = status.run;
-    rewrite(this.scenario, status.scenarios, (name) => el("option", { value: name }, name));
-    rewrite(this.worlds, status.worlds, (name) => el("option", { value: name }));
-    rewrite(this.vehicle, status.vehicles, (name) => el("option", { value: name }, name));
+    offer(this.scenario, status.scenarios);
+    offer(this.worlds, status.worlds);
+    offer(this.vehicle, status.vehicles);
     this.report.hidden = !status.report;
     if (status.report) this.report.href = `/runs/${encodeURIComponent(status.run)}/report.html${location.search}`;
-    setText(this.role, status.commands ? `you command; ${status.viewers} watching` : `${status.commander || "nobody"} commands; you watch`);
+    const viewers = `${status.viewers} ${status.viewers === 1 ? "viewer" : "viewers"}`;
+    setText(this.role, `${status.commands ? "you command" : `${status.commander || "no viewer"} commands; you watch`} (${viewers})`);
     this.take.hidden = status.commands;
     rewrite(this.checks, start ?? [], ([needed, otherwise]) => el("li", { class: otherwise ? "" : "met" }, el("span", { class: "sr" }, otherwise ? "not met: " : "met: "), otherwise || needed));
     setText(this.held, held === null ? "" : `The mission is paused. ${held}`);

@@ -1,10 +1,10 @@
-// What happened, in words: the outcome, what failed, what was done about it and what it cost; and each failure's chain of causes.
+// What happened, in words: the outcome; a row a failure with what was done and what it cost; each failure's chain of causes.
 
 const OUTCOMES = {
   accomplished: ["Mission accomplished", "good"],
   degraded: ["Mission accomplished in degraded mode", "fair"],
   given_up: ["Mission given up", "bad"],
-  aborted: ["Mission aborted by the operator", "bad"],
+  aborted: ["Mission aborted", "bad"],
   not_started: ["The mission did not start", "bad"],
   running: ["The mission is under way", "now"],
 };
@@ -17,12 +17,18 @@ function headline(run) {
   const summary = run.facts["/summary"];
   if (run.begin === null) return { text: run.facts["/run"] ? "The run has recorded nothing yet" : "No run yet", tone: "now", reason: "" };
   const outcome = summary?.outcome ?? mission.outcome ?? "running";
-  if (summary && outcome === "running") return { text: "The mission's process ended before the mission did", tone: "bad", reason: "" };
+  if (outcome === "running" && (summary || run.over)) return { text: "The mission's process ended before the mission did", tone: "bad", reason: "" };
   const failed = failures(run).length;
   if (outcome === "running" && (last(run.held.v) ?? null) !== null) return { text: `The mission is paused${failed ? `, after ${failed === 1 ? "a failure" : `${failed} failures`}` : ""}`, tone: "fair", reason: last(run.held.v) };
   if (outcome === "running" && failed) return { text: `The mission is under way, after ${failed === 1 ? "a failure" : `${failed} failures`}`, tone: "fair", reason: "" };
   const [text, tone] = OUTCOMES[outcome] ?? [`Outcome: ${words(outcome)}`, "now"];
-  return { text, tone, reason: summary?.reason ?? mission.reason ?? "" };
+  return { text, tone, reason: reasonTold(run, outcome) ?? summary?.reason ?? mission.reason ?? "" };
+}
+
+/** What failed, for the outcomes that follow from failures; null: the mission's own reason says it. */
+function reasonTold(run, outcome) {
+  const causes = ["degraded", "given_up"].includes(outcome) ? answers(run).filter(({ why }) => why) : [];
+  return causes.map(({ what, t }) => `${what} at ${seconds(t - origin(run), 2)}`).join("; ") || null;
 }
 
 /** The figures of the top row: [label, value, hint]. */
@@ -54,20 +60,57 @@ function failures(run) {
     .sort((one, other) => one.end - other.end);
 }
 
-/** What was made to fail: live nobody tells before the summary does. */
+/** What was made to fail, as the recordings or the summary tell; of what neither tells, as the radio or while the flight goes on, what was asked for. */
 function faultsOf(run) {
-  if (run.faults.length) return run.faults;
-  return (run.facts["/summary"]?.injected ?? []).filter(({ t_s: since }) => since !== null).map(({ sensor, mode, t_s: since }) => ({ sensor, mode, t: origin(run) + since }));
+  const summed = (run.facts["/summary"]?.injected ?? []).filter(({ t_s: since }) => since !== null).map(({ sensor, mode, t_s: since }) => ({ sensor, mode, t: origin(run) + since }));
+  const told = run.faults.length ? run.faults : summed;
+  const asked = (run.facts["/run"]?.faults ?? []).flatMap((text) => requested(run, String(text))).filter(({ sensor }) => !told.some((one) => one.sensor === sensor));
+  return [...told, ...asked].sort((one, other) => one.t - other.t);
 }
 
-/** A failure's chain of causes: [{step, t, text}], from the measurement to what the tree did. */
+/** What a request such as radio:critical@40-50 has come to by now: [{sensor, mode, t}]; the mode is empty where none was asked for. */
+function requested(run, text) {
+  const found = /^(\w+)(?::(\w+))?(?:@([\d.]+)(?:-([\d.]+))?)?$/.exec(text);
+  if (!found || run.begin === null) return [];
+  const [, sensor, mode = "", from, until] = found;
+  const flew = run.departure !== null || run.facts["/summary"]?.lift_off != null;
+  const at = (since) => (since === undefined || !flew ? Infinity : origin(run) + Number(since));
+  const faults = [{ sensor, mode, t: from === undefined ? run.begin : at(from) }, { sensor, mode: "ok", t: at(until) }];
+  return faults.filter(({ t }) => t <= run.end);
+}
+
+/** The name of what fails, for a sentence. */
+const named = (sensor) => String(sensor).replaceAll("_", " ");
+
+/** A failure that was made, in words; mocks do not tell in which way something fails. */
+const faultWords = ({ sensor, mode }) => `${named(sensor)} failed (${mode && mode !== "mock" ? `${mode}, ` : ""}injected)`;
+
+/** The failure that was made before an execution ended badly: the one that it names (`sure`), else the last one; null without one. */
+function faultBehind(run, failure) {
+  const before = faultsOf(run).filter(({ t, mode }) => t <= failure.end + APART_S && mode !== "ok");
+  const sensor = blamed(run, failure)?.resource.replace(/_status$/, "");
+  const own = before.findLast((fault) => fault.sensor === sensor || failure.message.includes(fault.sensor));
+  const fault = own ?? last(before);
+  return fault ? { ...fault, sure: Boolean(own) } : null;
+}
+
+const chains = new WeakMap(); // failure -> {key, chain}
+
+/** A failure's chain of causes: [{step, t, text}], from the measurement to what the tree did; made again only while something may be added. */
 function chainOf(run, failure) {
+  const settled = run.end > reactsUntil(run, failure.end);
+  const key = `${faultsOf(run).length} ${run.facts["/summary"] !== undefined} ${settled || run.news}`;
+  if (chains.get(failure)?.key !== key) chains.set(failure, { key, chain: makeChain(run, failure) });
+  return chains.get(failure).chain;
+}
+
+function makeChain(run, failure) {
   const chain = [];
   const add = (step, t, text) => chain.push({ step, t, text });
   const change = blamed(run, failure);
   const sensor = change ? change.resource.replace(/_status$/, "") : "";
-  const fault = faultsOf(run).findLast((entry) => entry.t <= failure.end + APART_S && entry.mode !== "ok" && (entry.sensor === sensor || failure.message.includes(entry.sensor)));
-  if (fault) add("failure", fault.t, `${fault.sensor}: ${fault.mode} (injected)`);
+  const fault = faultBehind(run, failure);
+  if (fault) add(fault.sure ? "failure" : "before", fault.t, faultWords(fault));
   const measured = measurement(run, failure, sensor);
   if (measured) add("measurement", measured.t, measured.text);
   if (change) add("resource", change.t, `${change.name}: ${change.from} → ${change.state}${change.cause === "extern" ? ", reported by the functional layer" : ` (${change.cause})`}`);
@@ -97,11 +140,30 @@ function measurement(run, failure, sensor) {
   }
   for (const [name, samples] of run.data) {
     const data = name.split(".")[1];
-    const named = [...samples.columns.keys()].filter((column) => failure.message.includes(`${data}.${column}`)).sort((one, other) => other.length - one.length)[0];
+    const column = [...samples.columns.keys()].filter((name_) => failure.message.includes(`${data}.${name_}`)).sort((one, other) => other.length - one.length)[0];
     const index = indexAt(samples.t, failure.end + APART_S);
-    if (named && index >= 0) return { t: samples.t[index], text: `${data}.${named} is ${short(samples.columns.get(named)[index])}` };
+    if (column && index >= 0) return { t: samples.t[index], text: marginsTold(`${data}.${column} is ${short(samples.columns.get(column)[index])}`) };
   }
   return null;
+}
+
+/** A sentence with what a negative margin means: "picture.fps_margin is -6" has the rate 6 1/s below its limit. */
+function marginsTold(text) {
+  return text.replace(/(\w+)_margin is -([\d.]+)/g, (all, name, number) => {
+    const unit = unitOf(name);
+    return `${all} (${name} is ${number}${unit ? ` ${unit}` : ""} below its limit)`;
+  });
+}
+
+/** How an execution ended, a sentence. */
+function endingTold(failure) {
+  const name = `${failure.skillset}.${failure.skill}`;
+  const why = marginsTold((failure.message || "").replace(/, after .*$/, "").replace(`${failure.result}: `, ""));
+  const because = why ? `: ${why}` : failure.result ? `: ${failure.result}` : "";
+  if (endingOf(failure) === "violated") return `${name} was stopped, its invariant ${failure.result} was violated${why ? `: ${why}` : ""}.`;
+  if (failure.state === "NOT_READY") return `${name} could not start, its precondition ${failure.result} was not met${why ? `: ${why}` : ""}.`;
+  if (failure.state === "NOT_VALIDATED") return `${name} was refused${because}.`;
+  return `${name} failed${because}.`;
 }
 
 /** The pauses of the mission: [{from, to}]; `to` is null in one that lasts. */
@@ -115,11 +177,14 @@ function pauses(run) {
   return found;
 }
 
-/** Until when a failure's reaction is looked for: a mission that is paused then reacts when it goes on. */
+/** Until when a failure's reaction is looked for: a mission that is paused then reacts when it goes on; what follows an abort is the abort's. */
 function reactsUntil(run, t) {
   const pause = pauses(run).find(({ from, to }) => from <= t && (to === null || t < to));
-  return (pause ? pause.to ?? Infinity : t) + REACTION_S;
+  return Math.min((pause ? pause.to ?? Infinity : t) + REACTION_S, abortAfter(run, t) - 0.001);
 }
+
+/** When the mission was aborted at or after a moment; Infinity: it was not. */
+const abortAfter = (run, t) => run.operator.find(({ by, command, t: at }) => by === "mission" && command === "abort" && at >= t)?.t ?? Infinity;
 
 /** The branch that a failure took down, and the one that the tree went on with. */
 function branchOf(run, failure) {
@@ -135,7 +200,7 @@ function branchOf(run, failure) {
   if (next && top.parent.kind === "selector") {
     const index = next.track.v.findIndex(({ status }) => status !== "INVALID");
     const t = next.track.t[index] <= until ? Math.max(failure.end, next.track.t[index]) : failure.end;
-    chain.push({ step: "decision", t, text: `“${top.parent.name}” went on with “${next.name}”` });
+    chain.push({ step: "decision", t, text: `“${top.parent.name}” went on with “${next.name}”`, told: `the mission fell back from “${top.name}” to “${next.name}”` });
   } else if (!top.parent) chain.push({ step: "decision", t: failure.end, text: "nothing was left to try" });
   return chain;
 }
@@ -152,14 +217,25 @@ function failedAround(node, t, until) {
 function reactionOf(run, failure) {
   const chain = [];
   const until = reactsUntil(run, failure.end);
-  const near = (t) => t !== null && t >= failure.end - APART_S && t <= until;
+  const earlier = failures(run).filter((other) => other.end < failure.end);
+  const near = (t) => t !== null && t >= failure.end - APART_S && t <= until && (t >= failure.end || !earlier.some((other) => t >= other.end - APART_S));
   const others = [...run.executions.values()].filter((execution) => execution !== failure);
   const stopped = others.filter((execution) => execution.state === "INTERRUPTED" && near(execution.end) && execution.start < failure.end);
   const started = others.filter((execution) => near(execution.running) && execution.start >= failure.end - APART_S);
   if (stopped.length) chain.push({ step: "stopped", t: stopped[0].end, text: `interrupted: ${stopped.map(({ skill }) => skill).join(", ")}` });
-  if (started.length) chain.push({ step: "started", t: started[0].running, text: `started: ${[...new Set(started.map(({ skill }) => skill))].join(", ")}` });
+  if (started.length) chain.push({ step: "started", t: started[0].running, text: `started: ${[...new Set(started.map((one) => `${one.skill}${one.skill === failure.skill && one.skillset === failure.skillset ? " again" : ""}`))].join(", ")}` });
   return chain.sort((one, other) => one.t - other.t);
 }
+
+/** What the mission did about a failure: {t, text}, or null where nothing followed. */
+function reactionTold(chain) {
+  const steps = chain.filter(({ step }) => ["decision", "stopped", "started"].includes(step));
+  if (!steps.length) return null;
+  const texts = steps.map(({ text, told }) => told ?? text.replace(":", ""));
+  return { t: steps[0].t, text: texts.join("; ") };
+}
+
+const OPERATOR_ACTS = { start: "started the mission", take: "took command", off: "switched everything off" };
 
 /** What happened, a sentence a line: [{t, text, kind}]. */
 function story(run) {
@@ -168,53 +244,143 @@ function story(run) {
   const recovery = run.facts["/summary"]?.recovery;
   const zero = origin(run);
   if (run.departure !== null) say(run.departure, "Lift-off.");
-  for (const fault of faultsOf(run)) say(fault.t, fault.mode === "ok" ? `The ${fault.sensor} works again.` : `The ${fault.sensor} was made to fail (${fault.mode}).`, "bad");
+  for (const fault of faultsOf(run)) say(fault.t, fault.mode === "ok" ? `The ${named(fault.sensor)} works again.` : `The ${named(fault.sensor)} was made to fail${fault.mode && fault.mode !== "mock" ? ` (${fault.mode})` : ""}.`, "bad");
+  operatorTold(run, say);
   for (const failure of failures(run)) {
-    const chain = chainOf(run, failure);
-    const branch = chain.find(({ step }) => step === "decision");
-    const acts = chain.filter(({ step }) => ["stopped", "started"].includes(step));
-    const done = acts.map(({ text }) => text.replace(":", "")).join("; ");
-    const why = (failure.message || failure.result).replace(/, after .*$/, "");
-    say(failure.end, `${failure.skillset}.${failure.skill} ${ENDINGS[endingOf(failure)].words}${why ? `: ${why}` : ""}.`, "bad");
-    const reaction = [branch?.text, done].filter(Boolean).join("; ");
-    if (reaction) say(Math.max(failure.end, (branch ?? acts[0]).t), `Reaction: ${reaction}.`, "reaction");
+    say(failure.end, endingTold(failure), "bad");
+    const reaction = reactionTold(chainOf(run, failure));
+    if (reaction) say(Math.max(failure.end, reaction.t), `Reaction: ${reaction.text}.`, "reaction");
   }
-  if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, "The fallback watches: the flight is safe again.", "reaction");
+  if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, `The fallback runs${fallbackName(run, zero + recovery.fallback_running_s)} and keeps the flight safe.`, "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
-  const paused = new Set();
-  for (const act of run.operator) {
-    const pause = pauses(run).findIndex(({ from, to }) => from <= act.t && (to === null || act.t < to));
-    if (act.by !== "mission") say(act.t, `The operator: ${act.command}.`);
-    else if (act.command === "paused" && !paused.has(pause)) {
-      paused.add(pause); // later ones tell of what has ended meanwhile, which has a line of its own
-      say(act.t, `The mission is paused: ${act.reason}.`, "reaction");
-    }
-    else if (act.command === "resume") say(act.t, "The mission goes on.", "reaction");
-    else if (act.command === "abort") say(act.t, `The mission is told to stop: ${act.reason}.`, "reaction");
-  }
+  for (const { t, text } of autopilotActs(run)) say(t, `The autopilot ${text}.`, "reaction");
+  const landed = landing(run);
+  if (landed !== null) say(landed, "Landed.");
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
   return lines.sort((one, other) => one.t - other.t);
 }
 
-/** What the failures cost, a sentence each. */
+/** Tells what the operator did; of pause, resume and abort what the mission says, where it says something. */
+function operatorTold(run, say) {
+  const paused = new Set();
+  const byMission = new Set(run.operator.filter(({ by }) => by === "mission").map(({ command }) => command));
+  for (const act of run.operator) {
+    const pause = pauses(run).findIndex(({ from, to }) => from <= act.t && (to === null || act.t < to));
+    if (act.by !== "mission") {
+      if (byMission.has(act.command)) continue;
+      const done = OPERATOR_ACTS[act.command] ?? `asked for: ${act.command}${act.answer ? ` (${act.answer})` : ""}`;
+      say(act.t, `The operator ${done}.`);
+    } else if (act.command === "paused" && !paused.has(pause)) {
+      paused.add(pause); // later ones tell of what has ended meanwhile, which has a line of its own
+      say(act.t, `The mission is paused: ${act.reason}.`, "reaction");
+    } else if (act.command === "resume") say(act.t, "The mission goes on.", "reaction");
+    else if (act.command === "abort") say(act.t, `The mission is told to stop: ${act.reason}.`, "reaction");
+  }
+}
+
+/** The name of the skill that came to run at a moment, as ` (hover)`; nothing where there is none. */
+function fallbackName(run, t) {
+  const found = [...run.executions.values()].find(({ running }) => running !== null && Math.abs(running - t) < APART_S / 2);
+  return found ? ` (${found.skill})` : "";
+}
+
+/** When the vehicle came to stand on the ground for the last time; null: it has not. */
+function landing(run) {
+  const [, track] = [...run.resources].find(([name]) => name.endsWith(".flight_status")) ?? [];
+  if (!track || last(track.v).state !== "ON_GROUND" || last(track.v).from !== "IN_AIR") return null;
+  return last(track.t);
+}
+
+// What ArduPilot's modes besides GUIDED and LAND mean for the flight; in these the mission does not command.
+const MODES = { RTL: "flies home and lands by itself", BRAKE: "brakes and hovers by itself", LOITER: "obeys the pilot", ALT_HOLD: "obeys the pilot", STABILIZE: "obeys the pilot" };
+
+/** When the autopilot changed, in the air, to a mode in which the mission does not command: [{t, text}]. */
+function autopilotActs(run) {
+  const acts = [];
+  const [begin, end] = [run.departure ?? Infinity, landing(run) ?? Infinity];
+  for (const { t, columns } of run.data.values()) {
+    (columns.get("mode") ?? []).forEach((mode, index, modes) => {
+      if (index && mode !== modes[index - 1] && MODES[mode] && t[index] > begin && t[index] < end) acts.push({ t: t[index], text: `changed to ${mode}: it ${MODES[mode]}` });
+    });
+  }
+  return acts;
+}
+
+/** A row for each failure, abort and pause, and one for the whole mission: [{what, why, t, until, done, cost}]; the last has no t. */
+function answers(run) {
+  const rows = [];
+  const failed = failures(run);
+  const running = (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome ?? "running") === "running";
+  const groups = new Map();
+  for (const failure of failed) {
+    const fault = faultBehind(run, failure);
+    const key = fault ? `${fault.sensor} ${fault.t}` : `${failure.id} ${failure.end}`;
+    if (!groups.has(key)) groups.set(key, { fault, failures: [] });
+    groups.get(key).failures.push(failure);
+  }
+  for (const { fault, failures: own } of groups.values()) rows.push(failureRow(run, fault, own, failed));
+  for (const fault of faultsOf(run)) if (fault.mode !== "ok" && !groups.has(`${fault.sensor} ${fault.t}`)) rows.push({ what: faultWords(fault), t: fault.t, until: endOf(run, fault), done: running ? "nothing so far" : "nothing: no skill failed of it", cost: "" });
+  for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) {
+    const t = when === null ? run.begin : origin(run) + when;
+    if (!rows.some((row) => Math.abs(row.t - t) < REACTION_S)) rows.push({ what: `the process ${name} died: ${how}`, t, done: "nothing that the record tells of", cost: "" });
+  }
+  for (const act of run.operator) if (act.by === "mission" && act.command === "abort") rows.push({ what: `no failure: ${act.reason}`, t: act.t, done: `started: ${started(run, act.t, Infinity) || "nothing"}`, cost: "the rest of the mission" });
+  for (const { from, to } of pauses(run)) rows.push({ what: "no failure: the operator had the mission pause", t: from, until: to, done: run.operator.find(({ by, command, t }) => by === "mission" && command === "paused" && t >= from && (to === null || t < to))?.reason ?? "", cost: to === null ? "it is paused" : `${seconds(to - from)} paused` });
+  rows.sort((one, other) => one.t - other.t);
+  const whole = costs(run);
+  if (whole.length) rows.push({ what: "the whole mission", t: null, done: wholeDone(run), cost: whole.join("; ") });
+  return rows;
+}
+
+/** When what was made to fail was made to work again; null: it was not. */
+const endOf = (run, fault) => faultsOf(run).find(({ sensor, mode, t }) => sensor === fault.sensor && mode === "ok" && t > fault.t)?.t ?? null;
+
+function failureRow(run, fault, own, failed) {
+  const [first, final] = [own[0], last(own)];
+  const next = failed[failed.indexOf(final) + 1];
+  const done = own.map((failure) => reactionTold(chainOf(run, failure))?.text).filter(Boolean);
+  const until = Math.min(next?.end ?? Infinity, abortAfter(run, final.end));
+  for (const { t, text } of autopilotActs(run)) if (t >= own[0].end - REACTION_S && t < until) done.push(`the autopilot ${text}`);
+  const later = started(run, reactsUntil(run, final.end), until);
+  if (later) done.push(`afterwards ${later}`);
+  const since = fault?.t ?? first.end;
+  const cost = [];
+  if (fault) cost.push(`noticed after ${seconds(Math.max(0, first.end - since), 2)}`);
+  const recovery = run.facts["/summary"]?.recovery;
+  const recovered = recovery && Math.abs(origin(run) + (recovery.failure_s ?? recovery.detected_s) - since) < 1;
+  if (recovered && recovery.fallback_running_s != null) cost.push(`the fallback ran after ${seconds(recovery.fallback_running_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
+  if (recovered && recovery.moving_again_s != null) cost.push(`the vehicle moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
+  const why = own.map((failure) => endingTold(failure)).join(" ");
+  return { what: fault ? faultWords(fault) : `${first.skillset}.${first.skill}: ${endingOf(first) === "violated" ? `invariant ${first.result} violated` : `${words(first.state)} ${first.result}`.trim()}`, why, t: since, until: fault ? endOf(run, fault) : null, done: done.join("; ") || "nothing followed", cost: cost.join("; ") };
+}
+
+/** The skills that were started between two moments, in their order, as "hover, land"; empty where there are none. */
+function started(run, from, to) {
+  const found = [...run.executions.values()].filter(({ running }) => running !== null && running > from && running < to);
+  return [...new Set(found.map(({ skill }) => skill))].join(", ");
+}
+
+/** How the whole mission ended, in a few words. */
+function wholeDone(run) {
+  const outcome = run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome;
+  if (!outcome || outcome === "running") return "";
+  const on = run.facts["/summary"]?.landed;
+  return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), on === true ? "landed" : on === false ? "not landed" : ""].filter(Boolean).join("; ");
+}
+
+/** What the whole mission lost, a sentence each. */
 function costs(run) {
   const summary = run.facts["/summary"];
-  const recovery = summary?.recovery;
   const mission = last(run.mission.v) ?? {};
   const lines = [];
-  if (recovery?.failure_s != null && recovery.detected_s != null) lines.push(`${seconds(recovery.detected_s - recovery.failure_s, 2)} from the failure to its detection`);
-  if (recovery?.fallback_running_s != null) lines.push(`${seconds(recovery.fallback_running_s - (recovery.failure_s ?? recovery.detected_s), 2)} from the failure until the fallback watched`);
-  if (recovery?.moving_again_s != null) lines.push(`${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)} from the failure until the vehicle moved on`);
   if (mission.waypoints && mission.outcome !== "running") {
     const missed = mission.waypoints - mission.waypoints_reached;
     lines.push(missed ? `${missed} of ${mission.waypoints} waypoints were not reached` : "no waypoint was missed");
   }
-  for (const { from, to } of pauses(run)) if (to !== null) lines.push(`${seconds(to - from)} paused; what failed meanwhile was dealt with afterwards`);
-  if (summary?.outcome === "degraded") lines.push("the rest of the mission was flown in degraded mode");
-  if (summary?.outcome === "given_up") lines.push("the mission's aim was given up");
   if (summary?.collisions === 0) lines.push("nothing was hit");
+  if (summary?.collisions > 0) lines.push(`${summary.collisions} collisions`);
   return lines;
 }
 

@@ -103,7 +103,7 @@ class TimelineView {
   }
 
   label(text, y, kind = "") {
-    const letters = Math.floor((this.left - 8) / 6.4);
+    const letters = Math.floor((this.left - 8) / 7.1);
     const cut = text.length > letters ? `${text.slice(0, letters - 1)}…` : text;
     return svg("text", { x: this.left - 6, y: y + 4, "text-anchor": "end", class: kind }, cut, svg("title", {}, text));
   }
