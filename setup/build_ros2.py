@@ -1,33 +1,28 @@
 """Build the ROS 2 workspace with colcon: the packages that have changed since they were last built, and those that need them.
 
-Runs in the ROS 2 world's environment. What was built from what is kept in ``$ALULA_STATE/ros2/built.json``: contents decide, not time
-stamps, so a fresh checkout may take over the state of another. A change of compiler, Python or generators builds everything again.
+Runs in the ROS 2 world's environment. What was built from what is kept in ``$ALULA_STATE/ros2/built.json``. A change of compiler,
+Python or generators builds everything again.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from importlib.metadata import distributions
 from pathlib import Path
-from xml.etree import ElementTree as ET
+
+from workspace import Built, Package, build_files, digest, find_packages, state_of
 
 ROOT = Path(os.environ["ALULA_ROOT"])
 STATE = Path(os.environ["ALULA_STATE"])
 PLACES = ("ros2_ws/src", "bridge")
 BUILT = STATE / "ros2" / "built.json"
 BUILD, INSTALL, LOG = (STATE / "ros2" / name for name in ("build", "install", "log"))
-# Of a Python package only this is installed: its modules are found in the sources (setup/env.sh).
-BUILD_FILES = {"CMakeLists.txt", "package.xml", "setup.py", "setup.cfg"}
-BUILD_SUFFIXES = {".msg", ".srv", ".action", ".cpp", ".hpp"}
 TOOLS = re.compile(r"(ros-|colcon-|empy|catkin-pkg|numpy)", re.IGNORECASE)
 CMAKE_ARGUMENTS = (
     "-DCMAKE_BUILD_TYPE=None",
@@ -41,24 +36,6 @@ CMAKE_ARGUMENTS = (
 )
 
 
-@dataclass(frozen=True)
-class Package:
-    """A ROS 2 package: where it is, what it is made of, which others it needs."""
-
-    folder: Path
-    digest: str
-    needs: frozenset[str]
-
-
-def digest(*parts: str | bytes) -> str:
-    """Return a short hash of texts in their order."""
-    hashed = hashlib.sha256()
-    for part in parts:
-        hashed.update(part.encode() if isinstance(part, str) else part)
-        hashed.update(b"\0")
-    return hashed.hexdigest()[:16]
-
-
 def toolchain() -> str:
     """Return what decides how everything is built."""
     installed = distributions(path=[sysconfig.get_path("purelib")])
@@ -68,48 +45,17 @@ def toolchain() -> str:
     return digest(sys.version, compiler, *CMAKE_ARGUMENTS, *tools, *sources)
 
 
-def build_files(folder: Path) -> Iterator[Path]:
-    """Yield the files of a package that decide what is built, in a fixed order."""
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and (path.name in BUILD_FILES or path.suffix in BUILD_SUFFIXES):
-            yield path
-
-
-def read_package(folder: Path) -> tuple[str, Package]:
-    """Read a package's name, contents and dependencies."""
-    manifest = ET.parse(folder / "package.xml").getroot()  # noqa: S314 - our own
-    needs = frozenset(str(element.text).strip() for element in manifest if element.tag.endswith("depend"))
-    contents = digest(*(part for path in build_files(folder) for part in (str(path.relative_to(folder)), path.read_bytes())))
-    return str(manifest.findtext("name")).strip(), Package(folder, contents, needs)
-
-
-def find_packages() -> dict[str, Package]:
-    """Return all packages of the workspace by name."""
-    folders = [path.parent for place in PLACES for path in sorted((ROOT / place).glob("*/package.xml"))]
-    folders += [path.parent for path in sorted((STATE / "generated").glob("*/package.xml"))]
-    return dict(read_package(folder) for folder in folders)
-
-
-def state_of(name: str, packages: Mapping[str, Package]) -> str:
-    """Return a hash of a package and of everything of the workspace that it is compiled against; Python only runs with what it needs."""
-    package = packages[name]
-    if not (package.folder / "CMakeLists.txt").exists():
-        return package.digest
-    return digest(package.digest, *(state_of(needed, packages) for needed in sorted(package.needs & packages.keys())))
-
-
-def read_built(packages: Mapping[str, Package], states: Mapping[str, str]) -> dict[str, str]:
-    """Return what was built, state by package; nothing when the toolchain was another, and then nothing of it is kept."""
-    if not BUILT.exists():  # an interrupted build, or one by colcon itself: what is younger than its sources counts
-        return {name: states[name] for name, package in packages.items() if is_younger(name, package)}
-    built, tools = json.loads(BUILT.read_text(encoding="utf-8")), toolchain()
-    # A record without these is an earlier version's; what is missing of its packages is found by `is_incomplete`.
-    if built.get("tools", tools) != tools:
+def read_built(packages: Mapping[str, Package], states: Mapping[str, str], tools: str) -> Built:
+    """Return what was built; nothing when the toolchain was another, and then nothing of it is kept."""
+    built = Built.read(BUILT)
+    if built is None:  # an interrupted build, or one by colcon itself: what is younger than its sources counts
+        return Built(tools, {name: states[name] for name, package in packages.items() if is_younger(name, package)})
+    if built.tools != tools:
         for folder in (BUILD, INSTALL):
             shutil.rmtree(folder, ignore_errors=True)
         BUILT.unlink()
-        return {}
-    return dict(built["packages"])
+        return Built(tools, {})
+    return built
 
 
 def run_colcon(names: list[str], packages: Mapping[str, Package]) -> int:
@@ -152,21 +98,22 @@ def is_incomplete(name: str, package: Package) -> bool:
 
 def build() -> int:
     """Build what has changed; return the exit code."""
-    packages = find_packages()
+    packages = find_packages([*(ROOT / place for place in PLACES), STATE / "generated"])
     states = {name: state_of(name, packages) for name in packages}
-    built = read_built(packages, states)
+    tools = toolchain()
+    built = read_built(packages, states, tools)
     leftovers = [name for name, package in packages.items() if has_leftovers(name, package)]
     for name in leftovers:
         shutil.rmtree(BUILD / name)
     incomplete = [name for name, package in packages.items() if is_incomplete(name, package)]
-    changed = [name for name, state in states.items() if built.get(name) != state or name in {*leftovers, *incomplete}]
+    again = {*built.changed(states), *leftovers, *incomplete}
+    changed = [name for name in packages if name in again]
     sys.stdout.write(f"to build: {' '.join(changed) or 'nothing'}\n")
     sys.stdout.flush()
     for name in changed:
         (BUILD / name / "colcon_build.rc").unlink(missing_ok=True)
     code = run_colcon(changed, packages) if changed else 0
-    kept = {name: state for name, state in states.items() if name not in changed or succeeded(name)}
-    BUILT.write_text(json.dumps({"tools": toolchain(), "packages": kept}, indent=1) + "\n", encoding="utf-8")
+    Built(tools, {name: state for name, state in states.items() if name not in changed or succeeded(name)}).write(BUILT)
     return code
 
 

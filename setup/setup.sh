@@ -56,12 +56,12 @@ together() {
 digest() { cat "$@" 2>/dev/null | sha256sum | cut -c1-16; }
 tree_digest() { # of all files below the given folders that decide what is built
   find -L "$@" -type f \( -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name CMakeLists.txt -o -name package.xml -o -name 'setup.*' \
-    -o -name '*.cpp' -o -name '*.hpp' -o -path '*/scripts/*' \) -not -path '*/__pycache__/*' -print0 2>/dev/null | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
+    -o -name '*.cpp' -o -name '*.hpp' -o -path '*/scripts/*' \) -not -path '*/__pycache__/*' -print0 2>/dev/null | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16
 }
 
 model_digest() { # of the models and of what generates from them
   ( cd "$ALULA_ROOT" && find skillsets ros2_ws/src/skill_model ros2_ws/src/skill_language -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
-      -not -path '*/.*' -not -path '*/test/*' -print0 | sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16 )
+      -not -path '*/.*' -not -path '*/test/*' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16 )
 }
 
 check_machine() {
@@ -127,27 +127,7 @@ tell_broken_robots() {
   done 2>/dev/null <"$ALULA_STATE/broken_robots"
 }
 
-build_ros1() {
-  ( . "$ALULA_ROOT/setup/env.sh" 1
-    export CMAKE_PREFIX_PATH=/usr
-    # Everything in the ROS 1 world is Python.
-    export ROS_LANG_DISABLE=gencpp:geneus:genlisp:gennodejs
-    # catkin wants a CMakeLists.txt beside the packages; the workspace is linked so that the checkout stays clean.
-    mkdir -p "$ALULA_STATE/ros1" && ln -sfn "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE/ros1/linked_src" || exit 1
-    # The interpreter of the environment goes into the shebangs of the nodes' relay scripts; newer catkin looks for it under the second name.
-    local python="$ALULA_STATE/venv1/bin/python3"
-    catkin_make -C "$ALULA_STATE/ros1" --source "$ALULA_STATE/ros1/src" -DPYTHON_EXECUTABLE="$python" -DPython_EXECUTABLE="$python" \
-      -DCATKIN_ENABLE_TESTING=OFF )
-}
-
-prepare_ros1_sources() { # $ALULA_STATE/ros1/src holds links to the packages: catkin_make writes its toplevel file beside them
-  rm -rf "$ALULA_STATE/ros1/src"; mkdir -p "$ALULA_STATE/ros1/src"
-  for package in "$ALULA_ROOT"/ros1_ws/src/*/ "$ALULA_STATE"/generated/*_interfaces/; do
-    [ -d "$package" ] || continue
-    ln -sfn "$(readlink -f "$package")" "$ALULA_STATE/ros1/src/$(basename "$package")"
-  done
-}
-make_ros1() { prepare_ros1_sources && build_ros1; }
+make_ros1() { ( . "$ALULA_ROOT/setup/env.sh" 1 && python3 "$ALULA_ROOT/setup/build_ros1.py" ); }
 
 make_ros2() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
@@ -177,10 +157,10 @@ step_venv2() {
 }
 step_generated() { step generated "$(model_digest)" generate "skillsets: interfaces, managers, bridge configuration"; }
 step_ros1() {
-  step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")" make_ros1 "ROS 1 workspace (catkin_make)"
+  step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")-$(digest "$ALULA_ROOT"/setup/{workspace,build_ros1}.py)" make_ros1 "ROS 1 workspace (catkin_make)"
 }
 step_ros2() {
-  local wheels; wheels=$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{build_ros2.py,interfaces.cmake,repair_wheels.py})
+  local wheels; wheels=$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{workspace.py,build_ros2.py,interfaces.cmake,repair_wheels.py})
   step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$wheels-$ALULA_STATE" make_ros2 "ROS 2 workspace (colcon build)"
 }
 run apt

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import os
 import subprocess
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from alula_common.network import claim_domain
 from alula_testing.cover import cover
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture
-def build_ros2(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> ModuleType:
-    """Return ``setup/build_ros2.py`` as a module."""
-    monkeypatch.setenv("ALULA_ROOT", str(ALULA_ROOT))
-    monkeypatch.setenv("ALULA_STATE", str(tmp_path))
-    spec = importlib.util.spec_from_file_location("build_ros2", ALULA_ROOT / "setup" / "build_ros2.py")
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "build_ros2", module)
-    spec.loader.exec_module(module)
-    return module
+def workspace(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return ``setup/workspace.py`` as a module."""
+    monkeypatch.syspath_prepend(ALULA_ROOT / "setup")
+    return importlib.import_module("workspace")
 
 
 def package(folder: Path, build_file: str, *needs: str) -> Path:
@@ -36,7 +31,7 @@ def package(folder: Path, build_file: str, *needs: str) -> Path:
     return folder
 
 
-def test_an_interface_that_changes_is_built_again_with_what_is_compiled_against_it_and_nothing_else(build_ros2, tmp_path):
+def test_an_interface_that_changes_is_built_again_with_what_is_compiled_against_it_and_nothing_else(workspace, tmp_path):
     folders = [
         package(tmp_path / "interfaces", "CMakeLists.txt"),
         package(tmp_path / "more_interfaces", "CMakeLists.txt", "interfaces"),
@@ -45,8 +40,8 @@ def test_an_interface_that_changes_is_built_again_with_what_is_compiled_against_
     ]
 
     def states() -> dict[str, str]:
-        packages = dict(build_ros2.read_package(folder) for folder in folders)
-        return {name: build_ros2.state_of(name, packages) for name in packages}
+        packages = dict(workspace.read_package(folder) for folder in folders)
+        return {name: workspace.state_of(name, packages) for name in packages}
 
     before = states()
     (tmp_path / "interfaces" / "Rest.action").write_text("---\n---\n")
@@ -54,11 +49,74 @@ def test_an_interface_that_changes_is_built_again_with_what_is_compiled_against_
     assert {name for name in before if before[name] != after[name]} == {"interfaces", "more_interfaces"}
 
 
+MESSAGES_CMAKE = """cmake_minimum_required(VERSION 3.16)
+project({name})
+find_package(catkin REQUIRED COMPONENTS message_generation {needs})
+add_message_files(FILES M.msg)
+generate_messages(DEPENDENCIES {needs})
+catkin_package(CATKIN_DEPENDS message_runtime {needs})
+"""
+
+
+def message_package(folder: Path, message: str, *needs: str) -> None:
+    """Make a ROS 1 package with one message, ``M``."""
+    (folder / "msg").mkdir(parents=True)
+    (folder / "msg" / "M.msg").write_text(message)
+    (folder / "CMakeLists.txt").write_text(MESSAGES_CMAKE.format(name=folder.name, needs=" ".join(needs)))
+    depends = "".join(f"<depend>{name}</depend>" for name in ("message_generation", "message_runtime", *needs))
+    (folder / "package.xml").write_text(
+        f'<package format="2"><name>{folder.name}</name><version>0.1.0</version><description>A message.</description>'
+        '<maintainer email="alula@alula-robotics.org">Alula</maintainer><license>Apache-2.0</license>'
+        f"<buildtool_depend>catkin</buildtool_depend>{depends}</package>"
+    )
+
+
+def test_one_more_message_of_ros_1_configures_and_builds_its_package_and_those_that_need_it_only(tmp_path):
+    sources, state = tmp_path / "ros1_ws/src", tmp_path / "state"
+    message_package(sources / "below", "int32 number\n")
+    message_package(sources / "above", "below/M below\n", "below")
+    message_package(sources / "beside", "int32 number\n")
+    in_state = [f"{ALULA_ROOT}/setup/in_ros1", "env", f"ALULA_ROOT={tmp_path}", f"ALULA_STATE={state}"]
+    devel = state / "ros1/devel"
+
+    def build() -> str:
+        done = subprocess.run([*in_state, "python3", f"{ALULA_ROOT}/setup/build_ros1.py"], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+        return done.stdout.splitlines()[0]
+
+    def fields(name: str) -> str:
+        ask = f"from {name}.msg import M; print(*M.__slots__, *M()._slot_types)"
+        path = f"PYTHONPATH={devel}/lib/python3/dist-packages"
+        return subprocess.run([*in_state, path, "python3", "-c", ask], capture_output=True, text=True, check=True).stdout.strip()
+
+    def configured_ns() -> dict[str, int]:
+        return {name: (devel / f"share/{name}/cmake/{name}Config.cmake").stat().st_mtime_ns for name in ("below", "above", "beside")}
+
+    def add(name: str) -> None:
+        with (sources / name / "msg/M.msg").open("a") as message:
+            message.write("string more\n")
+
+    assert build() == "to build: above below beside"
+    first = configured_ns()
+    assert build() == "to build: nothing"
+    add("above")
+    assert build() == "to build: above"
+    assert fields("above") == "below more below/M string"
+    second = configured_ns()
+    assert {name for name in first if first[name] != second[name]} == {"above"}
+    add("below")
+    assert build() == "to build: above below"
+    assert fields("below") == "number more int32 string"
+    assert fields("above") == "below more below/M string"
+    assert configured_ns()["beside"] == first["beside"]
+
+
 def test_a_robot_whose_models_have_errors_is_left_out_and_named_and_keeps_no_other_from_working(tmp_path):
     broken = (
         "mkdir -p skillsets/broken && echo 'skillset broken { resource door { initial SHUT SHUT -> -> OPEN } }' > skillsets/broken/b.skill"
     )
     covered = cover(tmp_path)
+    claim = claim_domain()  # what others fly on this machine is not heard there
     environment = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "ROS_DOMAIN_ID"}}
 
     def run(command: str) -> subprocess.CompletedProcess[str]:
@@ -68,7 +126,8 @@ def test_a_robot_whose_models_have_errors_is_left_out_and_named_and_keeps_no_oth
     checked = run("./alula check skillsets/broken/b.skill")
     assert (checked.returncode, "skillsets/broken/b.skill:1:" in checked.stdout, "^" in checked.stdout) == (1, True, True), checked
     assert run("./alula check --no-proofs skillsets/uav/mapping.skill").returncode == 0
-    listed = run("./alula skills --json")
+    listed = run(f"./alula skills --json --domain {claim.domain}")
+    claim.release()
     assert "the robot 'broken' is left out" in listed.stderr, listed.stderr
     assert "no skillset runs" in listed.stderr, listed.stderr
     assert listed.stdout == ""
