@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rosbags.highlevel import AnyReader
 
 from alula_testing.flights import Flight, start_flight, story
 from skill_model.execution_state import ExecutionState
@@ -17,6 +18,8 @@ Summary = dict[str, Any]
 MIN_CLEARANCE_M = 0.8
 MAX_RMSE_M = 0.15
 MAX_RECOVERY_S = 1.0
+MAX_RECORD_START_S = 0.02  # mission clock: the first tick
+MAX_START_S = 2.0  # mission clock; the start of the nodes takes ten times as long on the wall
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +60,30 @@ def test_nominal_mission_is_accomplished_and_safe(nominal: Summary) -> None:
     assert not executions(nominal, "lidar_depthmap")
     assert all(e["result"] == "ARRIVED" for e in executions(nominal, "goto_straight"))
     assert nominal["problems"] == []
+
+
+@pytest.mark.usefixtures("nominal", "failing")
+def test_the_recording_begins_when_simulated_time_does(pair: tuple[Flight, Flight]) -> None:
+    for flight in pair:
+        stamps_s = first_stamps_s(flight.out / "functional.bag", ("/imu/data", "/sim/true_pose"))
+        assert max(stamps_s.values()) <= MAX_RECORD_START_S, stamps_s
+
+
+def first_stamps_s(bag: Path, topics: Iterable[str]) -> dict[str, float]:
+    """Return the stamp of the first message of each topic, seconds of mission clock."""
+    found: dict[str, float] = {}
+    with AnyReader([bag]) as reader:
+        for topic in topics:
+            connection, _, data = next(reader.messages([one for one in reader.connections if one.topic == topic]))
+            stamp = reader.deserialize(data, connection.msgtype).header.stamp
+            found[topic] = stamp.sec + stamp.nanosec / 1e9
+    return found
+
+
+@pytest.mark.usefixtures("nominal", "failing")
+def test_how_long_nodes_take_to_start_changes_no_flight(pair: tuple[Flight, Flight]) -> None:
+    starts = [json.loads((flight.out / "mission.json").read_text(encoding="utf-8"))["start_s"] for flight in pair]
+    assert max(starts) < MAX_START_S
 
 
 def test_nominal_map_is_true_and_complete(nominal: Summary) -> None:

@@ -196,7 +196,7 @@ class Ends:
                 self._rospy.wait_for_service(SERVICE, max(0.1, end_s - time.monotonic()))
                 answer = self._rospy.ServiceProxy(SERVICE, self._service_class)(data=True)
             except (self._rospy.ServiceException, self._rospy.ROSException, OSError) as error:
-                # The master may go between these two lines; then nobody was called.
+                # The master may go between these two lines; then no server was called.
                 if any(word in str(error) for word in MASTER_GONE) and time.monotonic() < end_s:
                     continue
                 self._figures.failures.append(str(error))

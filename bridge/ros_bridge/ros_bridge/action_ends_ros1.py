@@ -37,7 +37,7 @@ class ActionlibServerEnd:
         return all(end.peers() > 0 for end in self._ends)
 
     def gone(self) -> bool:
-        """Tell whether nobody publishes the server's status any more."""
+        """Tell whether the server's status has no publisher any more."""
         return self._status.peers() == 0
 
     def send_goal(self, name: str, payload: bytes) -> None:

@@ -1,7 +1,7 @@
 """Actions: a route an action, one class for each side that the server can be on. They join the goals (pure) to the ends in both worlds.
 
 Ends deliver from the data plane's thread for Python and from the executor's; a thread of the route brings time. All of them take
-the goals' lock, and nothing done under it waits for anybody.
+the goals' lock, and nothing done under it waits.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class ActionlibServer(Protocol):
         """Tell whether all five topics have a peer that listens or speaks."""
 
     def gone(self) -> bool:
-        """Tell whether nobody publishes the server's status any more."""
+        """Tell whether the server's status has no publisher any more."""
 
     def send_goal(self, name: str, payload: bytes) -> None:
         """Publish a goal."""
@@ -104,7 +104,7 @@ class GoalsToRos1:
         self._goals: dict[bytes, GoalToRos1] = {}
 
     def connect(self, server: ActionlibServer, clients: Ros2Clients) -> None:
-        """Take both ends; whoever opens them holds the lock meanwhile, so that what they bring waits."""
+        """Take both ends; the caller that opens them holds the lock meanwhile, so that what they bring waits."""
         self._server = server
         self._clients = clients
 

@@ -108,7 +108,7 @@ class GoalsToRos2:
         self._next_status_s = 0.0
 
     def connect(self, server: Ros2Server, clients: Ros1Clients) -> None:
-        """Take both ends; whoever opens them holds the lock meanwhile, so that what they bring waits."""
+        """Take both ends; the caller that opens them holds the lock meanwhile, so that what they bring waits."""
         self._server = server
         self._clients = clients
 
@@ -172,7 +172,7 @@ class GoalsToRos2:
                 if accepted:
                     self._server.send_cancel(goal_uuid)
             elif goal.sent_s is None:
-                return  # nobody was asked
+                return  # the goal was never sent
             elif accepted:
                 goal.stamp_ns = goal.stamp_ns or stamp_ns
                 self._accept(goal)

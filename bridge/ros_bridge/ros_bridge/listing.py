@@ -32,7 +32,7 @@ def list_routes(config: BridgeConfig, types: Types, master: Connection) -> str:
     reader = GraphReader(node, types, master, f"/{LIST_NODE}")
     try:
         end_s = time.monotonic() + AT_MOST_S
-        while time.monotonic() < end_s and events.wait(QUIET_S):  # DDS finds everybody in its own time
+        while time.monotonic() < end_s and events.wait(QUIET_S):  # DDS finds the others in its own time
             time.sleep(QUIET_S / 10)
         reader.read_ros1(master.call_raw("getSystemState", f"/{LIST_NODE}"))
         decisions = decide(reader.graphs(), config.selection, reader.types, config.routes)

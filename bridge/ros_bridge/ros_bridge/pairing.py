@@ -1,7 +1,7 @@
 """Put the fields of a ROS 1 type and a ROS 2 type side by side: the same layout, or a plan that fills one from the other.
 
 Rules, in this order: fields that a mapping names; then fields of the same name (letter case and trailing underscores aside). Fields
-that only one of the two types has stay at zero in one direction and are lost in the other; where both have such fields, nobody but
+that only one of the two types has stay at zero in one direction and are lost in the other; where both have such fields, only
 the user knows whether they are the same, and the pair is refused. Kinds of fields have to agree, except for single numbers in a mapping.
 """
 

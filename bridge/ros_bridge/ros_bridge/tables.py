@@ -82,7 +82,7 @@ def list_table(decisions: Iterable[Decision], configured: Mapping[Spec, str]) ->
         if isinstance(decision, Refused):
             rows.append((decision.kind, decision.ros1_name, "x", decision.ros2_name, "", "", f"can't be: {decision.reason}"))
         else:
-            receivers = f"{decision.receivers} receive" if decision.receivers else "offered; nobody subscribes"
+            receivers = f"{decision.receivers} receive" if decision.receivers else "offered; no subscriber"
             rows.append(_row(decision.spec, receivers if isinstance(decision.spec, TopicRoute) else "offered"))
     return rows
 

@@ -22,7 +22,7 @@ ALL = Selection(("*",))
 
 
 class Types:
-    """Every type is itself in the other world, but for one that nobody has over there."""
+    """Every type is itself in the other world, but for one that the other world does not have."""
 
     def pair(self, ros1_type, ros2_type, topic):
         kind = ros1_type or ros2_type

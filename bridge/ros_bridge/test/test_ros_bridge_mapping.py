@@ -1,4 +1,4 @@
-"""Types that differ between the worlds: mapped by their names, by rules of a mapping, or refused by the field that nobody can place."""
+"""Types that differ between the worlds: mapped by their names, by rules of a mapping, or refused by the field that has no counterpart."""
 
 import struct
 

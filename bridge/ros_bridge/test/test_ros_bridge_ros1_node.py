@@ -125,7 +125,7 @@ def test_parameters_are_read_at_first_when_told_and_after_a_restart(node):
     node.subscribe_parameters(lambda: changed.append(1))
     assert ("subscribeParam", node.uri, "/") in master_of(node).asked
     with socket.create_connection(("127.0.0.1", int(node.uri.rpartition(":")[2].rstrip("/")))):
-        pass  # a peer that says nothing harms nobody
+        pass  # a peer that says nothing does no harm
     assert Connection(node.uri).call("getPid", "/peer") > 0
     Connection(node.uri).call("paramUpdate", "/master", "/rate", 5)
     node.register_again()

@@ -64,7 +64,7 @@ def test_spinning_goes_on_after_an_end_was_closed_under_the_executor(world, capl
     assert thread.is_alive()
     node.destroy_subscription(subscription)
     assert works(node)
-    assert not [record for record in caplog.records if record.exc_info]  # nobody is to look for a callback that raised
+    assert not [record for record in caplog.records if record.exc_info]  # no callback has raised
 
 
 def test_spinning_goes_on_after_a_callback_has_raised(world, caplog):

@@ -67,7 +67,7 @@ def bridge_command(*arguments):
 def listed(master, topic):
     """Return the rows of ``--list`` by the names in ROS 1, a row of the topic among them.
 
-    On a busy machine DDS may need longer to find everybody than the list waits.
+    On a busy machine DDS may need longer to find all nodes than the list waits.
     """
     rows: dict = {}
 
@@ -88,7 +88,7 @@ def test_the_list_tells_what_would_be_and_what_can_not_and_ends(ros1, ros2_node,
     ros1.do("publish", topic="/d/listed", values={})
     ros1.expect("published", topic="/d/listed")
     rows = listed(master, "/d/careless")
-    assert "topic /d/listed -> /d/listed std_msgs/String reliable, transient local, 100 offered; nobody subscribes" in rows["/d/listed"]
+    assert "topic /d/listed -> /d/listed std_msgs/String reliable, transient local, 100 offered; no subscriber" in rows["/d/listed"]
     assert "topic /d/careless <- /d/careless std_msgs/String best effort, volatile, 100" in rows["/d/careless"]
     assert "/d/unlisted x /d/unlisted can't be: message type rosgraph_msgs/TopicStatistics" in rows["/d/unlisted"]
     assert "/rosout" not in rows

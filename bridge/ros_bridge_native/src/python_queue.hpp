@@ -26,7 +26,7 @@ struct PythonMessage {
   size_t offset;  // where the message begins
 };
 
-// A bounded queue for each route, taken from in turn by one thread of Python. Nobody here ever waits for Python.
+// A bounded queue for each route, taken from in turn by one thread of Python. No other thread ever waits for Python.
 class PythonQueue {
  public:
   // Returns how many older messages of the route had to go.

@@ -50,7 +50,7 @@ ServiceInRos1::~ServiceInRos1() {
   if (answered) service_->wait_for_arrival(kFarewellNs);
 }
 
-// In a thread of DDS; in the loop's when it had too many. Requests that nobody takes are DDS's to keep or to let go.
+// In a thread of DDS; in the loop's when it had too many. DDS keeps or drops requests that are not taken.
 void ServiceInRos1::take_requests() {
   while (true) {
     if (posted_.load() >= kMostPosted) {
@@ -228,7 +228,7 @@ void ServiceInRos1::fail(Calls::iterator call, const std::string & reason) {
   const Call failed = std::move(call->second);
   waiting_.erase(std::remove(waiting_.begin(), waiting_.end(), call->first), waiting_.end());
   calls_.erase(call);
-  if (failed.connection && failed.connection->calling()) failed.connection->drop();  // whose answer nobody waits for any more
+  if (failed.connection && failed.connection->calling()) failed.connection->drop();  // no caller waits for its answer any more
   end_spare_attempts();
   replies_.refuse(failed.who, reason);
 }
@@ -246,7 +246,7 @@ std::string ServiceInRos1::why_late(const Call & call) const {
   return problem_ + " for " + specification_.ros1.service + " in ROS 1";
 }
 
-// End calls whose time is over and connections that nobody has used lately; look for a server for those that wait.
+// End calls whose time is over and connections that have not been used lately; look for a server for those that wait.
 void ServiceInRos1::look() {
   const int64_t now = now_ns();
   while (!calls_.empty() && calls_.begin()->second.deadline_ns <= now) {

@@ -17,7 +17,7 @@
 namespace plane {
 
 // Calls live in the loop's thread. Threads of DDS take the requests and post them to it.
-// A request is sent once: whether a server that died in a call had carried it out nobody knows, so it is not repeated.
+// A request is sent once: a server that died in a call may have carried it out, so it is not repeated.
 class ServiceInRos1 : public Route, public CallListener {
  public:
   ServiceInRos1(Context & context, ServiceSpecification specification);

@@ -26,7 +26,7 @@ struct Incoming {
   const Program * program;
   Buffer * frame;
   uint32_t sequence;
-  bool wanted;           // false: nobody listens, so spare the copy
+  bool wanted;           // false: no subscriber, so spare the copy
   bool touched = false;  // there was a message
   bool good = false;     // and it was one of the layout
 };

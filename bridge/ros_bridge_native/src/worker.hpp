@@ -21,7 +21,7 @@ class Worker {
 
   // Have the job's work() called soon, once for all calls until it begins.
   void schedule(Job * job);
-  // Return when the job is neither waiting nor running; nobody may schedule it any more.
+  // Return when the job is neither waiting nor running; it may not be scheduled any more.
   void forget(Job * job);
 
  private:

@@ -93,7 +93,7 @@ def test_a_guidance_without_a_vehicle_says_so_after_a_while():
     assert guidance.resources() == {"SDK_authority": "UNAVAILABLE", "homepoint_status": "INVALID"}
 
 
-def test_guided_is_asked_for_again_only_while_nobody_answers(flight):
+def test_guided_is_asked_for_again_only_while_no_answer_comes(flight):
     flight.vehicle.deaf = True
     flight.run(12.0)
     assert flight.commands == []

@@ -65,7 +65,7 @@ def test_tcp_that_is_not_there_yet_and_goes_away():
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         ear = Ear(f"tcp:127.0.0.1:{listener.getsockname()[1]}")
-        ear.link.send(heartbeat_message())  # lost: nobody is there
+        ear.link.send(heartbeat_message())  # lost: no peer is there
         assert not ear.connected.acquire(timeout=0.3)
         listener.listen()
         for mode in (4, 5):

@@ -231,7 +231,7 @@ def test_obstacle_stops_it_and_it_goes_on_when_clear(bench):
         return condition(bench.state)
 
     wait_until(lambda: clear_and(lambda s: not s.obstacle_stop and s.position_enu_m.x > obstacle_at), timeout_s=15.0, what="going on")
-    bench.until(lambda s: s.unwatched and s.obstacle_stop, "nobody watches any more")
+    bench.until(lambda s: s.unwatched and s.obstacle_stop, "no sensor watches any more")
 
 
 def test_reconnects_and_asks_for_its_streams_again(bench):

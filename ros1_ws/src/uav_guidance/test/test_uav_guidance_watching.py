@@ -1,4 +1,4 @@
-"""Braking before obstacles, and when nobody watches the way."""
+"""Braking before obstacles, and when no sensor watches the way."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def braking_begins_s(flight: PureFlight, limit_s: float = 2.0) -> float:
     pytest.fail(f"flies on: {flight.setpoints[-1][1].position_enu_m} after {place}")
 
 
-def test_brakes_within_0_3_s_when_nobody_watches_any_more_and_goes_on_when_somebody_does(flying):
+def test_brakes_within_0_3_s_when_no_sensor_watches_any_more_and_goes_on_when_one_does(flying):
     flying.go(30.0, 0.0, speed=1.5)
     watch(flying, 4.0)
     see(flying, None)
@@ -82,13 +82,13 @@ def test_brakes_within_0_3_s_when_nobody_watches_any_more_and_goes_on_when_someb
     flying.run(3.0)
     stopped_x = flying.vehicle.enu[0]
     flying.run(3.0)
-    assert flying.vehicle.enu[0] == pytest.approx(stopped_x, abs=0.05), "it stays until somebody watches"
+    assert flying.vehicle.enu[0] == pytest.approx(stopped_x, abs=0.05), "it stays until a sensor watches"
     watch(flying, 2.0, source="lidar")
     assert not flying.report.course.obstacle_stop
     assert flying.vehicle.enu[0] > stopped_x + 1.0
 
 
-def test_an_obstacle_that_nobody_sees_any_more_is_not_forgotten(flying):
+def test_an_obstacle_that_no_sensor_sees_any_more_is_not_forgotten(flying):
     flying.go(30.0, 0.0, speed=1.5)
     watch(flying, 3.0)
     watch(flying, 1.0, flying.vehicle.enu[0] + 3.5)
@@ -111,6 +111,18 @@ def test_a_way_that_can_not_be_judged_is_not_free(flying):
     assert not flying.report.course.obstacle_stop, "one that can judge is enough"
 
 
+def test_a_climb_on_the_spot_needs_no_way_ahead(flying):
+    watch(flying, 0.5, unknown=True)
+    x, y, z = flying.vehicle.enu
+    flying.go(x + 0.2, y, z + 4.0)
+    watch(flying, 8.0, unknown=True)
+    assert not flying.report.course.obstacle_stop
+    assert flying.vehicle.enu[2] == pytest.approx(z + 4.0, abs=0.2)
+    flying.go(x + 5.0, y, z + 4.0)
+    watch(flying, 1.0, unknown=True)
+    assert flying.report.course.obstacle_stop
+
+
 @pytest.mark.parametrize("stamp_s", [lambda now_s: now_s - 0.7, lambda now_s: now_s + 10.0, lambda _: 1.0, lambda _: math.nan])
 def test_a_verdict_on_an_old_or_a_future_measurement_is_none(flying, stamp_s):
     flying.go(30.0, 0.0, speed=1.5)
@@ -123,7 +135,7 @@ def test_a_verdict_on_an_old_or_a_future_measurement_is_none(flying, stamp_s):
     assert not flying.report.course.obstacle_stop, "a wrong stamp does no harm to the right ones after it"
 
 
-def test_where_nobody_has_watched_in_this_flight_it_flies_unwatched(flying):
+def test_where_no_sensor_has_watched_in_this_flight_it_flies_unwatched(flying):
     flying.go(3.0, 0.0)
     flying.until(lambda r: r.course.remaining_enu_m.norm < 0.2)
     watch(flying, 1.0)

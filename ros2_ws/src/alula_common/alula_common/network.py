@@ -20,7 +20,7 @@ class NoFreeDomainError(Exception):
 
 
 def free_port() -> int:
-    """Return a TCP port on loopback that nobody listens on at this moment.
+    """Return a TCP port on loopback that is free at this moment.
 
     Below the range that the system takes ports of outgoing connections from: any process could be given a port of that range
     between this look and the moment when our own process listens.

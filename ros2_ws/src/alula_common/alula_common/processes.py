@@ -1,4 +1,4 @@
-"""Find and end every process of a run, whoever started it and however its parents died.
+"""Find and end every process of a run, however it was started and its parents died.
 
 All processes of a run inherit ``ALULA_RUN_ID``; a process is of the run if, and only if, its environment carries that id.
 """
@@ -46,7 +46,7 @@ def end_run(run_id: str, *, patience_s: float = 3.0) -> list[int]:
 def _signal_all(run_id: str, send: Callable[[psutil.Process], None], wait_s: float) -> None:
     """Signal the run's processes and wait for their ends, also for those of processes born meanwhile.
 
-    Looks again and again, because waiting by psutil would take a child's exit code away from whoever started it.
+    Looks again and again, because waiting by psutil would take a child's exit code away from its parent.
     """
     for process in processes_of_run(run_id):
         with contextlib.suppress(psutil.NoSuchProcess):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from alula_common.network import is_claimed
+from alula_common.processes import processes_of_run
 
 LATEST = "latest"
 
@@ -18,15 +19,16 @@ class NoRunError(Exception):
 
 @dataclass(frozen=True)
 class Run:
-    """A run's folder and the DDS domain that it has claimed."""
+    """A run's folder, the DDS domain that it has claimed, and the id that its processes carry; empty: not known."""
 
     folder: Path
     domain: int
+    run_id: str = ""
 
     @property
     def live(self) -> bool:
-        """Tell whether somebody still holds the domain."""
-        return is_claimed(self.domain)
+        """Tell whether the domain is held, and by this run: domains are used again, and what is sent there reaches the run that has it."""
+        return is_claimed(self.domain) and (not self.run_id or bool(processes_of_run(self.run_id)))
 
 
 def runs_folder() -> Path:
@@ -37,8 +39,9 @@ def runs_folder() -> Path:
 def load_run(folder: Path) -> Run:
     """Read a run's folder; raise NoRunError."""
     try:
-        return Run(folder, int(json.loads((folder / "run.json").read_text(encoding="utf-8"))["domain"]))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        known = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        return Run(folder, int(known["domain"]), str(known.get("run_id", "")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise NoRunError(f"{folder} is no run's folder: it has no run.json that names a domain") from error
 
 
@@ -70,5 +73,5 @@ def find_run(which: str) -> Run:
         return runs[0]
     run = load_run(Path(which))
     if not run.live:
-        raise NoRunError(f"the run in {which} has ended: nobody holds its domain {run.domain} any more")
+        raise NoRunError(f"the run in {which} has ended: it does not hold its domain {run.domain} any more")
     return run

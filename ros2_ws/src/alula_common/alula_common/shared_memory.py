@@ -14,7 +14,7 @@ SHARED_MEMORY = Path("/dev/shm")  # noqa: S108  (where POSIX puts it)
 def sweep_shared_memory(*, older_than_s: float = 0.0) -> int:
     """Remove the segments whose owner is dead; return how many.
 
-    Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, nobody does. While others
+    Fast DDS holds a lock on ``<segment>_el`` as long as a segment's owner lives; where the lock can be had, the owner is dead. While others
     may be creating segments, ``older_than_s`` spares those whose lock was made but not yet taken.
     """
     removed = 0

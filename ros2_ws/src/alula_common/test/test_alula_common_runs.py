@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 
 from alula_common.network import claim_domain, is_claimed
+from alula_common.processes import RUN_ID_VARIABLE
 from alula_common.runs import NoRunError, find_run, live_runs, load_run
 
 
@@ -18,11 +21,11 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "runs"
 
 
-def make_run(folder, name: str, domain: object, age_s: float):
+def make_run(folder, name: str, domain: object, age_s: float, **more: object):
     place = folder / name
     place.mkdir()
     file = place / "run.json"
-    file.write_text(json.dumps({"domain": domain}))
+    file.write_text(json.dumps({"domain": domain, **more}))
     stamp_s = file.stat().st_mtime - age_s
     os.utime(file, (stamp_s, stamp_s))
     return place
@@ -44,6 +47,18 @@ def test_the_newest_run_that_holds_its_domain_is_the_latest(folder):
     assert (named.domain, named.live) == (ones[1].domain, True)
     for one in ones[1:]:
         one.release()
+
+
+def test_a_run_that_crashed_is_not_live_because_another_run_has_its_domain_now(folder):
+    claim = claim_domain()
+    place = make_run(folder, "crashed", claim.domain, age_s=0, run_id="one that crashed")
+    with pytest.raises(NoRunError, match="has ended"):
+        find_run(str(place))
+    words = [sys.executable, "-c", "input()"]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, env={**os.environ, RUN_ID_VARIABLE: "one that crashed"}) as process:
+        assert find_run(str(place)).live
+        process.kill()
+    claim.release()
 
 
 def test_a_run_that_has_ended_or_is_none_is_told(folder):

@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> None:
     """Add the prover's findings about every skillset of a file that is free of errors."""
-    # The prover brings its solvers along, which nobody should wait for who only converts.
+    # The prover brings its solvers along, which a conversion should not wait for.
     from skill_language.prove import prove
 
     for file in files:

@@ -1,4 +1,4 @@
-"""What may come next at a place, told by the words before it: the line may be broken, as it is while somebody writes."""
+"""What may come next at a place, told by the words before it: the line may be broken, as it is while it is written."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Source:
 
     @property
     def full(self) -> bool:
-        """So much is wrong that nobody wants to know more."""
+        """More is wrong than a reader wants to know."""
         return len(self.diagnostics) > MAX_ERRORS
 
     def span(self, token: Token) -> Span:

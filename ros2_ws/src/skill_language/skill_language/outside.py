@@ -1,6 +1,6 @@
 """Arrows that nothing in the model takes: no effect leads to their target, and they are not extern.
 
-In a dialect without `extern` the functional layer takes them. A fault that is out of reach only because nobody takes an
+In a dialect without `extern` the functional layer takes them. A fault that is out of reach only because nothing takes an
 arrow is not safe, so the search counts them as taken from outside, unless the user says that the model is all there is.
 """
 

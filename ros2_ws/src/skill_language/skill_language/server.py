@@ -131,7 +131,7 @@ def did_close(ls: SkillLanguageServer, params: lsp.DidCloseTextDocumentParams) -
 @server.thread()
 def did_save(ls: SkillLanguageServer, params: lsp.DidSaveTextDocumentParams) -> None:
     """Prove a file that was saved; tell what was found if it has not changed meanwhile."""
-    # The solvers are loaded only where somebody proves.
+    # The solvers are loaded only for a proof.
     from skill_language.prove import prove
 
     uri = params.text_document.uri

@@ -1,6 +1,6 @@
 """A counterexample as values: the steps of a run, each with what is done, what it changes, and what it ends.
 
-A step can be told (``text``), written as JSON, and played: whoever does the same to running managers sees the same.
+A step can be told (``text``), written as JSON, and played: the same done to running managers shows the same.
 """
 
 from __future__ import annotations

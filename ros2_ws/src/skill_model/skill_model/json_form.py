@@ -1,7 +1,7 @@
 """The model as JSON and back, without loss: what `describe` serves, what generated code carries.
 
 An object has the fields of its class; conditions, which may be of several classes, carry it as ``"is"``. Places in the
-source are left out: they mean nothing to whoever gets the JSON. The decoder is driven by the classes' own annotations,
+source are left out: they mean nothing to the reader of the JSON. The decoder is driven by the classes' own annotations,
 so that a field that is added to the model is in the JSON at once.
 """
 

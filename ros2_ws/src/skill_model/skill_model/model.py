@@ -2,7 +2,7 @@
 
 Resources are state machines (paper, section 4.1.1), skills have preconditions, a start effect, invariants and results
 (section 4.1.2). Nothing here knows of files, ROS or execution. Every named element carries the place in the source that
-it came from, so that whoever finds something wrong with it can show where.
+it came from, so that a tool that finds something wrong with it can show where.
 """
 
 from __future__ import annotations
@@ -197,7 +197,7 @@ class Resource:
         return tuple(self._targets.get((source, extern), ()))
 
     def reachable(self) -> frozenset[str]:
-        """Return the states with a way of arrows from the initial one, whoever takes them."""
+        """Return the states with a way of arrows from the initial one, extern or not."""
         found, todo = {self.initial}, [self.initial]
         while todo:
             source = todo.pop()

@@ -1,6 +1,6 @@
 """What a step of a skillset is (paper, section 4.1.2 and Figure 5): pure functions from one situation to the next.
 
-The engine takes its steps here and nowhere else, so whoever explores all steps of a model explores what is executed.
+The engine takes its steps here and nowhere else, so a tool that explores all steps of a model explores what is executed.
 
 A step is atomic: what asks for it, its resource changes, and every invariant that these break, with the effects of those
 and what they break in turn, until nothing more is broken. Happenings of a step are in this order: the changes of the

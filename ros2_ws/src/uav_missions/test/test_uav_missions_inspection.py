@@ -133,7 +133,7 @@ def test_who_takes_the_vehicle_is_left_alone_until_it_is_down(taker: str):
     assert on_ground(mission) is (taker == "control"), "the failsafe lands; a pilot does as he likes"
 
 
-def test_without_a_ground_station_nobody_takes_off():
+def test_without_a_ground_station_the_drone_does_not_take_off():
     mission = fly("radio")
     assert mission.end.outcome is Outcome.NOT_STARTED
     assert "ground station" in mission.end.reason

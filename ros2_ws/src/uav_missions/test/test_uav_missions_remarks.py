@@ -1,4 +1,4 @@
-"""Who has the vehicle is told at the end: the pilot, or nobody over a lost link."""
+"""What took the vehicle from the mission is told at the end: the pilot, a failsafe, or a lost link."""
 
 from __future__ import annotations
 

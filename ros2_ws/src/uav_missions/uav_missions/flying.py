@@ -89,7 +89,7 @@ class Flying:
         # For a while: a navigation that was restarted does not know yet that the vehicle is ours.
         pilot: Behaviour = Stays("the pilot has control", lambda: not self.obeys(), settings.settle_s, blackboard=self._blackboard)
         if settings.others_landing_s > 0.0:
-            lands = Awaits("somebody else lands it", self.on_ground, settings.others_landing_s, blackboard=self._blackboard)
+            lands = Awaits("the pilot or the autopilot lands it", self.on_ground, settings.others_landing_s, blackboard=self._blackboard)
             pilot = Sequence("leave it to them", memory=True, children=[pilot, FailureIsSuccess("or not", lands)])
         return Selector("land where it is", memory=True, children=[pilot, stop])
 
@@ -132,7 +132,7 @@ class Flying:
     # --- what leaves ask and tell ------------------------------------------------------------------------------------
 
     def obeys(self) -> bool:
-        """Tell whether the vehicle is ours to command: it is now, and nobody has taken it since the mission began."""
+        """Tell whether the vehicle is ours to command: it is now, and has been since the mission began."""
         taken = any(failure.result in AUTHORITY_INVARIANTS for failure in self._blackboard.failures)
         return not taken and self._navigation.resources.get("SDK_authority") == "AVAILABLE"
 

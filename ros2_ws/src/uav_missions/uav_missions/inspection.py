@@ -29,8 +29,8 @@ What was decided, and why:
   and 5 s after its last heartbeat the autopilot flies home, out of the hover or just before it: the two are about as quick. The
   mission is given up and waits for the landing.
 - **Degraded zones**: the picture gets worse, `stream` goes on, and so does the flight.
-- **The video comes back while it hovers**: it lands all the same. A radio that has failed once here will fail again, and a flight
-  that goes on and off with the picture is what nobody can take over.
+- **The video comes back while it hovers**: it lands all the same. A radio that has failed once here will fail again, and a
+  telepilot can't take over a flight that goes on and off with the picture.
 - **Where it lands**: below the route, which keeps its distance from the walls; no leg crosses the building, so neither does a landing.
 - **No video, no flight**: the route begins once the telepilot sees; before that the drone stays above the place of take-off.
 - **The sensor that looks ahead (LiDAR) fails**: flying on blind is out of the question, and turning the nose into the direction

@@ -46,6 +46,6 @@ def note_authority(blackboard: Blackboard, state: GuidanceState | Any) -> None:
 
 
 def who_has_it(blackboard: Blackboard) -> str:
-    """Return who has a vehicle whose authority was lost; empty where nobody listened to the guidance."""
+    """Return who has a vehicle whose authority was lost; empty where the guidance was not listened to."""
     # The guidance takes it from the skills and keeps it in one case only.
     return (blackboard.remarks[AUTHORITY] or "the autopilot has restarted") if AUTHORITY in blackboard.remarks else ""

@@ -66,7 +66,7 @@ class FunctionalPart:
 class GuidanceApi(FunctionalPart):
     """The guidance: references for position and heading, and what it says about following them.
 
-    A motion that is under way when this begins was started by managers that are gone: nobody watches it, so it is stopped.
+    A motion that is under way when this begins was started by managers that are gone: it is not watched, so it is stopped.
     ``orphans``: the references that this process may have started before; others are watched elsewhere.
     """
 

@@ -2,7 +2,7 @@
 
 The life of one execution (paper, Listing 4): ``on_dispatch`` sends a command and returns; the answer brings the reference's id;
 every state of the guidance that speaks of this id is decided on; a verdict ends the execution. When the verdict is not the
-success, the vehicle is told to hover: nobody watches the motion any more. A guidance that speaks of something else, or not
+success, the vehicle is told to hover: the motion is not watched any more. A guidance that speaks of something else, or not
 at all, ends the execution, too: the reference is lost.
 """
 
@@ -159,7 +159,7 @@ class GuidedSkill(SkillHooks):
             return
         silent_s = self.guidance.now_s - motion.heard_s
         if silent_s > self.thresholds.reference_lost_s:
-            # Somebody lands the vehicle, perhaps because nobody else decides any more: a hover would keep it in the air.
+            # The vehicle is being landed, perhaps because no mission decides any more: a hover would keep it in the air.
             state = self.guidance.state
             self._end(motion, self.lost(silent_s), stop=state is None or state.reference != "land")
 

@@ -155,7 +155,7 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
         return 1.0 if motion is not None and motion.execution is execution and motion.followed_since_s is not None else 0.0
 
     def lost(self, silent_s: float) -> Verdict:
-        """End when the heading is not held: somebody else released it, or it never was."""
+        """End when the heading is not held: it was released from elsewhere, or never held."""
         return Verdict("ABORTED", f"the heading is not locked for {silent_s:.1f} s")
 
     def _on_state(self, state: GuidanceState) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class _Depthmap(WatchedSkill):
-    """Look ahead until interrupted. The progress is 1 once obstacle messages arrive: then somebody may fly."""
+    """Look ahead until interrupted. The progress is 1 once obstacle messages arrive: then a flight may begin."""
 
     def __init__(self, sensor: str, depth: DepthApi) -> None:
         super().__init__(depth)

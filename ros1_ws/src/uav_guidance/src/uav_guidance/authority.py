@@ -45,7 +45,7 @@ class Authority:
         return Change.GAINED if self.held else Change.LOST
 
     def wants_start(self, vehicle: Vehicle, *, link: bool) -> bool:
-        """Return whether to take GUIDED now, once in a node's life: ready, on the ground, disarmed, and nobody flew before."""
+        """Return whether to take GUIDED now, once in a node's life: ready, on the ground, disarmed, and not flown before."""
         if self._start_settled or not link:
             return False
         if vehicle.armed or self.held or vehicle.off_ground:

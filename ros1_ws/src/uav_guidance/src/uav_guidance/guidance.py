@@ -266,7 +266,7 @@ class Guidance:
         """Drop what was asked of an autopilot that has restarted since: it has forgotten it, and its origin may be another one.
 
         Where it comes back in GUIDED and in the air, the vehicle is held where it is, and can be landed; another mode is not ours. The
-        skills do not get the authority back before somebody gives it: their places may be others now.
+        skills get the authority back only when the pilot or the operator gives it: their places may be others now.
         """
         self._restarted = True
         log.warning("the autopilot has restarted, in %s", mode_name(self.vehicle.mode))
@@ -310,7 +310,7 @@ class Guidance:
         self._introduced |= complete or now_s - self._begun_s > self._settings.link_lost_s
 
     def _take_authority_at_start(self, now_s: float) -> None:
-        """Take GUIDED once, when the vehicle stands ready on the ground; try again only if nobody answered."""
+        """Take GUIDED once, when the vehicle stands ready on the ground; try again only if no answer came."""
         running = self._start_procedure
         if running is not None and running.outcome is not None:
             if running.outcome.answered:

@@ -55,7 +55,7 @@ SKILLSET = "navigation"
 
 
 class GuidanceNode:
-    """Connect the pure guidance with ROS and with the link; one lock guards it, whoever comes."""
+    """Connect the pure guidance with ROS and with the link; one lock guards it against the threads of both."""
 
     def __init__(self, settings: Settings) -> None:
         self._guidance = Guidance(settings)
@@ -209,7 +209,7 @@ class GuidanceNode:
 
 
 def _on_garbage(reason: str) -> None:
-    log.warning("a sensor's verdict is left out, which is as if nobody watched: %s", reason)
+    log.warning("a sensor's verdict is left out, as if the sensor were silent: %s", reason)
 
 
 def _now_s() -> float:

@@ -1,7 +1,8 @@
 """Whether the way ahead is free: the last verdict of each sensor, when to hold and when to go on.
 
 A vehicle moves on when a sensor has just said that the way is free. What no sensor could judge is not free, and neither is what no
-sensor looks at any more. Where nobody has watched since the vehicle stood on the ground, it flies unwatched: that is the operator's choice.
+sensor looks at any more. Where no sensor has watched since the vehicle stood on the ground, it flies unwatched: that is the operator's
+choice.
 """
 
 from __future__ import annotations
@@ -76,20 +77,21 @@ class ObstacleWatch:
         self._last_in_way_s = None
 
     def nearest_m(self, now_s: float) -> float:
-        """Return the distance to the nearest obstacle ahead; infinite when there is none or nobody watches."""
+        """Return the distance to the nearest obstacle ahead; infinite when there is none or no sensor watches."""
         return min((s.distance_m for s in self._fresh(now_s) if s.detected), default=math.inf)
 
     def unwatched(self, now_s: float) -> bool:
-        """Return whether somebody has watched in this flight, and nobody who watches now can judge the way."""
+        """Return whether a sensor has watched in this flight, and none that watches now can judge the way."""
         return bool(self._heard) and all(sighting.unknown for sighting in self._fresh(now_s))
 
     def blocked(self, way: Way, now_s: float) -> bool:
-        """Return whether to hold: something is in the way, or was until less than half a second ago, or nobody watches."""
+        """Return whether to hold: something is in the way, or was until less than half a second ago, or no sensor watches."""
         if any(sighting.detected and self._in_way(sighting, way) for sighting in self._fresh(now_s)):
             self._last_in_way_s = now_s
         elif self._last_in_way_s is not None and now_s - self._last_in_way_s >= self.settings.obstacle_clear_s:
             self._last_in_way_s = None
-        return self._last_in_way_s is not None or self.unwatched(now_s)
+        travels = way.remaining_enu_m.horizontal >= LEAST_TRAVEL_M  # the sensors watch a horizontal corridor, not a climb on the spot
+        return self._last_in_way_s is not None or (travels and self.unwatched(now_s))
 
     def _fresh(self, now_s: float) -> list[Sighting]:
         """Return the verdicts that still hold: just arrived, and on a measurement that is not old."""

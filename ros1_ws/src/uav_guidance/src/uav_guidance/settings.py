@@ -35,7 +35,7 @@ class Settings:
 
     obstacle_stop_m: float = tunable(3.0, 1.0, 20.0, "from the vehicle's centre: an obstacle nearer than this makes it brake and hold")
     obstacle_clearance_m: float = tunable(2.0, 1.0, 20.0, "at which it stops; an obstacle farther behind the target is not in the way")
-    watch_age_s: float = tunable(0.25, 0.1, 1.0, "since a sensor's last verdict until nobody watches; sensors send at 10 Hz")
+    watch_age_s: float = tunable(0.25, 0.1, 1.0, "since a sensor's last verdict until it counts as silent; sensors send at 10 Hz")
     obstacle_age_s: float = tunable(0.6, 0.1, 2.0, "of a measurement, whose verdict does not count after that")
     obstacle_clear_s: float = tunable(0.5, 0.0, 10.0, "for which the way must be clear before it goes on")
 

@@ -14,7 +14,7 @@ class FineClock:
     """Read a coarse clock between its ticks: /clock has steps of 20 ms, and the autopilot's messages come before or after a step.
 
     How much of a step has passed is told by the wall time since the last one, compared with what steps usually take. A clock that
-    is held (the simulator waits for somebody) does not run on: it stands just before its next step.
+    is held (the simulator waits for a node) does not run on: it stands just before its next step.
     """
 
     def __init__(self) -> None:

@@ -16,6 +16,6 @@ def check(skillset: Skillset) -> list[Diagnostic]:
     """Return all findings about a skillset (at most ``MAX_FINDINGS``) in the order of the source."""
     about_all = (finding for rule in RULES for finding in rule(skillset))
     about_one = (finding for skill in skillset.skills for rule in SKILL_RULES for finding in rule(skillset, skill))
-    # Nobody reads more, and a file may be made to have a hundred thousand.
+    # More are not read, and a file may be made to have a hundred thousand.
     findings = islice(chain(about_all, about_one), MAX_FINDINGS)
     return sorted(dict.fromkeys(findings), key=lambda d: (d.span.line, d.span.column, d.code))

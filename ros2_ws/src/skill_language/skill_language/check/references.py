@@ -190,7 +190,7 @@ def error(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
 
 
 def for_generator(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
-    """Return a warning that is an error to whoever generates code (``FOR_GENERATOR`` in ``load``): the model itself is sound."""
+    """Return a warning that is an error to the generator (``FOR_GENERATOR`` in ``load``): the model itself is sound."""
     return Diagnostic(code, message, span, Severity.WARNING, hint)
 
 

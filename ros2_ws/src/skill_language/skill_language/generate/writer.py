@@ -24,7 +24,7 @@ def write_files(files: Mapping[str, str], out: Path) -> list[str]:
     for path, text in files.items():
         entries.setdefault(path.split("/", 1)[0], {})[path] = text
     changed = [entry for entry, texts in entries.items() if not _holds(out, entry, texts)]
-    # Hidden, so that nobody takes it for a package; in the same folder, so that moving is renaming.
+    # Hidden, so that no tool takes it for a package; in the same folder, so that moving is renaming.
     with tempfile.TemporaryDirectory(prefix=".generating-", dir=out) as staging:
         for entry in changed:
             for path, text in entries[entry].items():

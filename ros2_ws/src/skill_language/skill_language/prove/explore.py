@@ -68,7 +68,7 @@ def explore(world: World, deadline: Deadline, *, most: int) -> Graph:
                 graph.started[move.subject[0]].add(number)
             fresh = move.target not in graph.numbers
             target = _number(graph, move.target, (number, move)) if fresh else graph.numbers[move.target]
-            # What leaves everything as it was is no step: nobody could tell that it was taken.
+            # What leaves everything as it was is no step: it can't be told that it was taken.
             if target != number:
                 graph.edges[number].append(Edge(number, target, move.kind, move.subject, move.ended))
             if fresh:

@@ -1,4 +1,4 @@
-"""Bounded time: whoever works for long asks now and then whether it may go on."""
+"""Bounded time: what works for long asks now and then whether it may go on."""
 
 from __future__ import annotations
 

@@ -232,7 +232,7 @@ def _data_of(conditions: Sequence[Expression]) -> set[str]:
 
 
 def _written(condition: Expression) -> bool:
-    """Tell whether a condition stands in the source: nobody is to be blamed for the `true` in place of one left out."""
+    """Tell whether a condition stands in the source: the `true` in place of one left out is no finding."""
     return condition != TRUE or condition.span != NOWHERE
 
 
