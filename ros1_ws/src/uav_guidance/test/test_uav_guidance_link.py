@@ -25,7 +25,14 @@ class Ear:
     def __init__(self, url: str) -> None:
         self.modes: list[int] = []
         self.connected = threading.Semaphore(0)
-        self.link = Link(url, 57600, on_message=lambda m: self.modes.append(m.custom_mode), on_connect=self.connected.release)
+        self.idle = threading.Semaphore(0)
+        self.link = Link(
+            url,
+            57600,
+            on_message=lambda m: self.modes.append(m.custom_mode),
+            on_connect=self.connected.release,
+            on_idle=self.idle.release,
+        )
         self.link.start()
 
 
@@ -90,7 +97,9 @@ def test_a_message_that_can_not_be_dealt_with_does_not_end_the_link(peer):
         if message.custom_mode == 1:
             raise ZeroDivisionError
 
-    link = Link(f"udpout:127.0.0.1:{peer.getsockname()[1]}", 57600, on_message=take, on_connect=connected.release)
+    idle = threading.Semaphore(0)
+    url = f"udpout:127.0.0.1:{peer.getsockname()[1]}"
+    link = Link(url, 57600, on_message=take, on_connect=connected.release, on_idle=idle.release)
     link.start()
     assert connected.acquire(timeout=5.0)
     link.send(heartbeat_message())
@@ -99,4 +108,35 @@ def test_a_message_that_can_not_be_dealt_with_does_not_end_the_link(peer):
     for data in (frame(AUTOPILOT, 1), frame(AUTOPILOT, 2)[:-4], frame(AUTOPILOT, 3), frame(AUTOPILOT, 4)):
         peer.sendto(data, address)
     wait_until(lambda: heard == [1, 4], timeout_s=5.0, what="a message behind those that raised and that were cut short")
+    assert idle.acquire(timeout=5.0)
+    link.close()
+
+
+def test_the_link_is_idle_when_all_that_has_arrived_has_been_handed_over(peer):
+    connected, idle = threading.Semaphore(0), threading.Semaphore(0)
+    taken, go_on = threading.Semaphore(0), threading.Semaphore(0)
+
+    def take(_message: object) -> None:
+        taken.release()
+        assert go_on.acquire(timeout=5.0)
+
+    url = f"udpout:127.0.0.1:{peer.getsockname()[1]}"
+    link = Link(url, 57600, on_message=take, on_connect=connected.release, on_idle=idle.release)
+    assert link.idle, "there is no connection"
+    link.start()
+    assert connected.acquire(timeout=5.0)
+    link.send(heartbeat_message())
+    _, address = peer.recvfrom(300)
+    assert link.idle, "nothing has arrived"
+    peer.sendto(frame(AUTOPILOT, 1), address)
+    peer.sendto(frame(AUTOPILOT, 2), address)
+    assert taken.acquire(timeout=5.0)
+    assert not link.idle, "the first message is being handled, the second one waits"
+    go_on.release()
+    assert taken.acquire(timeout=5.0)
+    assert not link.idle
+    assert not idle.acquire(blocking=False), "the second message came before the link was idle"
+    go_on.release()
+    assert idle.acquire(timeout=5.0)
+    assert link.idle
     link.close()

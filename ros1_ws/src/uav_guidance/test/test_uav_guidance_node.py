@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ from guidance_fake_autopilot import GUIDED, LAND, LOITER, FakeAutopilot  # noqa:
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
 from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
 from uav_msgs.msg import GuidanceState, Obstacle  # noqa: E402
 from uav_msgs.srv import (  # noqa: E402
     CheckFence,
@@ -240,6 +242,18 @@ def test_reconnects_and_asks_for_its_streams_again(bench):
     poses = len(bench.poses)
     wait_until(lambda: len(bench.poses) > poses + 20, timeout_s=5.0, what="poses arrive again")
     bench.until(lambda s: s.authority and s.landed_state == 2, "it still flies")
+
+
+def test_what_it_is_done_with_is_told_whether_the_autopilot_speaks_or_not(bench):
+    done: list[float] = []
+    listener = rospy.Subscriber("/uav_guidance/done", Header, lambda m: done.append(m.stamp.to_sec()))
+    bench.until(lambda s: s.link and s.home_valid, "the autopilot speaks")
+    for break_it in (lambda: None, bench.autopilot.drop_client, bench.autopilot.forget_streams):
+        break_it()
+        begin_s = bench.autopilot.now_s
+        wait_until(lambda begin_s=begin_s: done[-1:] > [begin_s + 2.0], timeout_s=20.0, what="two seconds are done with")
+        assert all(0.0 < b - a <= 0.3 for a, b in pairwise(done)), done
+    listener.unregister()
 
 
 def test_respawned_in_flight_it_hovers_where_it_is(bench):

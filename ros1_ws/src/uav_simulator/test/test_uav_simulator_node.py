@@ -238,6 +238,12 @@ def test_time_begins_when_all_that_work_for_it_are_there(start_simulator, collec
     second = rospy.Publisher(others, Header, queue_size=1)
     seen.wait("imu")
     assert seen.messages["imu"][0].header.stamp.to_sec() < 0.05, "the first measurements are heard"
+    first.publish(Header(stamp=rospy.Time(100)))
+    wait_until(lambda: seen.messages["clock"][-1].clock.to_sec() >= 0.32, timeout_s=5.0, what="the limit")
+    rospy.rostime.wallsleep(0.5)
+    assert seen.messages["clock"][-1].clock.to_sec() <= 0.34, "the other node has not said anything yet"
+    second.publish(Header(stamp=rospy.Time(0, 320_000_000)))
+    wait_until(lambda: seen.messages["clock"][-1].clock.to_sec() >= 0.6, timeout_s=5.0, what="time goes on")
     first.unregister()
     second.unregister()
 

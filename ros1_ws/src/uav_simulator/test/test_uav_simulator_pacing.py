@@ -33,6 +33,18 @@ def test_time_waits_for_a_laggard_and_goes_on_when_it_has_caught_up():
     assert p.may_advance(10.32, 1.5)
 
 
+def test_from_its_beginning_time_waits_for_all_that_are_held_against_the_clock():
+    p = Pacer(["/a", "/b=0.06", "/c=zed"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    assert p.may_advance(50.0, 0.0), "time has not begun"
+    p.heard("/a", 10.04)
+    p.begin(10.0)
+    assert p.may_advance(10.06, 0.0)
+    assert not p.may_advance(10.08, 0.0), "/b has never spoken"
+    p.heard("/b", 10.34)
+    assert p.may_advance(10.34, 0.1), "/c has no measurement to deal with"
+    assert not p.may_advance(10.36, 0.1), "/a spoke before time began, and no more"
+
+
 def test_time_lets_go_after_its_patience_until_the_topic_speaks_again():
     p = pacer()
     p.heard("/a", 10.0)

@@ -71,7 +71,8 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def meet(self) -> None:
         """Advertise the heartbeats once every skillset can be called: simulated time begins with them."""
         if self._heartbeat is None and all(client.ready for client in self._skillsets.values()):
-            self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", 10)
+            # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
+            self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", LATCHED)
 
     def wake(self) -> None:
         """Have the tree ticked in this turn of the main loop; several events in one turn make one tick."""

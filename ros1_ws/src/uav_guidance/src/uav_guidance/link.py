@@ -26,12 +26,22 @@ class LinkClosedError(ConnectionError):
 class Link:
     """A MAVLink 2 connection to the autopilot (system and component 1/1), as its companion (1/191).
 
-    ``on_message`` and ``on_connect`` are called in the reader's thread; ``send`` may be called from any thread.
+    ``on_message``, ``on_connect`` and ``on_idle`` (all that has arrived has been handed over) are called in the reader's thread;
+    ``send`` may be called from any thread.
     """
 
-    def __init__(self, url: str, baud: int, *, on_message: Callable[[Any], None], on_connect: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        url: str,
+        baud: int,
+        *,
+        on_message: Callable[[Any], None],
+        on_connect: Callable[[], None],
+        on_idle: Callable[[], None],
+    ) -> None:
         self._url, self._baud = url, baud
-        self._on_message, self._on_connect = on_message, on_connect
+        self._on_message, self._on_connect, self._on_idle = on_message, on_connect, on_idle
+        self._reading = False
         self._ended = threading.Event()
         self._sending = threading.Lock()
         self._port: Any = None
@@ -41,6 +51,15 @@ class Link:
     def start(self) -> None:
         """Begin to connect and to read."""
         self._thread.start()
+
+    @property
+    def idle(self) -> bool:
+        """Whether all that has arrived has been handed over; also true without a connection."""
+        port = self._port
+        try:
+            return not self._reading and (port is None or not port.select(0.0))
+        except (OSError, ValueError):  # the reader has just closed it
+            return True
 
     def close(self) -> None:
         """End the thread and the connection."""
@@ -92,10 +111,19 @@ class Link:
         while not self._ended.is_set():
             if not self._port.select(READ_WAIT_S):
                 continue
-            data = self._port.recv(4096)
-            for message in (self._mav.parse_buffer(data) if data else None) or ():
-                if from_autopilot_to_us(message):
-                    self._take(message)
+            self._reading = True  # before the bytes leave the socket: in between, the link must not look idle
+            try:
+                self._read_once()
+            finally:
+                self._reading = False
+            if self.idle:
+                self._on_idle()
+
+    def _read_once(self) -> None:
+        data = self._port.recv(4096)
+        for message in (self._mav.parse_buffer(data) if data else None) or ():
+            if from_autopilot_to_us(message):
+                self._take(message)
 
     def _take(self, message: Any) -> None:
         try:

@@ -31,7 +31,7 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
-from perception_core.ros import RawSubscriber, TunableSettings, read_settings
+from perception_core.ros import DoneReporter, RawSubscriber, TunableSettings, read_settings
 from resource_reporter import ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
@@ -71,7 +71,15 @@ class GuidanceNode:
         self._state = rospy.Publisher("~state", GuidanceState, queue_size=5)
         self._pose = rospy.Publisher("~pose", PoseStamped, queue_size=10)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
-        self._link = Link(settings.url, settings.baud, on_message=self._on_message, on_connect=self._on_connect)
+        self._done = DoneReporter()
+        self._stepped_ns = self._done_ns = 0
+        self._link = Link(
+            settings.url,
+            settings.baud,
+            on_message=self._on_message,
+            on_connect=self._on_connect,
+            on_idle=self._report_done,
+        )
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
             RawSubscriber(topic, Obstacle, self._on_obstacle, _on_garbage, buffer_bytes=OBSTACLE_BYTES, queue_size=5)
         self._offer_services()
@@ -195,6 +203,17 @@ class GuidanceNode:
             self._advance()
             state = state_message(self._guidance.report(now_s), now)
         self._state.publish(state)
+        self._stepped_ns = now.to_nsec()
+        if self._link.idle:
+            self._report_done()
+
+    def _report_done(self) -> None:
+        """Tell the last step's time, once: it is made, and all that the autopilot had sent by then has been taken."""
+        with self._changed:
+            stepped_ns, told_ns = self._stepped_ns, self._done_ns
+            self._done_ns = stepped_ns
+        if stepped_ns > told_ns:
+            self._done.done(stepped_ns)
 
     def _advance(self) -> None:
         """Step the guidance to now and send what it says."""

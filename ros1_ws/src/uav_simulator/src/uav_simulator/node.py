@@ -125,6 +125,7 @@ class SimulatorNode:
                 self._pilot.serve(min(rest, WAIT_S))
         if missing and not self._ended:
             rospy.logwarn(f"simulated time begins without {', '.join(missing)}: not connected for {self._settings.start_patience_s:g} s")
+        self._pacer.begin(self._simulation.now_s)
 
     def _absent(self) -> list[str]:
         return [topic for topic, subscriber in self._paced.items() if not subscriber.get_num_connections()]

@@ -31,12 +31,20 @@ class Pacer:
 
     def __init__(self, topics: Iterable[str] = (), *, limit_s: float, patience_s: float) -> None:
         self._limit_s, self._patience_s = limit_s, patience_s
-        said = {topic: against for topic, _, against in (word.partition("=") for word in topics) if against}
+        words = [word.partition("=") for word in topics]
+        said = {topic: against for topic, _, against in words if against}
         self._limits_s = {topic: float(against) for topic, against in said.items() if against[0].isdigit()}
         self._sensor_of = {topic: against for topic, against in said.items() if topic not in self._limits_s}
+        self._clocked = [topic for topic, _, _ in words if topic not in self._sensor_of]
         self._measured: dict[str, deque[tuple[float, float]]] = {}  # of each sensor: stamps, and when they were published
         self._listeners: dict[str, _Listener] = {}
         self._lock = threading.Lock()
+
+    def begin(self, now_s: float) -> None:
+        """Note that simulated time begins: what is held against the clock may not lag behind it from now on, heard or not."""
+        with self._lock:
+            for topic in self._clocked:
+                self._listeners.setdefault(topic, _Listener(now_s))
 
     def measured(self, sensor: str, stamp_s: float, now_s: float) -> None:
         """Note that a sensor has published a measurement just now."""
