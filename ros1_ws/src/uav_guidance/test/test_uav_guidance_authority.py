@@ -1,4 +1,4 @@
-"""Who commands the vehicle: taken once, lost to the pilot or with the link, given back."""
+"""The authority over the vehicle: taken once, lost to the pilot or with the link, given back."""
 
 from __future__ import annotations
 

@@ -180,7 +180,7 @@ def test_turning_is_progress():
         assert watch.step(distance_m=5.0, heading_error_rad=1.0 - 0.04 * step, now_s=float(step)) == 0.0
 
 
-def test_who_has_arrived_is_not_still_until_pushed_away():
+def test_a_vehicle_that_has_arrived_is_not_still_until_pushed_away():
     watch = StillWatch(reached_m=0.1, reached_rad=0.035)
     watch.restart(0.0)
     watch.step(distance_m=0.05, heading_error_rad=0.01, now_s=0.0)

@@ -57,7 +57,7 @@ def test_a_ground_station_on_a_link_of_its_own_is_heard_and_forwarded():
     assert link.command(21) == ACCEPTED
     heard = mavlink.MAVLink(None).parse_buffer(ground.take_output())
     assert {m.custom_mode for m in heard if m.get_type() == "HEARTBEAT"} == {GUIDED, LAND}
-    assert not [m for m in heard if m.get_type() == "COMMAND_ACK"], "answers go to who has asked"
+    assert not [m for m in heard if m.get_type() == "COMMAND_ACK"], "answers go to the link that has asked"
     link.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
     assert [m.get_srcComponent() for m in mavlink.MAVLink(None).parse_buffer(ground.take_output())] == [191]
 

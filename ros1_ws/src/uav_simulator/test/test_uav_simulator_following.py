@@ -114,7 +114,7 @@ def command(number, *values):
     return mavlink.MAVLink_command_long_message(1, 1, number, 0, *values, *([0.0] * (7 - len(values)))).pack(sender)
 
 
-def test_where_nobody_answers_time_stands_still():
+def test_without_an_answer_time_stands_still():
     followed = FollowedVehicle("tcp:127.0.0.1:1")
     assert not followed.tick(TICK_S, TICK_S)
     followed.close()

@@ -272,7 +272,7 @@ def test_time_begins_without_a_node_that_never_comes(start_simulator, collect):
     wait_until_time_goes_on(collect)
 
 
-def test_time_waits_for_who_works_for_it_and_lets_go_of_the_dead(start_simulator, collect):
+def test_time_waits_for_the_nodes_that_work_for_it_and_lets_go_of_the_dead(start_simulator, collect):
     start_simulator("_rate:=0", f"_pace_topics:=[{PACE_TOPIC}]", "_pace_patience_s:=1.5")
     seen = collect(clock=("/clock", Clock))
 
@@ -300,7 +300,7 @@ def test_time_waits_for_who_works_for_it_and_lets_go_of_the_dead(start_simulator
     held_from = time.monotonic()
     work.unregister()
     wait_until(lambda: now_s() > stamp + 0.6, timeout_s=6.0, what="time lets go")
-    assert time.monotonic() - held_from < 1.0, "who has gone is not waited for"
+    assert time.monotonic() - held_from < 1.0, "a node that has gone is not waited for"
     # Before the second word and once the patience is over, time runs flat out.
     assert set(clock_steps_ns(seen, from_s=words[2], to_s=held_at)) == {20_000_000}, "paced, no tick is lost"
 

@@ -25,7 +25,7 @@ def pacer():
 
 def test_time_waits_for_a_laggard_and_goes_on_when_it_has_caught_up():
     p = pacer()
-    assert p.may_advance(100.0, 0.0), "who has never spoken is not waited for"
+    assert p.may_advance(100.0, 0.0), "a node that has never spoken is not waited for"
     p.heard("/a", 10.0)
     assert p.may_advance(10.3, 0.0)
     assert not p.may_advance(10.32, 1.0)
@@ -80,7 +80,7 @@ def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
     assert p.may_advance(20.0, 3.1)
 
 
-def test_who_works_on_measurements_is_waited_for_while_there_are_some():
+def test_a_node_that_works_on_measurements_is_waited_for_while_there_are_some():
     p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
     p.measured("zed", 10.0, 10.0)
     p.heard("/depth/done", 10.0)

@@ -160,7 +160,7 @@ class Director:
         return self._mission.conditions() if self.start_s is None and self.end is None else []
 
     def remember(self) -> None:
-        """Take note of how each node is; for those who look at the tree later only, instead of ``view`` after each step."""
+        """Take note of how each node is; for views of the tree at a later time only, instead of ``view`` after each step."""
         self._watch.remember()
         if self._stop_watch is not None:
             self._stop_watch.remember()

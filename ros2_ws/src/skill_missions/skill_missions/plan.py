@@ -34,7 +34,7 @@ class MissionPlan:
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         departure: resource and state; the run's files count time from when this state is left first.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
-        listen: on ROS 2, has the node listen to whoever says why a resource is as it is (``Blackboard.remarks``).
+        listen: on ROS 2, has the node listen to what says why a resource is as it is (``Blackboard.remarks``).
     """
 
     scenario: str

@@ -1,4 +1,4 @@
-"""Who commands the vehicle: the companion, as long as the mode is its own, and never against the pilot."""
+"""The authority over the vehicle: the companion has it as long as the mode is its own, and never against the pilot."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def stop_point(position_m: Vec3, velocity_m_s: Vec3, accel_m_s2: float) -> Vec3:
 
 
 class LineCarrot:
-    """Run along a line with a trapezoid speed profile, never far ahead of who follows, never backwards."""
+    """Run along a line with a trapezoid speed profile, never far ahead of the vehicle that follows, never backwards."""
 
     def __init__(self, line: Line, *, speed_m_s: float, accel_m_s2: float, lead_m: float, initial_speed_m_s: float = 0.0) -> None:
         self.line = line

@@ -29,7 +29,7 @@ class StillWatch:
     def step(self, *, distance_m: float, heading_error_rad: float, now_s: float) -> float:
         """Return the seconds without progress; zero while nothing remains to be done.
 
-        Who has arrived stays so until pushed away by half a metre: holding a place against the wind is no lack of progress.
+        A vehicle that has arrived stays so until pushed away by half a metre: holding a place against the wind is no lack of progress.
         """
         error_rad = abs(heading_error_rad)
         near_m = PUSHED_AWAY_M if self._arrived else self._reached_m

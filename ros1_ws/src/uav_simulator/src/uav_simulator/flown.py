@@ -29,7 +29,7 @@ class Flown(Protocol):
         """Whether it stands, climbs, flies or lands."""
 
     def tick(self, now_s: float, dt_s: float) -> bool:
-        """Advance by one tick that ends at ``now_s``; False: who flies it has not come so far yet, call again."""
+        """Advance by one tick that ends at ``now_s``; False: its autopilot has not come so far yet, call again."""
 
 
 class SimulatedAutopilotVehicle:

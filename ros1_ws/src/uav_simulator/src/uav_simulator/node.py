@@ -1,4 +1,4 @@
-"""The simulator's node: steps simulated time, in lockstep with those who work for it, and publishes what happens."""
+"""The simulator's node: steps simulated time, in lockstep with the nodes that work on its measurements, and publishes what happens."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class SimulatorNode:
         while not self._ended:
             self._obey_pilot()
             if not self._simulation.tick():
-                continue  # who flies it has not come so far yet
+                continue  # the body's autopilot has not come so far yet
             if first_tick:
                 first_tick = False
                 self._begin()
@@ -112,7 +112,7 @@ class SimulatorNode:
     def _begin(self) -> None:
         """Hold time at its first tick until all that work for it are there: how long nodes take to start changes no flight.
 
-        Who has subscribed by then is connected, too, so that perception and recorder miss no first measurement. An
+        A node that has subscribed by then is connected, too, so that perception and recorder miss no first measurement. An
         autopilot that is followed has a clock of its own, which goes on.
         """
         if self._settings.followed_url:

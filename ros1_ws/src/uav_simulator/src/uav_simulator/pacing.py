@@ -1,9 +1,9 @@
-"""Lockstep: whether simulated time may go on, given how far those who work for it have come. No ROS, no clock of its own.
+"""Lockstep: whether simulated time may go on, given how far the nodes that it waits for have come. No ROS, no clock of its own.
 
-A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, against the last measurement that the sensor published: who
-works on images has done its share when the last image is dealt with, and need not say anything while there are none. It has nearly the
-sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements. ``TOPIC=0.06``
-sets the seconds by which a topic may lag behind the clock.
+A topic is held against the simulated clock, or, written ``TOPIC=SENSOR``, against the last measurement that the sensor published: a
+node that works on images has done its share when the last image is dealt with, and need not say anything while there are none. It has
+nearly the sensor's period for that, as on a machine that is fast enough: so its verdicts come as regularly as the measurements.
+``TOPIC=0.06`` sets the seconds by which a topic may lag behind the clock.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Pacer:
     def may_advance(self, now_s: float, wall_s: float) -> bool:
         """Return whether simulated time may go on at ``now_s``; ``wall_s`` is a monotonic clock for the patience."""
         with self._lock:
-            # Asks everyone, for their patience.
+            # Asks every topic: each has a patience of its own.
             held = [self._holds(listener, self._lag_s(topic, listener, now_s), wall_s) for topic, listener in self._listeners.items()]
             return not any(held)
 

@@ -1,4 +1,4 @@
-"""Who flies the body, as the node sees it: something flown, served while time waits, and told what the pilot does."""
+"""What flies the body, as the node sees it: something flown, served while time waits, and told what the pilot does."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ log = logging.getLogger(__name__)
 
 
 class Pilot(Protocol):
-    """Who flies the body."""
+    """What flies the body."""
 
     @property
     def flown(self) -> Flown:
-        """The body and who flies it."""
+        """The body and what flies it."""
 
     @property
     def ports(self) -> dict[str, int]:
@@ -114,7 +114,7 @@ class FollowedPilot:
 
 
 def make_pilot(settings: Settings, home: Vec3) -> Pilot:
-    """Return who the settings say flies it; raises SimulatorError when its port is taken."""
+    """Return the pilot that the settings name; raises SimulatorError when its port is taken."""
     if settings.followed_url:
         return FollowedPilot(settings, home)
     return ArduPilotPilot(settings, home) if settings.vehicle == "ardupilot" else SimulatedPilot(settings, home)

@@ -19,7 +19,7 @@ class Settings:
     world: str = "yard"  # name of a world that comes with the simulator, or a world file
     world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
     faults: str = ""  # between commas; how each is written: alula_common.faults, what there is: sensors.faults
-    # Who flies the body: simulated (the simulator's own autopilot), ardupilot (its JSON interface), or followed:URL (it is where the
+    # The body's autopilot: simulated (the simulator's own autopilot), ardupilot (its JSON interface), or followed:URL (it is where the
     # autopilot at a MAVLink connection says, on that one's clock).
     vehicle: str = "simulated"
     ardupilot_port: int = 9002  # UDP on loopback, where ArduPilot's motor outputs come
@@ -28,7 +28,7 @@ class Settings:
     gcs_port: int = -1  # UDP on loopback, for a ground station; 0: any free one, which the parameter then tells; -1: one is made up
     autopilot_params: str = ""  # NAME=VALUE,... on top of autopilot.params.DEFAULTS, for example FS_GCS_ENABLE=1
     rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
-    pace_topics: tuple[str, ...] = ()  # of those who work for simulated time: TOPIC, or TOPIC=SENSOR for who deals with its measurements
+    pace_topics: tuple[str, ...] = ()  # simulated time waits for them: TOPIC, or TOPIC=SENSOR of a node that deals with its measurements
     pace_limit_s: float = 0.3
     pace_patience_s: float = 15.0  # wall clock; a node that hangs is waited for so long, one that has died is not
     start_patience_s: float = 45.0  # wall clock; time begins when all of pace_topics are advertised, and then without them

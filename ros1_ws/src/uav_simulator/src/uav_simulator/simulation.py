@@ -43,7 +43,7 @@ class State:
 
 
 class Simulation:
-    """Steps everything; who runs it decides when, and asks for the measurements it wants."""
+    """Steps everything; the caller decides when, and asks for the measurements it wants."""
 
     def __init__(
         self,
@@ -80,7 +80,7 @@ class Simulation:
         return Pose(self.now_s, self.flown.body.position, self.flown.body.attitude)
 
     def tick(self) -> bool:
-        """Advance by 20 ms: the vehicle moves, contacts and faults are looked after. False: who flies it has not come so far yet."""
+        """Advance by 20 ms: the vehicle moves, contacts and faults are looked after. False: its autopilot has not come so far yet."""
         body = self.flown.body
         before = body.position
         if not self.flown.tick((self.now_ns + TICK_NS) * 1e-9, TICK_S):

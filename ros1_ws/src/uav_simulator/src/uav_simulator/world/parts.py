@@ -39,7 +39,7 @@ def route_samples(route: tuple[Vec3, ...]) -> Floats:
 
 
 def samples_ahead(route: tuple[Vec3, ...]) -> Floats:
-    """Return points on the 5 m beyond each leg, (N, 3): who watches ahead must not be stopped before a corner."""
+    """Return points on the 5 m beyond each leg, (N, 3): a vehicle that watches ahead must not be stopped before a corner."""
     pieces = []
     for a, b in pairwise(np.array(route)):
         pieces.append(_line_samples(b, b + AHEAD_M * (b - a) / max(float(np.linalg.norm(b - a)), 1e-6)))
