@@ -46,11 +46,11 @@ def filter_at(position=(0.0, 0.0, 2.0), *, sigma_m=0.1, sigma_rad=0.02) -> Inert
     return found
 
 
-@given(vectors, vectors, vectors, vectors, vectors, vectors)
+@given(vectors, vectors, vectors, vectors, vectors, vectors, vectors)
 @settings(max_examples=40, deadline=None)
-def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel, autopilot) -> None:
-    error = np.concatenate([turn, velocity, position, gyro, accel, autopilot])
-    start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro, gyro[::-1])
+def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel, autopilot, drift) -> None:
+    error = np.concatenate([turn, velocity, position, gyro, accel, autopilot, drift])
+    start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro, gyro[::-1], drift[::-1])
     assert start.plus(error).minus(start) == pytest.approx(error, abs=1e-9)
 
 
@@ -64,6 +64,15 @@ def test_propagation_follows_a_known_motion_and_grows_uncertain() -> None:
     assert found.state.position == pytest.approx([radius * np.sin(1.0), radius * (1 - np.cos(1.0)), 0.0], abs=0.01)
     assert Rotation.from_matrix(found.state.rotation).as_rotvec() == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
     assert np.all(np.diag(found.covariance)[:9] > np.diag(before)[:9])
+
+
+def test_a_turn_is_followed_while_it_goes_on() -> None:
+    found = InertialFilter(InertialNoise(), 0, IDENTITY)
+    for k in range(101):  # 50 Hz, a turn of 1 rad within 2 s
+        t = k / 50
+        found.propagate(ImuReading(k * 20_000_000 + 1, np.array([0.0, 0.0, 0.5 * (1 - np.cos(np.pi * t))]), np.array([0.0, 0.0, 9.81])))
+        heading = 0.5 * (t - np.sin(np.pi * t) / np.pi)
+        assert Rotation.from_matrix(found.state.rotation).as_rotvec()[2] == pytest.approx(heading, abs=1e-3)
 
 
 def test_a_plane_is_flat_and_an_edge_is_not() -> None:

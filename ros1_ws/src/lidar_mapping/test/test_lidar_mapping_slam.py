@@ -86,6 +86,23 @@ def test_the_autopilots_slow_error_of_attitude_does_not_bend_the_map(kind) -> No
     assert np.sqrt(np.mean(off_the_yard(points[points[:, 2] > 1.7]) ** 2)) < 0.02
 
 
+def test_the_autopilots_drift_is_learned_where_surfaces_hold_the_scan() -> None:
+    slam = Slam(SlamSettings())
+    fly(Path(leg), slam, 12.0, count=2500, drift=0.05)
+    assert slam._odometry.state.autopilot_drift == pytest.approx([0.05, 0.0, 0.0], abs=0.015)
+
+
+def begin(t):
+    """Stand for a second, then 1.2 m/s within a second."""
+    faster = np.clip(t - 1.0, 0.0, 1.0)
+    return np.array([0.6 * faster**2 + 1.2 * max(t - 2.0, 0.0), 0.0, 2.0])
+
+
+def test_a_start_along_bare_walls_is_not_held_back_by_the_mean_velocity() -> None:
+    slam = Slam(SlamSettings())
+    assert fly(Path(begin, corridor=True, across_deg=30.0), slam, 3.0) < 0.02
+
+
 def test_a_jump_of_the_autopilots_position_moves_odom_and_not_the_map() -> None:
     path, slam = Path(lap), Slam(SlamSettings())
     assert fly(path, slam, 4.0, jump_m=2.0, jump_s=2.5) < 0.1
@@ -180,12 +197,12 @@ def test_readings_that_can_not_be_any_are_left_out() -> None:
     assert queue.add(ImuReading(2, still, up), 8), "the clock was set back"
 
 
-def test_a_sweep_gets_the_part_of_the_reading_that_spans_its_end() -> None:
+def test_a_sweep_gets_the_reading_of_its_end_from_those_around_it() -> None:
     queue, up = ReadingQueue(), np.array([0.0, 0.0, 9.81])
     for k in range(1, 4):
         assert queue.add(ImuReading(k * NS // 50, np.full(3, k), up), NS)
     taken = queue.take_until(3 * NS // 100)
-    assert [(reading.stamp_ns, reading.rates[0]) for reading in taken] == [(NS // 50, 1.0), (3 * NS // 100, 2.0)]
+    assert [(reading.stamp_ns, reading.rates[0]) for reading in taken] == [(NS // 50, 1.0), (3 * NS // 100, 1.5)]
     assert [reading.stamp_ns for reading in queue.take_until(NS)] == [2 * NS // 50, 3 * NS // 50], "it is whole for the next sweep"
     assert queue.add(ImuReading(5 * NS, np.zeros(3), up), 5 * NS)
     assert queue.take_until(NS) == [], "a reading after a gap says nothing of the time before the gap"

@@ -1,8 +1,9 @@
 """The state of a LiDAR-inertial odometry: propagated by inertial readings, corrected by whatever measures pose or velocity.
 
-An error-state Kalman filter in information form. Its 18 error terms are, in this order: attitude (rotation vector in the body frame),
-velocity and position (map frame, ENU), gyro bias and accelerometer bias (body frame), and the error of the autopilot's attitude (rotation
-vector in the map frame). That error changes slowly, so a hundred attitudes within a few seconds know no more than one.
+An error-state Kalman filter in information form. Its 21 error terms are, in this order: attitude (rotation vector in the body frame),
+velocity and position (map frame, ENU), gyro bias and accelerometer bias (body frame), the error of the autopilot's attitude (rotation
+vector in the map frame), and the drift of its position (map frame, metres a metre flown). Both errors change slowly, so a hundred
+attitudes or velocities within a few seconds know no more than one.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
     Linearise = Callable[["State"], tuple[Floats, Floats]]
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
-ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS, AUTOPILOT = (slice(3 * i, 3 * i + 3) for i in range(6))
+ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS, AUTOPILOT, DRIFT = (slice(3 * i, 3 * i + 3) for i in range(7))
 HEADING = 2  # of the attitude, while the vehicle is level
-TERMS = 18
+TERMS = 21
 HISTORY = 64
 """States kept for the deskewing of one sweep."""
 
@@ -47,11 +48,12 @@ class InertialNoise:
 
     Without inertial readings the vehicle is assumed to keep its velocity and attitude; ``free_m_s2`` and ``free_rad_s`` say how badly
     (root mean square over one second). The autopilot's attitude is off by ``autopilot_tilt_rad`` about each horizontal axis and by
-    ``autopilot_heading_rad``, which change within ``autopilot_s`` (first-order Gauss-Markov processes).
+    ``autopilot_heading_rad``, which change within ``autopilot_s``; its position drifts along each axis by ``autopilot_drift`` of the way,
+    which changes within ``autopilot_drift_s`` (first-order Gauss-Markov processes).
     """
 
     gyro: float = 0.0005
-    accel: float = 0.08
+    accel: float = 0.05
     gyro_walk: float = 5e-5
     accel_walk: float = 5e-4
     free_rad_s: float = 0.5
@@ -63,6 +65,8 @@ class InertialNoise:
     autopilot_tilt_rad: float = 0.01
     autopilot_heading_rad: float = 0.05
     autopilot_s: float = 30.0
+    autopilot_drift: float = 0.05
+    autopilot_drift_s: float = 60.0
 
     @property
     def autopilot_rad(self) -> Floats:
@@ -72,7 +76,10 @@ class InertialNoise:
 
 @dataclass(frozen=True)
 class State:
-    """``rotation`` (3, 3) is R_map_base; the rest are (3,) vectors. The autopilot says Exp(``autopilot_error``) R_map_base."""
+    """``rotation`` (3, 3) is R_map_base; the rest are (3,) vectors.
+
+    The autopilot says Exp(``autopilot_error``) R_map_base, and ``velocity`` + speed * ``autopilot_drift``.
+    """
 
     rotation: Floats
     velocity: Floats
@@ -80,6 +87,7 @@ class State:
     gyro_bias: Floats = field(default_factory=lambda: np.zeros(3))
     accel_bias: Floats = field(default_factory=lambda: np.zeros(3))
     autopilot_error: Floats = field(default_factory=lambda: np.zeros(3))
+    autopilot_drift: Floats = field(default_factory=lambda: np.zeros(3))
 
     @property
     def matrix(self) -> Floats:
@@ -89,7 +97,7 @@ class State:
         return transform
 
     def plus(self, error: Floats) -> State:
-        """Return the state moved by an error (18,)."""
+        """Return the state moved by an error (21,)."""
         return State(
             self.rotation @ Rotation.from_rotvec(error[ATTITUDE]).as_matrix(),
             self.velocity + error[VELOCITY],
@@ -97,10 +105,11 @@ class State:
             self.gyro_bias + error[GYRO_BIAS],
             self.accel_bias + error[ACCEL_BIAS],
             self.autopilot_error + error[AUTOPILOT],
+            self.autopilot_drift + error[DRIFT],
         )
 
     def minus(self, other: State) -> Floats:
-        """Return the error (18,) that leads from ``other`` to this state."""
+        """Return the error (21,) that leads from ``other`` to this state."""
         turn = Rotation.from_matrix(other.rotation.T @ self.rotation).as_rotvec()
         shifts = (
             self.velocity - other.velocity,
@@ -108,6 +117,7 @@ class State:
             self.gyro_bias - other.gyro_bias,
             self.accel_bias - other.accel_bias,
             self.autopilot_error - other.autopilot_error,
+            self.autopilot_drift - other.autopilot_drift,
         )
         return np.concatenate([turn, *shifts])
 
@@ -120,15 +130,22 @@ class InertialFilter:
         self.stamp_ns = stamp_ns
         self.state = start
         sigmas = (noise.start_attitude_rad, noise.start_velocity_m_s, 1e-3, noise.start_gyro_bias, noise.start_accel_bias)
-        self.covariance: Floats = np.diag(np.square([*np.repeat(sigmas, 3), *noise.autopilot_rad]))
+        self.covariance: Floats = np.diag(np.square([*np.repeat(sigmas, 3), *noise.autopilot_rad, *np.full(3, noise.autopilot_drift)]))
+        self._last: ImuReading | None = None
         self.history: deque[tuple[int, State]] = deque([(stamp_ns, start)], maxlen=HISTORY)
 
     def propagate(self, reading: ImuReading) -> None:
-        """Move to the reading's moment with its rates and specific force; one that is not later is left out."""
+        """Move to the reading's moment; one that is not later is left out.
+
+        A reading tells of its moment: from the reading before on, the mean of both counts, for a vehicle that begins to turn at 1 rad/s
+        would else be ahead by half a period, 0.6 degrees at 50 Hz, until it ends its turn.
+        """
         duration_s = (reading.stamp_ns - self.stamp_ns) / NS
         if duration_s > 0.0:
-            rates = reading.rates - self.state.gyro_bias
-            force = reading.specific_force - self.state.accel_bias
+            before = self._last if self._last is not None and self._last.stamp_ns == self.stamp_ns else reading
+            self._last = reading
+            rates = 0.5 * (before.rates + reading.rates) - self.state.gyro_bias
+            force = 0.5 * (before.specific_force + reading.specific_force) - self.state.accel_bias
             noise = self._noise
             densities = np.square([noise.gyro, noise.accel, 0.0, noise.gyro_walk, noise.accel_walk])
             self._move(reading.stamp_ns, rates, self.state.rotation @ force + GRAVITY, force, densities)
@@ -142,7 +159,7 @@ class InertialFilter:
             self._move(stamp_ns, np.zeros(3), np.zeros(3), np.zeros(3), densities)
 
     def correct(self, linearise: Linearise, *, least: int = 1, most: int = 1) -> None:
-        """Take a measurement that was linearised about the state: an information matrix (18, 18) and a gradient (18,), iterated.
+        """Take a measurement that was linearised about the state: an information matrix (21, 21) and a gradient (21,), iterated.
 
         Small steps end the iterations after the ``least``: a measurement may narrow its gates as it goes.
         """
@@ -171,7 +188,8 @@ class InertialFilter:
 
     def _move(self, stamp_ns: int, rates: Floats, acceleration: Floats, force: Floats, densities: Floats) -> None:
         duration_s = (stamp_ns - self.stamp_ns) / NS
-        before, fading = self.state, float(np.exp(-duration_s / self._noise.autopilot_s))
+        before, noise = self.state, self._noise
+        fading, drift_fading = np.exp(-duration_s / np.array([noise.autopilot_s, noise.autopilot_drift_s]))
         turn = Rotation.from_rotvec(rates * duration_s).as_matrix()
         transition = np.eye(TERMS)
         transition[ATTITUDE, ATTITUDE] = turn.T
@@ -180,7 +198,9 @@ class InertialFilter:
         transition[VELOCITY, ACCEL_BIAS] = -before.rotation * duration_s
         transition[POSITION, VELOCITY] = np.eye(3) * duration_s
         transition[AUTOPILOT, AUTOPILOT] = np.eye(3) * fading
-        growth = [*np.repeat(densities * duration_s, 3), *(1.0 - fading**2) * self._noise.autopilot_rad**2]
+        transition[DRIFT, DRIFT] = np.eye(3) * drift_fading
+        slow = [*(1.0 - fading**2) * noise.autopilot_rad**2, *np.full(3, (1.0 - drift_fading**2) * noise.autopilot_drift**2)]
+        growth = [*np.repeat(densities * duration_s, 3), *slow]
         self.covariance = transition @ self.covariance @ transition.T + np.diag(growth)
         self.state = State(
             before.rotation @ turn,
@@ -189,6 +209,7 @@ class InertialFilter:
             before.gyro_bias,
             before.accel_bias,
             before.autopilot_error * fading,
+            before.autopilot_drift * drift_fading,
         )
         self.stamp_ns = stamp_ns
         self.history.append((stamp_ns, self.state))

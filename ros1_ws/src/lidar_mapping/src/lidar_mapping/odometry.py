@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lidar_mapping.inertial import ATTITUDE, AUTOPILOT, HEADING, TERMS, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
+from lidar_mapping.inertial import ATTITUDE, AUTOPILOT, DRIFT, HEADING, TERMS, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.registration import Registration, RegistrationSettings, refused, register
 from lidar_mapping.voxel_map import downsample
@@ -27,9 +27,11 @@ if TYPE_CHECKING:
 
 IMU_GAP_NS = 100_000_000
 KNOT_NS = 10_000_000
+VELOCITY_BASE_NS = 100_000_000
 FIRST_SWEEPS = 3
 FIRST_HEADING_RAD = 0.001  # a new map's heading is what the start says, by definition
 AUTOPILOT_RAD = 0.003  # what its attitude is off without the slow error, which is a part of the state
+JUMP_SIGMAS = 3.0  # velocities that are off by more count less: a position that jumps by 0.1 m looks like 1 m/s for one sweep
 
 
 @dataclass(frozen=True)
@@ -37,9 +39,8 @@ class OdometrySettings:
     """Metres, radians. Scans are thinned to ``scan_voxel_m`` and ``scan_points``; the surface is what keyframes within ``reach_m`` saw.
 
     A keyframe is taken after ``keyframe_m`` or ``keyframe_rad``; it holds the sweeps since the last one, ``keyframe_sweeps`` at most. The
-    autopilot's velocity is believed to ``autopilot_m_s``: loosely, because its errors go on for seconds, so that it counts only where
-    no surface holds a direction for long. How its attitude is believed stands in ``noise``. A fitness below ``good_fitness`` makes
-    other starts be tried.
+    autopilot's velocity is believed to ``autopilot_m_s``, but for its drift: how that and its attitude are believed stands in ``noise``.
+    A fitness below ``good_fitness`` makes other starts be tried.
     """
 
     scan_voxel_m: float = 0.2
@@ -50,7 +51,7 @@ class OdometrySettings:
     keyframe_rad: float = 0.2
     keyframe_sweeps: int = 8
     max_keyframes: int = 1500
-    autopilot_m_s: float = 0.2
+    autopilot_m_s: float = 0.05
     good_fitness: float = 0.85
     noise: InertialNoise = field(default_factory=InertialNoise)
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
@@ -58,7 +59,10 @@ class OdometrySettings:
 
 @dataclass(frozen=True)
 class AutopilotMotion:
-    """What the autopilot says: R_enu_base (3, 3), with its slow error, and velocity m/s ENU, which a wrong heading does not turn."""
+    """What the autopilot says: R_enu_base (3, 3), with its slow error, and velocity m/s ENU, which a wrong heading does not turn.
+
+    The velocity is the mean over the last `VELOCITY_BASE_NS`.
+    """
 
     rotation: Floats
     velocity: Floats
@@ -106,7 +110,14 @@ class LidarInertialOdometry:
         state, turn = self.filter.state, correction[:3, :3]
         position = turn @ state.position + correction[:3, 3]
         error = (Rotation.from_rotvec(state.autopilot_error) * Rotation.from_matrix(turn.T)).as_rotvec()
-        moved = State(turn @ state.rotation, turn @ state.velocity, position, state.gyro_bias, state.accel_bias, error)
+        moved = replace(
+            state,
+            rotation=turn @ state.rotation,
+            velocity=turn @ state.velocity,
+            position=position,
+            autopilot_error=error,
+            autopilot_drift=turn @ state.autopilot_drift,
+        )
         self.filter.state = moved
         self.filter.history[-1] = (self.filter.stamp_ns, moved)
         self._last_pose = None if self._last_pose is None else correction @ self._last_pose
@@ -144,6 +155,7 @@ class LidarInertialOdometry:
         if autopilot is None:
             return self._register(points)
         predicted, take_back = self.filter.state, self.filter.keep()
+        autopilot = self._at_the_end(autopilot)
         last = self.filter.history[0][1]
         best, back_to_best = refused("not tried"), take_back
         for velocity_m_s, start in (
@@ -162,16 +174,31 @@ class LidarInertialOdometry:
         back_to_best()
         return best
 
+    def _at_the_end(self, autopilot: AutopilotMotion) -> AutopilotMotion:
+        """Return the motion with the velocity of the sweep's end: as it has changed since the mean, by the IMU."""
+        (since_ns, since), now = self.filter.history[0], self.filter.state
+        passed_ns = self.filter.stamp_ns - since_ns
+        if not passed_ns:
+            return autopilot
+        change = now.velocity - (now.position - since.position) / (passed_ns / NS)
+        return replace(autopilot, velocity=autopilot.velocity + min(1.0, VELOCITY_BASE_NS / passed_ns) * change)
+
     def _listen_to(self, autopilot: AutopilotMotion, velocity_m_s: float) -> None:
+        moves = np.zeros((3, TERMS))
+        moves[:, VELOCITY], moves[:, DRIFT] = np.eye(3), np.linalg.norm(autopilot.velocity) * np.eye(3)
+
+        def off_m_s(state: State) -> Floats:
+            return state.velocity + moves[:, DRIFT] @ state.autopilot_drift - autopilot.velocity
+
+        weight = _weight(off_m_s(self.filter.state), moves @ self.filter.covariance @ moves.T, velocity_m_s)
+
         def linearise(state: State) -> tuple[Floats, Floats]:
             said = Rotation.from_rotvec(state.autopilot_error).as_matrix() @ state.rotation
             rows = np.zeros((3, TERMS))
             rows[:, ATTITUDE], rows[:, AUTOPILOT] = np.eye(3), said.T
             information = rows.T @ rows / AUTOPILOT_RAD**2
             gradient: Floats = rows.T @ Rotation.from_matrix(autopilot.rotation.T @ said).as_rotvec() / AUTOPILOT_RAD**2
-            information[VELOCITY, VELOCITY] += np.eye(3) / velocity_m_s**2
-            gradient[VELOCITY] += (state.velocity - autopilot.velocity) / velocity_m_s**2
-            return information, gradient
+            return information + weight * moves.T @ moves, gradient + weight * moves.T @ off_m_s(state)
 
         self.filter.correct(linearise)
 
@@ -201,3 +228,11 @@ class LidarInertialOdometry:
         self._since, self._last_pose = [], pose
         self._surface = self.keyframes.surface(pose[:3, 3], settings.reach_m)
         return frame
+
+
+def _weight(off_m_s: Floats, covariance: Floats, sigma_m_s: float) -> float:
+    """Return the information of each axis of a velocity that is off its prediction (3,) with that covariance (3, 3); 0 for no sigma."""
+    if not np.isfinite(sigma_m_s):
+        return 0.0
+    squared = float(off_m_s @ np.linalg.solve(covariance + sigma_m_s**2 * np.eye(3), off_m_s))
+    return min(1.0, JUMP_SIGMAS**2 / max(squared, 1e-9)) / sigma_m_s**2

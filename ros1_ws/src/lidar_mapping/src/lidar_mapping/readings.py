@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lidar_mapping.inertial import ImuReading
 from lidar_mapping.odometry import IMU_GAP_NS
 from perception_core import NS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from lidar_mapping.inertial import ImuReading
 
 KEPT = 2000
 FASTEST_RAD_S, STRONGEST_M_S2 = 70.0, 320.0  # 4000 degrees/s and 32 g: beyond the range of what flies on a drone
@@ -29,6 +28,7 @@ class ReadingQueue:
     def __init__(self) -> None:
         self._readings: deque[ImuReading] = deque(maxlen=KEPT)
         self._last_ns = -1
+        self._taken: ImuReading | None = None
         self._arrived = Condition()
         self._silent = False
         """The last wait was in vain, and nothing has come since."""
@@ -56,20 +56,30 @@ class ReadingQueue:
     def take_until(self, stamp_ns: int) -> list[ImuReading]:
         """Take the readings up to a moment; later ones stay for the next sweep.
 
-        A reading tells of the time before it, so the first of the later ones is given for its part up to that moment, too: without it
-        the points at the end of each sweep would not be straightened.
+        The last one is what the readings around that moment make of it: without it the points at the end of each sweep would not be
+        straightened.
         """
         taken: list[ImuReading] = []
         while self._readings and self._readings[0].stamp_ns <= stamp_ns:
             taken.append(self._readings.popleft())
+        self._taken = taken[-1] if taken else self._taken
         if self._readings and self._readings[0].stamp_ns - stamp_ns < IMU_GAP_NS:
-            taken.append(replace(self._readings[0], stamp_ns=stamp_ns))
+            taken.append(_between(self._taken, self._readings[0], stamp_ns))
         return taken
 
     def clear(self) -> None:
         """Forget all."""
         self._readings.clear()
-        self._last_ns = -1
+        self._last_ns, self._taken = -1, None
+
+
+def _between(before: ImuReading | None, after: ImuReading, stamp_ns: int) -> ImuReading:
+    """Return the reading of a moment between two, or the later one where the one before is missing or too old."""
+    if before is None or not 0 < after.stamp_ns - before.stamp_ns <= IMU_GAP_NS:
+        return replace(after, stamp_ns=stamp_ns)
+    share = (stamp_ns - before.stamp_ns) / (after.stamp_ns - before.stamp_ns)
+    rates = (1.0 - share) * before.rates + share * after.rates
+    return ImuReading(stamp_ns, rates, (1.0 - share) * before.specific_force + share * after.specific_force)
 
 
 def _within(vector: NDArray[np.float64], limit: float) -> bool:

@@ -34,6 +34,7 @@ class MappingSettings:
     autopilot_m_s: float = _ODOMETRY.autopilot_m_s
     autopilot_tilt_rad: float = _ODOMETRY.noise.autopilot_tilt_rad
     autopilot_heading_rad: float = _ODOMETRY.noise.autopilot_heading_rad
+    autopilot_drift: float = _ODOMETRY.noise.autopilot_drift
     loop_reach_m: float = _GRAPH.reach_m
     autopilot_m: float = _GRAPH.autopilot_m
 
@@ -41,7 +42,12 @@ class MappingSettings:
     def slam(self) -> SlamSettings:
         """How the map is made."""
         registration = replace(_ODOMETRY.registration, min_fitness=self.min_fitness)
-        noise = replace(_ODOMETRY.noise, autopilot_tilt_rad=self.autopilot_tilt_rad, autopilot_heading_rad=self.autopilot_heading_rad)
+        noise = replace(
+            _ODOMETRY.noise,
+            autopilot_tilt_rad=self.autopilot_tilt_rad,
+            autopilot_heading_rad=self.autopilot_heading_rad,
+            autopilot_drift=self.autopilot_drift,
+        )
         odometry = replace(
             _ODOMETRY,
             reach_m=self.reach_m,

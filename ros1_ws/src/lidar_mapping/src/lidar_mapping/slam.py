@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from lidar_mapping.graph import GraphSettings, PoseGraph
 from lidar_mapping.inertial import POSITION, State
 from lidar_mapping.keyframes import Keyframes
-from lidar_mapping.odometry import AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
+from lidar_mapping.odometry import VELOCITY_BASE_NS, AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
 from lidar_mapping.readings import SET_BACK_NS
 from lidar_mapping.registration import refused
 from lidar_mapping.surface import flat_patches
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from perception_core import PoseBuffer, Sweep
 
     Floats = NDArray[np.float64]
-
-VELOCITY_BASE_NS = 100_000_000
 
 
 @dataclass(frozen=True)
