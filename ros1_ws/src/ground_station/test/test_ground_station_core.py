@@ -78,6 +78,14 @@ def test_a_missing_packet_is_asked_for_and_waited_for_then_given_up():
     assert feed(assembler, [packet(6, 0, key=True), packet(6, 1, key=True), packet(3, 0), packet(3, 1)], 2 * NS) == [6]
 
 
+def test_a_gap_within_the_newest_frame_is_asked_for_at_once():
+    assembler = Assembler()
+    feed(assembler, [packet(0, 0, key=True), packet(0, 1, key=True)])
+    assembler.add(packet(1, 2, count=4), now_ns=0)
+    assert assembler.missing(0) == ((1, 0), (1, 1)), "others have overtaken them; the last one may be on its way"
+    assert assembler.missing(NS // 10) == ((1, 0), (1, 1), (1, 3)), "nothing has come for a while"
+
+
 def test_replayed_packets_change_nothing():
     assembler = Assembler()
     first = [packet(f, i, key=f == 0) for f in range(3) for i in range(2)]
@@ -181,6 +189,12 @@ def test_a_degraded_radio_gives_a_worse_picture_but_gives_one():
     good, degraded = at(stream, 2.9).report, at(stream, 9.9).report
     assert degraded.fps >= 8
     assert 0.4 < degraded.quality < good.quality
+
+
+@pytest.mark.parametrize("seed", [5, 9])
+def test_a_packet_that_is_lost_as_the_radio_gets_worse_freezes_the_picture_but_briefly(seed):
+    stream = run(5.0, [(0.0, GOOD), (3.0, DEGRADED)], seed=seed)
+    assert max(stream.gaps()) <= 0.7, "seconds; with a queue in front of it what is sent again comes late"
 
 
 def test_a_critical_radio_exhausts_the_adaptation_and_holds_no_frame_rate():

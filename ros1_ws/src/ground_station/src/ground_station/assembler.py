@@ -9,7 +9,7 @@ from aiortc.codecs.h264 import h264_depayload
 from video_stream.report import MOST_MISSING
 from video_stream.wire import NS, VideoPacket
 
-PATIENCE_NS = NS * 3 // 10  # how long a frame that others wait for may still be sent again
+PATIENCE_NS = NS // 2  # how long a frame that others wait for may still be sent again
 MOST_WAITING = 60
 
 
@@ -42,7 +42,7 @@ class _Partial:
 class Assembler:
     """Collects packets; gives out frames of which each can be decoded after the last one that was given out.
 
-    A frame whose predecessor is missing waits for it, at most 0.3 s; then everything up to the next key frame is dropped:
+    A frame whose predecessor is missing waits for it, at most 0.5 s; then everything up to the next key frame is dropped:
     a picture that was predicted from one that never came would be wrong.
     """
 
@@ -95,8 +95,10 @@ class Assembler:
             partial = self._partial.get(frame_id)
             if partial is None:
                 wanted.append((frame_id, 0))
-            elif not partial.whole and (frame_id < self.newest_id or now_ns - partial.last_ns > NS // 20):
-                wanted += [(frame_id, index) for index in range(partial.count) if index not in partial.payloads]
+            else:
+                overdue = frame_id < self.newest_id or now_ns - partial.last_ns > NS // 20
+                last = partial.count if overdue else max(partial.payloads)
+                wanted += [(frame_id, index) for index in range(last) if index not in partial.payloads]
             if len(wanted) >= MOST_MISSING:
                 break
         return tuple(wanted[:MOST_MISSING])

@@ -1,6 +1,6 @@
 """The telepilot's stick: when it takes the vehicle over, what is sent of it, and how it gives the vehicle back. Pure.
 
-An ArduCopter lets sticks fly it in modes of the pilot's, in GUIDED it does not: so who moves the stick takes LOITER first. Only while the
+An ArduCopter lets sticks fly it in modes of the pilot's, in GUIDED it does not: so moving the stick takes LOITER first. Only while the
 vehicle says that it is in LOITER is the stick sent, as MANUAL_CONTROL: four axes without any vehicle's calibration, which can't reach its
 mode switch, as RC_CHANNELS_OVERRIDE can. In GUIDED nothing is sent, not even a centred stick: it would do nothing, it would lie on top of
 a safety pilot's transmitter, and a second without radio would be the loss of a remote control, which ends the flight.

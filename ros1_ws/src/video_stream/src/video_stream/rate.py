@@ -21,10 +21,11 @@ class RateSettings:
     min_bps: float = 100e3
     relieved_bps: float = 180e3  # once the least was reached: from here on there is something to give again
     max_bps: float = 2.5e6
-    queue_limit_s: float = 0.15
+    queue_limit_s: float = 0.1
     loss_limit: float = 0.2
     decrease: float = 0.8
     most_decrease: float = 0.45  # at once: what has just arrived may be little because little was sent
+    most_decrease_queued: float = 0.2  # where packets wait, what arrives is what the radio carries
     hold_s: float = 0.25  # after a decrease, until what it did can be seen
     increase: float = 1.03
     careful_increase: float = 1.006
@@ -52,7 +53,8 @@ class RateController:
         if congested and now_ns >= self._held_until_ns:
             self._congested_bps = max(report.received_bps, limits.min_bps)
             wanted_bps = min(self.target_bps * 0.9, report.received_bps * limits.decrease)
-            self._set(max(wanted_bps, self.target_bps * limits.most_decrease))
+            queued = report.queue_s > limits.queue_limit_s and report.loss <= limits.loss_limit
+            self._set(max(wanted_bps, self.target_bps * (limits.most_decrease_queued if queued else limits.most_decrease)))
             self._held_until_ns = now_ns + int(limits.hold_s * NS)
         elif not congested and now_ns >= self._held_until_ns and report.received_bps > 0.0:
             near = 0.8 * self._congested_bps < self.target_bps < 1.2 * self._congested_bps

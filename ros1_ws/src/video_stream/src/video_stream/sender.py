@@ -15,6 +15,7 @@ KEPT_FRAMES = 40
 RESEND_AFTER_NS = 150_000_000
 GRAIN_NS = 15_000_000  # by so much may a frame come early: cameras are not quite even
 UNDER_WAY_S = 0.3  # a frame that was sent so long ago and has not come yet: the radio is full
+WINDOW_S = 0.2  # so much of what the radio carries may be under way: what is more only waits, and a lost packet behind it
 PROBE_S = 0.4  # one goes out then all the same: only a frame that arrives tells that the way is free again
 
 
@@ -100,8 +101,12 @@ class VideoSender:
     def _full(self, now_ns: int) -> bool:
         if self.report is None or self._sent_ns is None or now_ns - self._sent_ns >= PROBE_S * NS:
             return False
-        waiting = [kept.sent_ns for frame_id, kept in self._kept.items() if frame_id > self.report.newest_id]
-        return bool(waiting) and now_ns - min(waiting) > UNDER_WAY_S * NS
+        waiting = [kept for frame_id, kept in self._kept.items() if frame_id > self.report.newest_id]
+        if not waiting:
+            return False
+        bits = 8 * sum(len(datagram) for kept in waiting for datagram in kept.datagrams)
+        carried_bps = max(self.report.received_bps, self._rate.target_bps / 4.0)  # little has come while little was sent
+        return now_ns - waiting[0].sent_ns > UNDER_WAY_S * NS or bits > WINDOW_S * carried_bps
 
     def _send(self, payloads: tuple[bytes, ...], stamp_ns: int, now_ns: int, *, key: bool, size_bytes: int) -> SentFrame:
         frame_id = self._next_id

@@ -1,7 +1,7 @@
 """What crosses the radio: RTP packets whose header extension names their frame, and sealed messages. RFC 3550, RFC 8285.
 
-Every packet carries the id and the stamp of its frame, its place among the frame's packets, and a tag that only who has the key
-can make. A player that knows nothing of them skips the extension, as RFC 8285 demands. Frames are put together by id and place, not
+Every packet carries the id and the stamp of its frame, its place among the frame's packets, and a tag that only a holder of the
+key can make. A player that knows nothing of them skips the extension, as RFC 8285 demands. Frames are put together by id and place, not
 by sequence number: what is repeated, late or out of order finds its place or none.
 """
 
