@@ -58,7 +58,7 @@ def parse_fault(text: str, known: Mapping[str, Sequence[str]] | None = None) -> 
 
     Args:
         text: as on the command line.
-        known: the things that can fail, each with the ways in which it can; None: anything, somebody else knows.
+        known: the things that can fail, each with the ways in which it can; None: any, and the caller checks it.
 
     Raises:
         FaultError: it is not written like that, or there is no such thing or way.

@@ -115,7 +115,8 @@ def read_yaml(path: Path, make_error: MakeError = YamlError) -> Located | None:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark is not None else ""
-        raise make_error(f"{path}{line}: is no YAML: {getattr(error, 'problem', None) or error}") from None
+        problem = " ".join(str(getattr(error, "problem", None) or error).split())  # some of its messages have several lines
+        raise make_error(f"{path}{line}: is no YAML: {problem}") from None
     return None if node is None else Located(path, node, make_error)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 # DDS derives its UDP ports from the domain (RTPS 2.5, section 9.6.2.3: 7400 + 250 * domain + ...); above 101 they fall
-# into Linux's ephemeral range. 0 is everybody's default and left alone.
+# into Linux's ephemeral range. 0 is every program's default and left alone.
 DOMAINS = range(1, 102)
 RTPS_PORT, RTPS_PORTS_PER_DOMAIN = 7400, 250
 # Linux takes outgoing connections' ports from 32768 up; the claims of domains lie among these.

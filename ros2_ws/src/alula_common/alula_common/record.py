@@ -16,7 +16,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mcap.exceptions import McapError
 from mcap.records import Channel, Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
@@ -186,7 +185,7 @@ class RecordFollower:
                     self._channels[part.id] = part
                 elif isinstance(part, Message):
                     yield from self._entry(part)
-        except (McapError, ValueError, KeyError, struct.error, EOFError) as error:
+        except Exception as error:  # noqa: BLE001 - damaged bytes: each decompressor and decoder raises types of its own
             self.broken = f"damaged before byte {self._offset}: {error}"
 
     def _entry(self, message: Message) -> Iterator[Entry]:

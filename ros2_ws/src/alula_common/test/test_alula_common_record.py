@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 from alula_common.record import DECISIONS, EVENTS, FILE, MAGIC, Entry, RecordError, RecordFollower, RecordWriter, read_record
 
@@ -76,6 +78,25 @@ def test_a_damaged_record_never_raises_but_for_its_head(tmp_path_factory, data):
     content[place] ^= data.draw(st.integers(1, 255))
     path.write_bytes(content)
     assert len(read_record(path)) <= len(ENTRIES)
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
+@given(data=st.data())
+def test_a_damaged_chunk_of_another_recorder_ends_the_record_and_does_not_raise(tmp_path_factory, compression, data):
+    path = tmp_path_factory.mktemp("record") / FILE
+    with path.open("wb") as file:
+        writer = Writer(file, compression=compression)
+        writer.start()
+        channel = writer.register_channel(EVENTS, "json", schema_id=0)
+        for number in range(50):
+            writer.add_message(channel, number, json.dumps({"number": number}).encode(), number)
+        writer.finish()
+    assert len(read_record(path)) == 50
+    content = bytearray(path.read_bytes())
+    place = data.draw(st.integers(len(MAGIC), len(content) - 1))
+    content[place] ^= data.draw(st.integers(1, 255))
+    path.write_bytes(content)
+    assert len(read_record(path)) <= 50
 
 
 def test_what_is_no_record_is_refused(tmp_path):

@@ -66,7 +66,7 @@ def test_a_run_that_has_ended_or_is_none_is_told(folder):
     place = make_run(folder, "one", claim.domain, age_s=0)
     assert load_run(place).live
     claim.release()
-    if not is_claimed(claim.domain):  # unless somebody else has just taken it
+    if not is_claimed(claim.domain):  # unless another process has just taken it
         with pytest.raises(NoRunError, match="has ended"):
             find_run(str(place))
     with pytest.raises(NoRunError, match="is no run's folder"):

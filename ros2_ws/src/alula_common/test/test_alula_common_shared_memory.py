@@ -1,4 +1,4 @@
-"""Shared memory of dead participants: what nobody holds a lock on."""
+"""Shared memory of dead participants: what no process holds a lock on."""
 
 from __future__ import annotations
 
