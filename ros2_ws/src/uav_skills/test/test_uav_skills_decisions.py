@@ -118,8 +118,9 @@ def test_silence_and_time():
     assert decisions.decide_stream(1.0, told_idle=True) is None
     assert decisions.decide_stream(1.1, told_idle=False) == Verdict("LOST", "nothing was heard of the video encoder for 1.1 s")
     assert decisions.decide_stream(1.1, told_idle=True) == Verdict("LOST", "the video encoder was started again and sends nothing")
-    assert decisions.decide_mapping(3.0) is None
-    assert decisions.decide_mapping(3.1).result == "ABORTED"
+    assert decisions.decide_mapping(3.0, "silent") is None
+    assert decisions.decide_mapping(3.1, "") == Verdict("ABORTED", "no scan registered for 3.1 s")
+    assert decisions.decide_mapping(3.1, "no cloud for 3.4 s").message == "no scan registered for 3.1 s; the LiDAR: no cloud for 3.4 s"
     assert decisions.decide_hover(1.9, 2.0) is None
     assert decisions.decide_hover(2.0, 2.0) == Verdict("DONE")
 

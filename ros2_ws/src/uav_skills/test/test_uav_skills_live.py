@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from uav_msgs.msg import SensorHealth
 from uav_skills_rig import Rig
 
 CRITERIA = {"min_fps": 8.0, "min_quality": 0.4, "patience": 3.0}
@@ -129,7 +130,7 @@ def test_a_flight_whose_reference_is_lost_aborts(rig, how):
     rig.wait(lambda: rig.functional.names()[-1:] == ["hover"])
 
 
-def test_a_flight_that_somebody_else_lands_is_not_held_up_by_a_hover(rig):
+def test_a_flight_that_another_reference_lands_is_not_held_up_by_a_hover(rig):
     rig.in_air()
     handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
     rig.wait(lambda: handle.progress > 0.0)
@@ -228,8 +229,9 @@ def test_mapping_that_registers_nothing_more_aborts(rig):
     handle = rig.start("mapping", "lidar_mapping")
     rig.wait(lambda: handle.progress == 1.0)
     rig.functional.mute.add("lidar_mapping")
+    rig.functional.lidar_health.publish(SensorHealth(sensor="lidar", reason="no clouds for 0.4 s", verdict=SensorHealth.BROKEN))
     assert rig.ended(handle) == ("TERMINATED", "ABORTED")
-    assert "no scan registered" in handle.message
+    assert handle.message.endswith("; the LiDAR: no clouds for 0.4 s"), handle.message
 
 
 def test_a_stream_is_sent_until_it_is_interrupted(rig):

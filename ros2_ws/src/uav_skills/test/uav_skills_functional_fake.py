@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from skillset_interfaces.srv import Transition
 from std_srvs.srv import SetBool, Trigger
-from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle, SensorHealth, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
 STEP_S = 0.05  # of mission clock
@@ -90,6 +90,7 @@ class FakeFunctional:
         self._state = self.node.create_publisher(GuidanceState, "/uav_guidance/state", 10)
         self._obstacles = {name: self.node.create_publisher(Obstacle, f"/{name}/obstacle", 10) for name in ("zed_depth", "lidar_obstacles")}
         self._mapping = self.node.create_publisher(MappingState, "/lidar_mapping/state", 10)
+        self.lidar_health = self.node.create_publisher(SensorHealth, "/lidar_obstacles/health", 5)
         self._video = self.node.create_publisher(VideoState, "/video_stream/state", 10)
         for name, kind, handler in (
             ("takeoff", Takeoff, self._takeoff),

@@ -2,8 +2,8 @@
 
 The functional layer lives in another world behind the bridge: a service may be away for a moment, and two services are
 served by different threads. So calls wait in one queue, and the next is sent when the last was answered, or when it was sent
-long enough ago to have arrived: an answer may take seconds (the guidance arms the vehicle first), and who wants to stop
-must not wait for it. What is not answered in time is answered here, as a refusal that says so.
+long enough ago to have arrived: an answer may take seconds (the guidance arms the vehicle first), and a call that stops the
+vehicle must not wait for it. What is not answered in time is answered here, as a refusal that says so.
 """
 
 from __future__ import annotations

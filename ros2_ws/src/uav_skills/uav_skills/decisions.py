@@ -133,11 +133,15 @@ def decide_stream(silent_s: float, *, told_idle: bool, limits: Thresholds = DEFA
     return Verdict("LOST", f"nothing was heard of the video encoder for {silent_s:.1f} s")
 
 
-def decide_mapping(silent_s: float, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
-    """End a mapping that registers no more scans; ``silent_s`` counts from the start until there was one."""
+def decide_mapping(silent_s: float, lidar_fault: str, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+    """End a mapping that registers no more scans; ``silent_s`` counts from the start until there was one.
+
+    ``lidar_fault``: what is said to be wrong with the LiDAR, empty for nothing: then it is the mapping that is silent.
+    """
     if silent_s <= limits.mapping_silence_s:
         return None
-    return Verdict("ABORTED", f"no scan registered for {silent_s:.1f} s")
+    cause = f"; the LiDAR: {lidar_fault}" if lidar_fault else ""
+    return Verdict("ABORTED", f"no scan registered for {silent_s:.1f} s{cause}")
 
 
 def remaining_part(remaining: float, initial: float) -> float:

@@ -14,7 +14,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool, Trigger
-from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle, SensorHealth, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
 from uav_skills.calls import CallQueue, Reply, ignore_answer
@@ -148,7 +148,10 @@ class MappingApi(FunctionalPart):
         self.registered_s: float | None = None
         self._enable = self._client(SetBool, "/lidar_mapping/enable")
         self._save = self._client(Trigger, "/lidar_mapping/save")
+        self.lidar_fault = ""
+        """What the LiDAR's health says of it; empty when it is well."""
         self._subscribe(MappingState, "/lidar_mapping/state", self._on_state)
+        self._subscribe(SensorHealth, "/lidar_obstacles/health", self._on_health)
 
     def enable(self, *, on: bool, reply: Reply = ignore_answer) -> None:
         """Start or stop the registration of scans."""
@@ -162,6 +165,9 @@ class MappingApi(FunctionalPart):
         if self.state is None or state.scans != self.state.scans:
             self.registered_s = self.now_s
         self.state = state
+
+    def _on_health(self, health: SensorHealth) -> None:
+        self.lidar_fault = str(health.reason)
 
 
 class VideoApi(FunctionalPart):

@@ -42,7 +42,7 @@ class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[mis
 
     def decide(self, silent_s: float) -> Verdict | None:
         """End as ABORTED when no more are registered."""
-        return decide_mapping(silent_s)
+        return decide_mapping(silent_s, self._mapping.lidar_fault)
 
 
 def make_hooks(node: Node) -> dict[str, SkillHooks]:
