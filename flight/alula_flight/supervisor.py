@@ -38,7 +38,7 @@ log = logging.getLogger("alula.supervisor")
 
 
 class Watch:
-    """Listens to roslaunch's process monitor: who died, and with which code."""
+    """Listens to roslaunch's process monitor: which process died, and with which code."""
 
     def __init__(self, record: DeathRecord, clock: MissionClock) -> None:
         self._record = record

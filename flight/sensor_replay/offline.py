@@ -24,7 +24,7 @@ CALLS = "/calls"
 
 
 class Graph:
-    """Who subscribes, who serves, and what is to be done when.
+    """The subscribers, the services, and what is to be done when.
 
     Args:
         publish: gets whatever is published, ``publish(topic, message)``.
@@ -67,7 +67,7 @@ class Graph:
         self.now_ns = max(self.now_ns, stamp_ns)
 
     def deliver(self, topic: str, kind: str, data: bytes) -> None:
-        """Give a message, as it is on the wire, to all who have subscribed."""
+        """Give a message, as it is on the wire, to all of the topic's subscribers."""
         for wanted, callback in self.subscribers.get(topic, ()):
             if wanted is rospy.AnyMsg:
                 raw = rospy.AnyMsg()

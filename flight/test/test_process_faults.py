@@ -107,7 +107,7 @@ def test_a_process_that_is_not_there_is_no_matter(tmp_path):
     assert not (tmp_path / FILE).exists()
 
 
-def test_faults_go_to_who_applies_them(tmp_path):
+def test_faults_go_to_the_program_that_applies_them(tmp_path):
     spec = RunSpec(
         "inspection", str(tmp_path), "id", 0, 0.0, ("zed@3", "radio@4", "encoder@5", "ground_station:hung@6"), "w", None, 1, 2, 3
     )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from alula_common.scenarios import load_scenario
+from alula_flight.report.answers import find_answers
 from alula_flight.report.events import History
+from alula_flight.report.facts import RunFacts
 from alula_flight.report.phases import Phases
 from alula_flight.report.recording import FaultChange, Recording
 from alula_flight.report.recovery import find_recovery
@@ -39,7 +43,9 @@ def test_a_stream_that_no_criterion_ended_lost_no_radio():
 @pytest.mark.parametrize(("killed_s", "failure_s", "failed"), [(110.0, 110.0, "ground_station"), (None, 112.5, "radio")])
 def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s, failed):
     killed = () if killed_s is None else (FaultChange("ground_station", "killed", killed_s),)
-    recovery = find_recovery(load_scenario("inspection"), History(), Recording(processes=killed), Phases(), radio_lost_s=112.5)
+    scenario, recording, facts = load_scenario("inspection"), Recording(processes=killed), RunFacts("inspection", 0, Path(), (), (), None)
+    answers = find_answers(facts, scenario, History(), recording, Phases(), radio_lost_s=112.5)
+    recovery = find_recovery(scenario, History(), recording, Phases(), answers)
     assert (recovery.failure_s, recovery.failed) == (failure_s, failed)
     (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery)["marks"]
     assert (mark["t_s"], mark["label"]) == (failure_s - 100.0, f"{failed} fails")

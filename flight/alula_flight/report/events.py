@@ -7,11 +7,12 @@ since lift-off only when they are shown: here they are absolute seconds of missi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from alula_common.record import EVENTS, RecordFollower
 from alula_flight.report.files import Problems, mapping
+from run_analysis.tree import Places
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
 
@@ -38,6 +39,9 @@ class History:
 
     executions: tuple[PastExecution, ...] = ()
     transitions: tuple[TransitionEvent, ...] = ()
+    events: tuple[EngineEvent, ...] = ()
+    places: Places = field(default_factory=Places)
+    """Where in the tree each execution was started."""
     first_s: float | None = None
     last_s: float | None = None
 
@@ -98,7 +102,7 @@ def gaps(events: Sequence[EngineEvent]) -> Iterator[str]:
             yield f"{event.skillset} lost {event.sequence - before - 1} events before {event.stamp_s:.2f} s of mission clock"
 
 
-def fold(events: Iterable[EngineEvent], problems: Problems) -> History:
+def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | None = None) -> History:
     """Put the events of each execution together. The first terminal state counts; another one is noted as a problem."""
     executions: dict[tuple[str, str, str], PastExecution] = {}
     transitions: list[TransitionEvent] = []
@@ -117,6 +121,8 @@ def fold(events: Iterable[EngineEvent], problems: Problems) -> History:
     return History(
         executions=tuple(executions.values()),
         transitions=tuple(transitions),
+        events=tuple(events),
+        places=places or Places(),
         first_s=min(stamps, default=None),
         last_s=max(stamps, default=None),
     )

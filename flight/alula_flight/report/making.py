@@ -7,7 +7,9 @@ from pathlib import Path
 
 from alula_common.files import write_aside, write_json
 from alula_common.record import FILE as RECORD
+from alula_common.record import read_record
 from alula_common.scenarios import Scenario, load_scenario
+from alula_flight.report.answers import FaultAnswer, find_answers
 from alula_flight.report.events import History, fold, read_events
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.files import Problems
@@ -26,6 +28,7 @@ from alula_flight.report.video import Video, radio_lost_s, read_video
 from alula_flight.report.video_picture import draw_video
 from alula_flight.report.world import TrueSurfaces
 from mission_console.page import write_report
+from run_analysis.tree import places_in
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,12 @@ class Account:
     mock: MockSummary | None
     phases: Phases
     video: Video
+    answers: tuple[FaultAnswer, ...]
     recovery: Recovery | None
 
     @property
     def failed(self) -> str:
-        """What failed first, or nothing."""
+        """What the recovery is from, or nothing."""
         return "" if self.recovery is None else self.recovery.failed
 
 
@@ -73,6 +77,7 @@ def make_report(facts: RunFacts) -> Summary:
         history=account.history,
         recording=account.recording,
         phases=account.phases,
+        answers=account.answers,
         recovery=account.recovery,
         recomputed=truth.recomputed,
         resting=truth.resting,
@@ -89,9 +94,10 @@ def make_report(facts: RunFacts) -> Summary:
 def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account:
     folder, history, recording, mock, video = facts.out_dir, History(), Recording(), None, Video()
     with problems.survive(RECORD):
-        history = fold(read_events(folder / RECORD, problems), problems)
+        events = read_events(folder / RECORD, problems)
+        history = fold(events, problems, places_in(read_record(folder)) if events else None)
     if facts.mock:
-        recording, mock = read_mock(folder, problems)
+        recording, mock = read_mock(facts, history.last_s, problems)
     else:
         with problems.survive("functional.bag"):
             recording = read_recording(folder, problems)
@@ -100,8 +106,9 @@ def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account
     if "video" in scenario.report and not facts.mock:
         with problems.survive("video"):
             video = read_video(folder, history, phases, problems)
-    recovery = find_recovery(scenario, history, recording, phases, radio_lost_s=radio_lost_s(video, phases))
-    return Account(history, recording, mock, phases, video, recovery)
+    answers = find_answers(facts, scenario, history, recording, phases, radio_lost_s=radio_lost_s(video, phases))
+    recovery = find_recovery(scenario, history, recording, phases, answers)
+    return Account(history, recording, mock, phases, video, answers, recovery)
 
 
 def _draw_pictures(facts: RunFacts, account: Account, truth: Truth, problems: Problems) -> None:

@@ -19,7 +19,7 @@ _BEFORE_FLIGHT = {"takeoff", "idle", ""}
 class Phases:
     """Absolute seconds of mission clock. ``zero_s`` is the origin of all times of a report: lift-off where it is known.
 
-    ``zero_from`` names who told: simulator, flight_status, first event, first pose or nothing. ``cruise_s``: the take-off is over.
+    ``zero_from`` names what told it: simulator, flight_status, first event, first pose or nothing. ``cruise_s``: the take-off is over.
     """
 
     zero_s: float = 0.0

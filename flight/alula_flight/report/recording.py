@@ -24,6 +24,8 @@ MAPPING = "/lidar_mapping/state"
 HEALTH = {"/zed_depth/health": "zed", "/lidar_obstacles/health": "lidar"}
 ON_GROUND = 1  # uav_msgs/GuidanceState.landed_state
 LANDING = 4
+MENDED = "ok"
+"""The mode of what works again."""
 
 Floats = NDArray[np.float64]
 

@@ -1,23 +1,24 @@
-"""How a flight got over a broken sensor: when it broke, when that was noticed, when the fallback ran, when it flew on."""
+"""How a flight got over a fault: when it happened, when that was noticed, when the fallback ran, when the vehicle flew on."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alula_common.scenarios import Scenario
+from alula_flight.report.answers import FaultAnswer
 from alula_flight.report.events import History, PastExecution
 from alula_flight.report.phases import Phases
-from alula_flight.report.recording import FaultChange, Recording, Track
+from alula_flight.report.recording import Recording, Track
+from run_analysis.causes.failures import SkillFailure, skill_failures
+from run_analysis.causes.faults import EARLY_S
 
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 LOST = "LOST"  # how the skills end whose function is not heard of any more
 BROKEN = "BROKEN"
-MENDED = "ok"
 MOVING_M_S = 0.2
-# The managers' clock ticks at 50 Hz, so an event's stamp may be a tick older than what caused it.
-STAMP_TOLERANCE_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -31,54 +32,77 @@ class Recovery:
     failed: str = ""
 
 
-def injected(recording: Recording) -> tuple[FaultChange, ...]:
-    """Return what the simulator and the supervisor broke, in the order of time."""
-    faults = recording.simulator.faults if recording.simulator is not None else ()
-    return tuple(sorted((fault for fault in (*faults, *recording.processes) if fault.mode != MENDED), key=lambda fault: fault.t_s))
-
-
 def find_recovery(
-    scenario: Scenario, history: History, recording: Recording, phases: Phases, *, radio_lost_s: float | None = None
+    scenario: Scenario, history: History, recording: Recording, phases: Phases, answers: Sequence[FaultAnswer]
 ) -> Recovery | None:
-    """Return the recovery from the first failure, or None without one. ``radio_lost_s``: when the radio was lost that ended the video.
+    """Return the recovery from the first fault in the air that the mission answered, or None where nothing failed there.
+
+    Where it answered none: from what broke without a fault that is known; else from the first fault that was detected, else the first;
+    these have no fallback. A fault before lift-off interrupts no flight.
 
     The scenario says which skill's running makes the flight safe again, and which take the vehicle on: a turn on the spot, or braking
     past the stop point and back, is not moving on.
     """
-    faults = injected(recording)
-    broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN]
-    if not faults and not broken and radio_lost_s is None:
+    flown = [one for one in answers if _in_the_air(one, phases)]
+    answered = [one for one in flown if one.traced.failures]
+    if answered:
+        one = min(answered, key=lambda one: one.traced.failures[0].at)
+        fallback_s = _fallback(scenario.fallback, history, one)
+        return _recovery(one, fallback_s, _moving(scenario, history, recording, phases, fallback_s))
+    noticed_s = _unexplained(history, answers)
+    if noticed_s is not None:
+        fallback_s = _first([e.running_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
+        return Recovery(None, noticed_s, fallback_s, _moving(scenario, history, recording, phases, fallback_s))
+    unanswered = [one for one in flown if one.traced.detected_s is not None] or flown
+    return _recovery(unanswered[0], None, None) if unanswered else None
+
+
+def _in_the_air(one: FaultAnswer, phases: Phases) -> bool:
+    at_s = one.traced.fault.at_s
+    ended = phases.touch_down_s is not None and at_s > phases.touch_down_s
+    return not ended and (at_s >= phases.zero_s or not phases.lifted_off)
+
+
+def _recovery(one: FaultAnswer, fallback_s: float | None, moving_s: float | None) -> Recovery:
+    return Recovery(one.traced.fault.at_s, one.traced.detected_s, fallback_s, moving_s, one.what)
+
+
+def _fallback(skill: str, history: History, one: FaultAnswer) -> float | None:
+    """Return when the fallback ran in answer to a fault: in the branch that answered it, or before anything else failed."""
+    first = one.traced.failures[0]
+    others = [failure for failure in skill_failures(history.events) if failure.at > first.at and failure not in one.traced.failures]
+    other_s = min((failure.end.stamp_s for failure in others), default=np.inf)
+
+    def answers(execution: PastExecution) -> bool:
+        in_branch = one.answer.branch in history.places.started.get(execution.id, ())
+        return execution.running_s is not None and (in_branch or execution.running_s < other_s)
+
+    runs = [execution.running_s for execution in history.executions if execution.skill == skill and answers(execution)]
+    return _first(runs, first.end.stamp_s - EARLY_S)
+
+
+def _unexplained(history: History, answers: Sequence[FaultAnswer]) -> float | None:
+    """Return when the skill layer noticed something broken that follows from no fault that is known; None: never."""
+    changes = {change for one in answers for change in one.traced.changes}
+    explained = {failure.at for one in answers for failure in one.traced.failures}
+    broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN and change not in changes]
+    failed = [failure.end.stamp_s for failure in skill_failures(history.events) if _lost(failure) and failure.at not in explained]
+    return min([*broken, *failed]) if broken else None
+
+
+def _lost(failure: SkillFailure) -> bool:
+    return failure.end.state.value == VIOLATED or failure.end.result == LOST
+
+
+def _moving(scenario: Scenario, history: History, recording: Recording, phases: Phases, fallback_s: float | None) -> float | None:
+    if fallback_s is None or recording.path is None:
         return None
-    failure_s, failed = _failure(recording, radio_lost_s)
-    since_s = -np.inf if failure_s is None else failure_s - STAMP_TOLERANCE_S
-    violated = [e.end_s for e in history.executions if (e.outcome == VIOLATED or e.result == LOST) and e.end_s is not None]
-    detected_s = _first([*broken, *violated], since_s)
-    fallback_s = _fallback(scenario.fallback, history.executions, since_s if detected_s is None else detected_s)
-    motion_s = None if fallback_s is None else _first(_running_stamps(history, scenario.motion), fallback_s)
-    moving_s = None if motion_s is None or recording.path is None else moving_again(recording.path, motion_s, phases.landing_s)
-    return Recovery(failure_s, detected_s, fallback_s, moving_s, failed)
+    motion_s = _first([e.running_s for e in history.executions if e.skill in scenario.motion], fallback_s)
+    return None if motion_s is None else moving_again(recording.path, motion_s, phases.landing_s)
 
 
-def _failure(recording: Recording, radio_lost_s: float | None) -> tuple[float | None, str]:
-    """Return when the first failure happened, and of what; a process that died is not told as the radio, whatever that was like."""
-    dead = [fault.t_s for fault in recording.processes if fault.mode != MENDED]
-    if radio_lost_s is not None and not dead:
-        return radio_lost_s, "radio"
-    first = next(iter(injected(recording)), None)
-    return (None, "") if first is None else (first.t_s, first.sensor)
-
-
-def _running_stamps(history: History, skills: tuple[str, ...]) -> list[float]:
-    return [e.running_s for e in history.executions if e.skill in skills and e.running_s is not None]
-
-
-def _first(stamps: list[float], since_s: float) -> float | None:
-    return min((stamp for stamp in stamps if stamp >= since_s), default=None)
-
-
-def _fallback(skill: str, executions: tuple[PastExecution, ...], since_s: float) -> float | None:
-    """Return when the fallback skill came to run; one that was running before the failure needs no mention."""
-    return _first([e.running_s for e in executions if e.skill == skill and e.running_s is not None], since_s)
+def _first(stamps: Sequence[float | None], since_s: float) -> float | None:
+    return min((stamp for stamp in stamps if stamp is not None and stamp >= since_s), default=None)
 
 
 def moving_again(track: Track, since_s: float, landing_s: float | None) -> float | None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypedDict
 
 from alula_common.faults import parse_fault
 from alula_common.scenarios import load_scenario
+from alula_flight.report.answers import AnswerSummary, FaultAnswer, injected, summarise_answer
 from alula_flight.report.events import History
 from alula_flight.report.facts import Death, RunFacts
 from alula_flight.report.files import Problems, ReportError, mapping, read_json, sequence
@@ -13,7 +15,7 @@ from alula_flight.report.map_quality import MapQuality
 from alula_flight.report.mocked import MockSummary
 from alula_flight.report.phases import Phases, flight_status
 from alula_flight.report.recording import ON_GROUND, Recording
-from alula_flight.report.recovery import Recovery, injected
+from alula_flight.report.recovery import Recovery
 from alula_flight.report.truth import Encounter, worse
 from alula_flight.report.video import VideoSummary
 
@@ -102,6 +104,7 @@ class Summary(TypedDict):
     video: VideoSummary | None
     faults: list[str]
     injected: list[InjectedFault]
+    answers: list[AnswerSummary]
     died: list[Death]
     mission_exit: int | None
     conformance: dict[str, object] | None
@@ -181,6 +184,7 @@ def summarise(
     history: History,
     recording: Recording,
     phases: Phases,
+    answers: Sequence[FaultAnswer],
     recovery: Recovery | None,
     recomputed: Encounter,
     resting: bool | None,
@@ -215,6 +219,7 @@ def summarise(
         video=video,
         faults=list(facts.faults),
         injected=[InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(recording)],
+        answers=[summarise_answer(one, phases) for one in answers],
         died=[Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],
         mission_exit=facts.mission_exit,
         conformance=None if facts.conformance is None else dict(facts.conformance),

@@ -1,4 +1,4 @@
-"""``timeline.json``: who did what when, as rows of bars (skills) and of bands (resources), for the picture and other viewers."""
+"""``timeline.json``: which skill ran when, as rows of bars (skills) and of bands (resources), for the picture and other viewers."""
 
 from __future__ import annotations
 

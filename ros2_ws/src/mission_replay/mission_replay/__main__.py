@@ -132,8 +132,8 @@ def replay(options: argparse.Namespace) -> int:
     result = prepare(recorded, options).run()
     zero_s = zero_of(recorded)
     if options.out is not None:
-        requests = [parse_fault(text) for text in options.failed] if options.depth == "sensors" else []
-        write_out(options.out, recorded, result, zero_s, {one.what: zero_s + (one.begin_s or 0.0) for one in requests})
+        spoiled = [parse_fault(text) for text in options.failed] if options.depth == "sensors" else []
+        write_out(options.out, recorded, result, zero_s, spoiled)
     if options.kept:
         make_report(options.out, recorded, options.failed)
     for line, decision in zip(trace_of(result, zero_s), result.decisions, strict=True):

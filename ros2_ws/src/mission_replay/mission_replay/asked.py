@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -30,7 +31,10 @@ def route_of(recorded: Recorded) -> Route:
     """Return the route that was flown."""
     waypoints = recorded.mission.get("route")
     if isinstance(waypoints, list) and waypoints:
-        return Route([(float(x), float(y), float(z)) for x, y, z in waypoints])
+        try:
+            return Route([(float(x), float(y), float(z)) for x, y, z in waypoints])
+        except (TypeError, ValueError):
+            raise ReplayError(f"{recorded.path}: its route is no list of [x, y, z] in metres") from None
     try:
         return load_route(recorded.path.parent / "route.json")
     except RouteError as error:
@@ -81,8 +85,10 @@ def skillsets_for(plan: MissionPlan, models: Sequence[Path]) -> list[Skillset]:
 
 def parameters_for(recorded: Recorded, plan: MissionPlan, settings: Sequence[str]) -> dict[str, float]:
     """Return the mission's parameters: as they were, changed by ``NAME=VALUE``."""
-    said = recorded.mission.get("parameters")
-    values = {**plan.parameters, **{name: value for name, value in (said or {}).items() if name in plan.parameters}}
+    said = recorded.mission.get("parameters") or {}
+    if not isinstance(said, Mapping):
+        raise ReplayError(f"{recorded.path}: its parameters are no mapping of names to numbers")
+    values = {**plan.parameters, **{name: _number(recorded, name, value) for name, value in said.items() if name in plan.parameters}}
     for setting in settings:
         name, _, text = setting.partition("=")
         name = name.removeprefix("mission.")
@@ -92,7 +98,15 @@ def parameters_for(recorded: Recorded, plan: MissionPlan, settings: Sequence[str
             values[name] = float(text)
         except ValueError:
             raise ReplayError(f"--set {setting}: {text!r} is no number") from None
+        if not math.isfinite(values[name]):
+            raise ReplayError(f"--set {setting}: {text!r} is no finite number")
     return values
+
+
+def _number(recorded: Recorded, name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ReplayError(f"{recorded.path}: the parameter {name} is no number, but {value!r}")
+    return value
 
 
 def behaviour_for(recorded: Recorded, skillsets: Sequence[Skillset], files: Sequence[Path]) -> Behaviour:

@@ -111,7 +111,7 @@ class SwitchedSkill(SkillHooks):
                 self._mock.on_dispatch(execution)
 
     def ended(self, event: ExecutionEvent) -> None:
-        """Take note of an end: who got there has moved all the way."""
+        """Take note of an end: a skill that terminated has moved the vehicle all the way."""
         execution = self._open.pop(event.id, None)
         if execution is not None and event.state is ExecutionState.TERMINATED:
             self._mock.forget(execution.id)

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 from rosbags.interfaces import ConnectionExtRosbag1
-from rosbags.rosbag1 import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from alula_common.record import OPERATOR, TICKS, Entry
 from mission_replay.recorded import Recorded, ReplayError
 
+MOST_SAID = 200
+"""Characters of what a reader says of a damaged bag: it can quote the definition of a message."""
 CALLS = "/calls"
 MESSAGE = "message"
 
@@ -44,8 +45,9 @@ def read_bag(path: Path, topics: Iterable[str]) -> Iterator[Entry]:
             # No connections would mean all of them.
             for connection, stamp_ns, raw in reader.messages(connections=found) if found else ():
                 yield Entry(connection.topic, stamp_ns, {MESSAGE: reader.deserialize(raw, connection.msgtype)})
-    except (AnyReaderError, ReaderError, OSError, ValueError, KeyError, AssertionError) as error:
-        raise ReplayError(f"{path}: {str(error) or type(error).__name__}") from error
+    except Exception as error:  # whatever a damaged or hostile bag makes the reader raise
+        said = " ".join(str(error).split())[:MOST_SAID] or type(error).__name__
+        raise ReplayError(f"{path}: can't be read as a bag: {said}") from error
 
 
 def read_calls(path: Path) -> list[Call]:

@@ -8,9 +8,11 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from alula_common.faults import FaultRequest
 from alula_common.files import write_json, write_text
 from mission_replay.recorded import Recorded, ReplayError
 from mission_replay.replay import Result
+from run_analysis.causes.faults import RunTimes, faults_asked
 from uav_missions.plan import write_route
 from uav_missions.route import Route
 
@@ -36,23 +38,31 @@ def same(recorded: Recorded, result: Result) -> bool:
     return result.difference is None and ended_alike
 
 
-def write_out(out: Path, recorded: Recorded, result: Result, zero_s: float, spoiled: Mapping[str, float]) -> None:
-    """Write what is not in the replay's own record: the trace and the verdict; ``spoiled``: measurements, and since when."""
+def write_out(out: Path, recorded: Recorded, result: Result, zero_s: float, spoiled: Sequence[FaultRequest]) -> None:
+    """Write what is not in the replay's own record: the trace and the verdict; ``spoiled``: faults of measurements."""
     write_text(out / "trace.jsonl", "".join(json.dumps(line) + "\n" for line in trace_of(result, zero_s)))
     route = recorded.mission.get("route")
     if isinstance(route, list):
         write_route(out, Route([(x, y, z) for x, y, z in route]))
-    write_json(out / "mock.json", account_of(result, spoiled))
+    begun_s = min(entry.stamp_s for entry in recorded.entries)
+    write_json(out / "mock.json", account_of(result, first_times(spoiled, RunTimes(begun_s, zero_s, result.simulated_s))))
     difference = None if result.difference is None else result.difference.as_dict()
     write_json(
         out / "replay.json", {"of": str(recorded.path), "same": same(recorded, result), "difference": difference, "notes": result.notes}
     )
 
 
+def first_times(spoiled: Sequence[FaultRequest], times: RunTimes) -> dict[str, float]:
+    """Return when each fault of measurements came first, as mocks tell it of theirs: by its name, seconds of mission clock."""
+    found: dict[str, float] = {}
+    for request, fault in faults_asked(spoiled, times):
+        found.setdefault(request.what, fault.at_s)
+    return found
+
+
 def account_of(result: Result, spoiled: Mapping[str, float]) -> dict[str, object]:
     """Return ``mock.json``, as of a flight over mocks; times are mission clock, but for ``wall_s``."""
-    happened = {**result.faults, **{name: when_s for name, when_s in spoiled.items() if when_s <= result.simulated_s}}
-    faults = [{"sensor": name, "mode": "mock", "t_s": when_s} for name, when_s in happened.items()]
+    faults = [{"sensor": name, "mode": "mock", "t_s": when_s} for name, when_s in {**result.faults, **spoiled}.items()]
     factor = result.simulated_s / result.wall_s if result.wall_s else None
     told = {"simulated_s": result.simulated_s, "wall_s": result.wall_s, "factor": factor, "lift_off_s": result.lift_off_s}
     return {**told, "faults": faults, "notes": list(result.notes)}

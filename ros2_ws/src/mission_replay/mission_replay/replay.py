@@ -15,7 +15,7 @@ from typing import Any
 
 from alula_common.record import OPERATOR, TICKS, Entry
 from mission_replay.comparison import Comparison, Difference
-from mission_replay.recorded import Decision, Knowledge, Recorded
+from mission_replay.recorded import Decision, Knowledge, Recorded, ReplayError
 from mission_replay.vehicle import Vehicle
 from run_analysis.tree import path_to
 from skill_missions.director import Director, End, Outcome
@@ -29,6 +29,8 @@ from skill_runtime.plain import to_plain
 
 TICK_PERIOD_S = 0.1
 LIMIT_S = 3600.0
+MAX_GAP_S = 86400.0
+"""A mission ticks, so a longer silence is a damaged stamp; virtual time would take minutes or years to get there."""
 """Mission clock after the record's end, after which a mission that goes round in circles is left."""
 
 
@@ -132,7 +134,13 @@ class Replay:
 
     def _advance_to(self, stamp_ns: int, begun: float, start_s: float) -> None:
         over = lambda: not self._may_go_on()  # noqa: E731
-        self._world.run_until(over, timeout_s=max(0, stamp_ns - self._world.clock.now_ns) / 1e9)
+        wait_s = max(0, stamp_ns - self._world.clock.now_ns) / 1e9
+        if wait_s > MAX_GAP_S:
+            raise ReplayError(
+                f"{self._recorded.path}: nothing was recorded from {self._world.now_s:.3f} s to {stamp_ns / 1e9:.3f} s of mission clock; "
+                "a stamp there is damaged"
+            )
+        self._world.run_until(over, timeout_s=wait_s)
         if self._rate > 0.0:
             time.sleep(max(0.0, begun + (self._world.now_s - start_s) / self._rate - time.monotonic()))
 

@@ -77,9 +77,14 @@ class ReplayHost(LocalMockHost):
             super().publish(skillset, data, value)
 
     def publish_recorded(self, skillset: str, data: str, value: object) -> None:
-        """Publish a value of the record."""
-        if skillset not in self.mocked:
+        """Publish a value of the record; data that another model does not have are left out and noted."""
+        if skillset in self.mocked:
+            return
+        try:
             super().publish(skillset, data, value)
+        except KeyError as error:
+            if str(error.args[0]) not in self.notes:
+                self.note(str(error.args[0]))
 
 
 class Vehicle:

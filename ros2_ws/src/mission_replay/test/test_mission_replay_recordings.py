@@ -124,13 +124,15 @@ def test_a_weakened_invariant_is_told(depth, tmp_path, capsys):
     assert "now:  nothing" in said
 
 
-@pytest.mark.parametrize("content", [b"", b"#ROSBAG V2.0\n", b"#ROSBAG V2.0\n" + b"\xff" * 4000, "cut", None])
+@pytest.mark.parametrize("content", [b"", b"#ROSBAG V2.0\n", b"#ROSBAG V2.0\n" + b"\xff" * 4000, "cut", "definition", None])
 def test_a_bag_that_can_not_be_read_is_refused_in_a_line(content, tmp_path, capsys):
     pytest.importorskip("uav_msgs")
     shutil.copy(RECORDINGS / "mapping" / FILE, tmp_path / FILE)
     bag = tmp_path / "functional.bag"
     if content == "cut":
         bag.write_bytes((RECORDINGS / "mapping/functional.bag").read_bytes()[:30000])
+    elif content == "definition":
+        bag.write_bytes((RECORDINGS / "mapping/functional.bag").read_bytes().replace(b"float64", b"fl{at\n4"))
     elif content is not None:
         bag.write_bytes(content)
     assert main([str(tmp_path), "--from", "functional"]) == CANNOT_REPLAY

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-from alula_common.record import DECISIONS, FILE, MISSION, RecordWriter, read_record
+from alula_common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
 from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
 from mission_replay.comparison import alike
 from run_analysis import expect
@@ -218,6 +218,47 @@ def write_wrong_mission(path: Path) -> None:
     writer.close()
 
 
+WRONG_MISSIONS = {
+    "its route is no list of [x, y, z]": {"route": [[0, 0, 3], "x"]},
+    "its parameters are no mapping": {"parameters": [1]},
+    "the parameter speed_m_s is no number, but 'fast'": {"parameters": {"speed_m_s": "fast"}},
+    "the parameter speed_m_s is no number, but {}": {"parameters": {"speed_m_s": {}}},
+}
+
+
+@pytest.mark.parametrize("complaint", WRONG_MISSIONS)
+def test_a_mission_with_values_that_can_not_be_is_refused_in_a_line(complaint, tmp_path, capsys):
+    writer = RecordWriter(tmp_path / FILE)
+    writer.write(MISSION, 0, {"scenario": "mapping", "route": [[0, 0, 3]], **WRONG_MISSIONS[complaint]})
+    writer.close()
+    assert main([str(tmp_path)]) == CANNOT_REPLAY
+    said = capsys.readouterr().err
+    assert f"skills.mcap: {complaint}" in said
+    assert said.count("\n") == 1
+
+
+def test_a_stamp_that_can_not_be_is_refused_and_not_waited_for(nominal, tmp_path, capsys):
+    writer, entries = RecordWriter(tmp_path / FILE), read_record(nominal)
+    for number, entry in enumerate(entries):
+        writer.write(entry.topic, entry.stamp_ns + (2**60 if number == len(entries) // 2 else 0), entry.value)
+    writer.close()
+    assert main([str(tmp_path)]) == CANNOT_REPLAY
+    said = capsys.readouterr().err
+    assert "a stamp there is damaged" in said
+    assert said.count("\n") == 1
+
+
+def test_data_that_the_model_does_not_have_are_left_out_and_noted(nominal, tmp_path):
+    writer, entries = RecordWriter(tmp_path / FILE), read_record(nominal)
+    unknown = Entry(DATA, entries[50].stamp_ns, {"skillset": "perception", "data": "battery", "value": 1})
+    for entry in (*entries[:50], unknown, unknown, *entries[50:]):
+        writer.write(entry.topic, entry.stamp_ns, entry.value)
+    writer.close()
+    assert main([str(tmp_path / FILE), "--out", str(tmp_path / "out")]) == SAME
+    notes = json.loads((tmp_path / "out" / "replay.json").read_text())["notes"]
+    assert notes == ["skillset perception has no data battery; it has zed_obstacle, lidar_obstacle"]
+
+
 def write_wrong_scenario(path: Path) -> None:
     writer = RecordWriter(path)
     writer.write(MISSION, 0, {"scenario": "../secret", "route": [[0, 0, 3]]})
@@ -253,6 +294,7 @@ def test_what_is_no_record_is_refused_in_a_line(tmp_path, capsys, write):
         (["--fail", "zed@x"], "zed:dark@30-40"),
         (["--set", "sped_m_s=1"], "did you mean `speed_m_s`"),
         (["--set", "speed_m_s=fast"], "is no number"),
+        (["--set", "speed_m_s=nan"], "is no finite number"),
         (["--tree", "nowhere.py"], "there is no such file"),
         (["--tree", "no.such.module"], "no.such"),
         (["--tree", "json"], "plan"),

@@ -42,7 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if given.svg is not None:
             from run_analysis.comparing.picture import draw  # late: matplotlib takes a moment
 
-            write_aside(given.svg, lambda aside: draw(compared, aside))
+            try:
+                write_aside(given.svg, lambda aside: draw(compared, aside))
+            except OSError as error:
+                raise AnalysisError(f"--svg {given.svg}: can't be written: {error.strerror or error}") from None
     except (AnalysisError, OSError, ValueError) as error:
         sys.stderr.write(f"alula compare: {error}\n")
         return UNREADABLE

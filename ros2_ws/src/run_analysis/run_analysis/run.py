@@ -40,11 +40,19 @@ class Run:
         return event.stamp_s - self.origin_s
 
 
-def origin_of(events: Sequence[EngineEvent]) -> float:
-    """Return the time that a run's times count from, seconds of mission clock."""
+def lift_off_of(events: Sequence[EngineEvent]) -> float | None:
+    """Return when the vehicle left the ground first, seconds of mission clock; None: never."""
     for event in events:
         if isinstance(event, TransitionEvent) and (event.resource, event.from_state) == DEPARTURE:
             return event.stamp_s
+    return None
+
+
+def origin_of(events: Sequence[EngineEvent]) -> float:
+    """Return the time that a run's times count from, seconds of mission clock."""
+    lift_off_s = lift_off_of(events)
+    if lift_off_s is not None:
+        return lift_off_s
     return events[0].stamp_s if events else 0.0
 
 
@@ -66,6 +74,6 @@ def _mission(path: Path) -> Mapping[str, Any]:
             return content if isinstance(content, dict) else {}
         record = path if path.is_file() else path / FILE
         told = [entry.value for entry in read_record(record) if entry.topic == MISSION] if record.suffix == ".mcap" else []
-    except (OSError, ValueError, RecordError) as error:
+    except (OSError, ValueError, RecursionError, RecordError) as error:
         raise AnalysisError(f"{folder}: its mission can't be read: {error}") from None
     return told[-1] if told else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from run_analysis_mocks import fly_recorded
 from alula_common.record import read_record
 from run_analysis.campaign.__main__ import main
 from run_analysis.campaign.coverage import cover, is_troubled, processes
-from run_analysis.campaign.failures import ARROW, FAULT, INVARIANT, PROCESS, RESULT, Failure, Way, failures_by, failures_in, ways_to_fail
+from run_analysis.campaign.failures import ARROW, FAULT, INVARIANT, PROCESS, RESULT, Failure, Way, failures_in, ways_to_fail
 from run_analysis.campaign.flying import fly
 from run_analysis.campaign.plan import MOCKS, Flight, load_campaign
 from run_analysis.campaign.table import ROWS, Table
@@ -130,6 +131,9 @@ WRONG = {
     "over: simulator\nworlds: {mapping: no.yaml}": "a.yaml:2: there is no file ",
     "over: simulator\nworlds: {inspection: no.yaml}": "a.yaml:2: `worlds` has no `inspection`; it may have mapping",
     "over: simulator\nbehaviour: no.yaml": "a.yaml:2: `behaviour` says what mocks do",
+    "seeds: []": "a.yaml:1: `seeds` lists nothing, so there is no flight",
+    "scenarios: []": "a.yaml:1: `scenarios` lists nothing, so there is no flight",
+    "flights: 2\ndraw: {faults: []}": "a.yaml:2: `faults` has none to draw for mapping",
     "faults: [[rotor@3]]": "there is no fault 'rotor' in the behaviour; it has zed",
 }
 
@@ -192,23 +196,6 @@ def test_the_branch_that_answers_is_the_first_node_that_leads_elsewhere():
     )
     assert (places.answer("a", "b"), places.answer("a", "c"), places.answer("a", None)) == ("lidar", "zed", "end")
     assert (places.answer("a", "?"), places.answer("?", "a"), Places().answer("a", None)) == ("", "", "")
-
-
-def test_a_fault_is_answered_as_the_first_failure_after_it_and_before_the_next():
-    lost, blocked, unused = (Way(RESULT, f"navigation.goto {name}") for name in ("LOST", "BLOCKED", "ABORTED"))
-    failures = [
-        Failure(unused, 9.0, "not in use", "not in use"),
-        Failure(lost, 11.0, "come down", "navigation.hover", 0.5),
-        Failure(blocked, 31.0, "given up"),
-    ]
-    causes = [(Way(FAULT, name), at_s) for name, at_s in (("zed", 8.0), ("radio:out", 10.0), ("lidar", 20.0), ("control", 40.0))]
-    found = [(one.way.name, one.answered_by, one.skill, one.after_s) for one in failures_by(causes, failures)]
-    assert found == [
-        ("zed", "nothing failed", "nothing failed", None),
-        ("radio:out", "come down", "navigation.hover", 1.5),
-        ("lidar", "given up", "no skill", None),
-        ("control", "nothing failed", "nothing failed", None),
-    ]
 
 
 def test_the_rows_of_flights_over_mocks_tell_of_their_faults():
@@ -301,6 +288,38 @@ def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(
         Table(tmp_path / "out", load_campaign(campaign_file(tmp_path / "b.yaml", DRAWN.replace("12", "13"))))
     with pytest.raises(AnalysisError, match="is not empty and holds no campaign"):
         Table(tmp_path, campaign)
+
+
+DAMAGED = {"bytes": b"\xff{\n", "cut": b"{\n", "number": b"3\n", "little": b'{"flight": 3}\n', "deep": b"[" * 10**5 + b"\n"}
+
+
+@pytest.mark.parametrize("damaged", DAMAGED.values(), ids=DAMAGED)
+def test_a_row_that_was_damaged_costs_no_other(damaged, tmp_path):
+    campaign = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN))
+    Table(tmp_path / "out", campaign).add([row(1), row(2)])
+    path = tmp_path / "out" / ROWS
+    first, second = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(first + damaged + second)
+    again = Table(tmp_path / "out", campaign)
+    assert set(again.rows) == {1, 2}
+    again.add([row(3)])
+    assert [json.loads(line)["flight"] for line in path.read_text(encoding="utf-8").splitlines()] == [1, 2, 3]
+
+
+def test_a_campaign_whose_plan_was_damaged_is_refused(tmp_path):
+    campaign = load_campaign(campaign_file(tmp_path / "a.yaml", DRAWN))
+    Table(tmp_path / "out", campaign)
+    (tmp_path / "out" / "campaign.json").write_text("{", encoding="utf-8")
+    with pytest.raises(AnalysisError, match="holds another campaign"):
+        Table(tmp_path / "out", campaign)
+
+
+def test_a_folder_that_goes_away_is_told_in_a_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("run_analysis.campaign.__main__.run", lambda *_: shutil.rmtree(tmp_path / "out"))
+    path = campaign_file(tmp_path / "a.yaml", "faults: [[zed@3]]\n")
+    assert main([str(path), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said == f"alula campaign: {tmp_path / 'out'}: can't be written any more: No such file or directory\n"
 
 
 def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp_path):

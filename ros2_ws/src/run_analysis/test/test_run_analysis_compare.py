@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -71,10 +72,34 @@ def test_the_95th_percentile_is_what_95_in_100_do_not_exceed(values, p95):
     assert spread(values)["p95"] == p95
 
 
+IMPOSSIBLE = ['{"recovery": {"failure_s": "x", "detected_s": 1}}', '{"recovery": [1]}', '{"duration_s": {}}', '{"map": 3}', "[]", "null"]
+
+
+@pytest.mark.parametrize("summary", IMPOSSIBLE)
+def test_figures_that_can_not_be_are_left_out(summary, folders, capsys, tmp_path):
+    damaged = shutil.copytree(folders["nominal"], tmp_path / "damaged")
+    (damaged / "summary.json").write_text(summary, encoding="utf-8")
+    assert main([str(folders["nominal"]), str(damaged), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["runs"][1]["figures"]["detected after"] is None
+
+
+@pytest.mark.parametrize("summary", ["{", "[" * 10**5, "\x00"], ids=["cut", "deep", "nul"])
+def test_a_summary_that_is_no_json_is_refused_in_a_line(summary, folders, capsys, tmp_path):
+    damaged = shutil.copytree(folders["nominal"], tmp_path / "damaged")
+    (damaged / "summary.json").write_text(summary, encoding="utf-8")
+    assert main([str(folders["nominal"]), str(damaged)]) == 2
+    said = capsys.readouterr().err
+    assert f"{damaged / 'summary.json'}: can't be read" in said
+    assert said.count("\n") == 1
+
+
 def test_what_can_not_be_compared_is_refused(folders, capsys, tmp_path):
     assert main([str(folders["nominal"]), str(tmp_path)]) == 2
     assert "is no run and no bag" in capsys.readouterr().err
     assert main([str(folders["nominal"]), str(folders["again"]), "--svg", str(tmp_path / "x.none")]) == 2
     assert "alula compare: " in capsys.readouterr().err
+    picture = tmp_path / "no" / "x.svg"
+    assert main([str(folders["nominal"]), str(folders["again"]), "--svg", str(picture)]) == 2
+    assert capsys.readouterr().err == f"alula compare: --svg {picture}: can't be written: No such file or directory\n"
     with pytest.raises(SystemExit, match="2"):
         main([str(folders["nominal"])])

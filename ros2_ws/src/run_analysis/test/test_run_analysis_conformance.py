@@ -15,18 +15,16 @@ from log_mutations.mutations import MUTATIONS, Spoiler
 from log_mutations.witness import legal
 from run_analysis.conformance import Monitor, SkillsetMonitor
 from skill_model.execution_state import ExecutionState as S
+from skill_model.expressions import Comparison, DataIs, ResourceIs
 from skill_model.model import (
     Assignment,
-    Comparison,
     Data,
-    DataIs,
     Effect,
     Hold,
     Interrupt,
     Invariant,
     Precondition,
     Resource,
-    ResourceIs,
     Result,
     Skill,
     Skillset,

@@ -49,7 +49,7 @@ def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_f
     assert found == ("degraded", True, 0, 1.2, ["b"], 0, True)
     answers = {failure["name"]: failure["answered_by"] for failure in row["failures"]}
     assert answers["zed"] == answers["perception.zed_status OK -> BROKEN"] == "LiDAR navigation"
-    assert answers["lidar"] == answers["zed_depth"] == "nothing failed"
+    assert answers["lidar"] == answers["zed_depth"] == "not detected"
     assert (failed["outcome"], failed["reason"], failed["exit_code"], failed["failures"]) == ("not_started", "no free domain", 2, [])
 
 

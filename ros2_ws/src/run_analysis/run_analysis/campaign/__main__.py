@@ -1,6 +1,6 @@
 """``./alula campaign``: flies a campaign, goes on where it stopped, and ends with the failure coverage.
 
-Ends with 0: all flown, 1: flown, and flights had trouble, 2: could not start.
+Ends with 0: all flown, 1: flown, and flights had trouble, 2: could not start, or could not write its folder any more.
 """
 
 from __future__ import annotations
@@ -88,13 +88,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if table.rows:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.flights)} flights are in {out / ROWS}\n")
         run(campaign, table, out, Teller(len(campaign.flights), len(table.rows)), given.dask)
+        coverage = finish(table, out, f"Campaign {given.file.stem}")
     except AnalysisError as error:
         sys.stderr.write(f"alula campaign: {error}\n")
+        return CANNOT_START
+    except OSError as error:
+        sys.stderr.write(f"alula campaign: {out}: can't be written any more: {error.strerror or error}\n")
         return CANNOT_START
     except KeyboardInterrupt:
         sys.stderr.write(f"interrupted; the same command goes on from {out / ROWS}\n")
         return TROUBLE
-    coverage = finish(table, out, f"Campaign {given.file.stem}")
     sys.stdout.write(as_text(coverage))
     sys.stderr.write(f"{out / 'coverage.html'}\n")
     return TROUBLE if coverage.troubled else FLOWN

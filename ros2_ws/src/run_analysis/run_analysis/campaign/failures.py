@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from alula_common.faults import FaultRequest
+from run_analysis.causes.answers import NO_SKILL, answer_to, answer_to_fault
+from run_analysis.causes.failures import SkillFailure, skill_failures
+from run_analysis.causes.faults import Fault, trace
+from run_analysis.causes.reach import EXTERN
 from run_analysis.tree import Places
 from skill_model.conditions import NO_DATA, judge
 from skill_model.execution_state import ExecutionState as S
-from skill_model.model import Invariant, Resource, ResourceIs, Result, ResultKind, Skillset, Transition, atoms
-from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from skill_model.expressions import ResourceIs, atoms
+from skill_model.model import Invariant, Resource, Result, ResultKind, Skillset, Transition
+from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.mock.behaviour import UNHAPPY_WORDS
 
 FAULT, PROCESS, RESULT, INVARIANT, ARROW = "fault", "process", "result", "invariant", "extern arrow"
 KINDS = (FAULT, PROCESS, RESULT, INVARIANT, ARROW)
-NO_SKILL = "no skill"
-"""The mission started none any more."""
-NO_FAILURE = "nothing failed"
-"""A fault, or the end of a process, after which no skill failed."""
 NO_NEED = "not in use"
 """A transition that broke no invariant: nothing that ran hung on it."""
-_EXTERN = "extern"
 
 
 @dataclass(frozen=True, order=True)
@@ -104,8 +103,24 @@ def _arrow(skillset: str, resource: str, source: str, target: str) -> str:
 def failures_in(events: Sequence[EngineEvent], known: Iterable[Way], places: Places) -> list[Failure]:
     """Return the failures of a flight in the order of time, each with the branch of the tree and the skill that followed."""
     ways = set(known)
-    told = [(at, way) for at, event in enumerate(events) for way in _ways_of(event) if way in ways]
-    return [_answered(way, events, at, places) for at, way in told]
+    violated = [failure for failure in skill_failures(events) if failure.end.state is S.RESOURCE_INVARIANT_VIOLATED]
+    broken = {at: failure for failure in reversed(violated) for at in failure.behind}
+    found = []
+    for at, event in enumerate(events):
+        way = _way_of(event)
+        if way is not None and way in ways:
+            failure = broken.get(at) if isinstance(event, TransitionEvent) else SkillFailure(at, event, event.stamp_s)
+            found.append(_answered(way, event.stamp_s, failure, events, places))
+    return found
+
+
+def failures_by(causes: Sequence[tuple[Way, Fault]], events: Sequence[EngineEvent], places: Places) -> list[Failure]:
+    """Return what failed by faults, or by processes that ended, as one failure each; see ``causes.faults.trace``."""
+    found = []
+    for (way, fault), traced in zip(causes, trace([fault for _, fault in causes], events), strict=True):
+        answer, after_s = answer_to_fault(traced, events, places)
+        found.append(Failure(way, fault.at_s, answer.branch, answer.skill, after_s))
+    return found
 
 
 def name_of(fault: FaultRequest) -> str:
@@ -113,74 +128,22 @@ def name_of(fault: FaultRequest) -> str:
     return f"{replace(fault, begin_s=None, end_s=None)}{'' if fault.end_s is None else ', ends again'}"
 
 
-def failures_by(causes: Sequence[tuple[Way, float]], failures: Sequence[Failure]) -> list[Failure]:
-    """Return what failed by faults, or by processes that ended, as one failure each.
-
-    Each is answered as the first failure after it and before the next cause; its recovery counts from the cause.
-
-    Args:
-        causes: each with its time, seconds of mission clock, in the order of time.
-        failures: of the flight, in the order of time.
-    """
-    found: list[Failure] = []
-    for number, (way, at_s) in enumerate(causes):
-        until_s = causes[number + 1][1] if number + 1 < len(causes) else math.inf
-        first = next((one for one in failures if at_s <= one.at_s < until_s and one.answered_by != NO_NEED), None)
-        if first is None:
-            found.append(Failure(way, at_s, NO_FAILURE, NO_FAILURE))
-        else:
-            after_s = None if first.after_s is None else first.at_s - at_s + first.after_s
-            found.append(Failure(way, at_s, first.answered_by, first.skill, after_s))
-    return found
-
-
-def _ways_of(event: EngineEvent) -> Iterator[Way]:
+def _way_of(event: EngineEvent) -> Way | None:
     if isinstance(event, TransitionEvent):
-        if event.cause == _EXTERN:
-            yield Way(ARROW, _arrow(event.skillset, event.resource, event.from_state, event.to_state))
-    elif event.state is S.TERMINATED:
-        yield Way(RESULT, f"{event.skillset}.{event.skill} {event.result}")
-    elif event.state is S.RESOURCE_INVARIANT_VIOLATED:
-        yield Way(INVARIANT, f"{event.skillset}.{event.skill} {event.result}")
+        return Way(ARROW, _arrow(event.skillset, event.resource, event.from_state, event.to_state)) if event.cause == EXTERN else None
+    if event.state is S.TERMINATED:
+        return Way(RESULT, f"{event.skillset}.{event.skill} {event.result}")
+    if event.state is S.RESOURCE_INVARIANT_VIOLATED:
+        return Way(INVARIANT, f"{event.skillset}.{event.skill} {event.result}")
+    return None
 
 
-def _answered(way: Way, events: Sequence[EngineEvent], at: int, places: Places) -> Failure:
+def _answered(way: Way, at_s: float, failure: SkillFailure | None, events: Sequence[EngineEvent], places: Places) -> Failure:
     """Return a failure with the first skill that was asked for and ran after it."""
-    begun_s, failed = events[at].stamp_s, _failed(events, at)
-    if failed is None:
-        return Failure(way, begun_s, NO_NEED, NO_NEED)
-    started = _started(events[at + 1 :])
-    branch = places.answer(failed, None if started is None else started.id)
-    if started is None:
-        return Failure(way, begun_s, branch or NO_SKILL)
-    skill = f"{started.skillset}.{started.skill}"
-    return Failure(way, begun_s, branch or skill, skill, started.stamp_s - begun_s)
-
-
-def _started(events: Iterable[EngineEvent]) -> ExecutionEvent | None:
-    """Return the start of the first execution that was asked for and ran."""
-    requested: set[str] = set()
-    for event in events:
-        if isinstance(event, ExecutionEvent) and event.state is S.REQUESTED:
-            requested.add(event.id)
-        elif isinstance(event, ExecutionEvent) and event.state is S.RUNNING and event.id in requested:
-            return event
-    return None
-
-
-def _failed(events: Sequence[EngineEvent], at: int) -> str | None:
-    """Return the id of the execution that failed; of a transition, what it broke, which comes next in its skillset, None: nothing."""
-    first = events[at]
-    if isinstance(first, ExecutionEvent):
-        return first.id
-    for event in events[at + 1 :]:
-        if event.skillset != first.skillset:
-            continue
-        if isinstance(event, ExecutionEvent):
-            return event.id if event.state is S.RESOURCE_INVARIANT_VIOLATED else None
-        if event.cause == _EXTERN:
-            return None
-    return None
+    if failure is None:
+        return Failure(way, at_s, NO_NEED, NO_NEED)
+    answer = answer_to(failure, events, places)
+    return Failure(way, at_s, answer.branch, answer.skill, None if answer.ran_s is None else answer.ran_s - at_s)
 
 
 def as_dict(failure: Failure, origin_s: float) -> Mapping[str, object]:

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import functools
 import json
-import math
 import os
 import subprocess
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from alula_common.record import RecordError, read_record
 from run_analysis.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
 from run_analysis.campaign.plan import SIMULATOR, Flight
+from run_analysis.causes.faults import Fault, RunTimes, faults_asked
+from run_analysis.causes.reach import reach_of
 from run_analysis.conformance import Monitor
 from run_analysis.errors import AnalysisError
 from run_analysis.mock_flights import MockFlights, load_flights
 from run_analysis.models import models_of
-from run_analysis.run import Run, load_run, origin_of
+from run_analysis.run import Run, lift_off_of, load_run, origin_of
 from run_analysis.tree import Places, places_in
 from skill_runtime.core.events import EngineEvent, TransitionEvent
+from skill_runtime.mock import Behaviour
 
 Row = dict[str, Any]
 
@@ -45,7 +48,7 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
     landed = _landed(flown.events)
     found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
     found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
-    return _row(flight, found, flown.events, monitor, ways, flown.places)
+    return _row(flight, found, _Evidence(flown.events, flown.places, flown.faults, scenario.behaviour), monitor, ways)
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
@@ -64,17 +67,27 @@ def _landed(events: Sequence[EngineEvent]) -> bool | None:
     return flight_status == "ON_GROUND" or (None if taken else False)
 
 
-def _row(
-    flight: Flight, found: Mapping[str, Any], events: Sequence[EngineEvent], monitor: Monitor, ways: Sequence[Way], places: Places
-) -> Row:
+@dataclass(frozen=True)
+class _Evidence:
+    """What a flight has left; ``told``: when mocks say that each fault came first; ``behaviour``: theirs."""
+
+    events: Sequence[EngineEvent]
+    places: Places
+    told: Mapping[str, float] = field(default_factory=dict)
+    behaviour: Behaviour | None = None
+
+
+def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
     """Return a row; ``found`` is how the flight went besides its events."""
+    events, origin_s = left.events, origin_of(left.events)
     for event in events:
         monitor.take(event)
-    failures, origin_s = failures_in(events, ways, places), origin_of(events)
-    ended_s = events[-1].stamp_s if events else -math.inf
-    begun = [(Way(FAULT, name_of(fault)), origin_s + (fault.begin_s or 0.0)) for fault in flight.requests]
-    died = [(Way(PROCESS, one["name"]), origin_s + (one["when_s"] or 0.0)) for one in found["died"]]
-    every = [*failures_by([cause for cause in begun if cause[1] <= ended_s], failures), *failures_by(died, failures), *failures]
+    times = RunTimes.of(events, lift_off_of(events))
+    asked = faults_asked(flight.requests, times, left.told, left.behaviour)
+    begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
+    died = [(Way(PROCESS, one["name"]), _ended(one, times.begun_s, origin_s)) for one in found["died"]]
+    every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
+    every += failures_in(events, ways, left.places)
     return {
         "flight": flight.number,
         "scenario": flight.scenario,
@@ -86,6 +99,11 @@ def _row(
         "conforms": monitor.verdict.conforms,
         "failures": [as_dict(failure, origin_s) for failure in every],
     }
+
+
+def _ended(died: Mapping[str, Any], begun_s: float, origin_s: float) -> Fault:
+    """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
+    return Fault(died["name"], begun_s if died["when_s"] is None else origin_s + died["when_s"], reach=reach_of(died["name"]))
 
 
 # --- in the simulator ---------------------------------------------------------------------------------------------------
@@ -119,4 +137,4 @@ def _simulated(flight: Flight, out: Path) -> Row:
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
     found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
     models = models_of(names)
-    return _row(flight, found, run.events, Monitor(models), ways_to_fail(models), places)
+    return _row(flight, found, _Evidence(run.events, places), Monitor(models), ways_to_fail(models))

@@ -68,6 +68,9 @@ def load_campaign(path: Path) -> Campaign:
     over = _choice(said["over"], (MOCKS, SIMULATOR)) if "over" in said else MOCKS
     scenarios = tuple(_choice(part, scenario_names()) for part in said["scenarios"].elements()) if "scenarios" in said else ("mapping",)
     drawn = "draw" in said or "flights" in said
+    for key in ("scenarios", "seeds", "faults"):
+        if key in said and not said[key].elements():
+            raise said[key].wrong(f"`{key}` lists nothing, so there is no flight; leave it out, or name one")
     flights = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
     if over == SIMULATOR and "behaviour" in said:
         raise said["behaviour"].wrong("`behaviour` says what mocks do; the simulator has none")
@@ -196,6 +199,9 @@ def _draw(part: Located, scenarios: Sequence[str]) -> _Draw:
     for scenario, one in lists.items():
         if not one:
             raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` is flights without faults")
+    for scenario, several in faults.items():
+        if not several.elements():
+            raise several.wrong(f"`faults` has none to draw for {scenario}; for flights without faults write `in_turn: [[]]`")
     return _Draw(
         faults={scenario: tuple(map(_kind, part.elements())) for scenario, part in faults.items()},
         in_turn=lists,

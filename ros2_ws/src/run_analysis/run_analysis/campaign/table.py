@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,6 +12,10 @@ from run_analysis.campaign.plan import Campaign
 from run_analysis.errors import AnalysisError
 
 ROWS, PLAN = "flights.jsonl", "campaign.json"
+COLUMNS = frozenset(
+    ("flight", "faults", "outcome", "landed", "open", "problems", "collisions", "min_clearance_m", "conforms", "exit_code", "failures")
+)
+"""What the coverage reads of a row."""
 
 Row = Mapping[str, Any]
 
@@ -29,9 +33,8 @@ class Table:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._claim(folder, campaign)
-            kept = self._read()
+            self._read({flight.number for flight in campaign.flights})
             self._file: BinaryIO = self._path.open("ab")
-            self._file.truncate(kept)
         except OSError as error:
             raise AnalysisError(f"{folder}: can't hold a campaign: {error.strerror or error}") from None
 
@@ -42,23 +45,16 @@ class Table:
             if any(folder.iterdir()):
                 raise AnalysisError(f"{folder}: is not empty and holds no campaign; choose another folder with --out")
             write_json(plan, asked)
-        elif json.loads(plan.read_text(encoding="utf-8")) != asked:
+        elif _json(plan.read_bytes()) != asked:
             raise AnalysisError(f"{folder}: holds another campaign; choose another folder with --out, or remove this one")
 
-    def _read(self) -> int:
-        """Read the rows that are whole; return how many bytes they take."""
-        kept = 0
-        for line in self._path.read_bytes().splitlines(keepends=True) if self._path.is_file() else ():
-            try:
-                row = json.loads(line)
-                number = int(row["flight"])
-            except (ValueError, TypeError, KeyError):
-                break
-            if not line.endswith(b"\n"):
-                break
-            self.rows[number] = row
-            kept += len(line)
-        return kept
+    def _read(self, numbers: Collection[int]) -> None:
+        """Read the rows that are whole, and leave no others in the file."""
+        lines = self._path.read_bytes().splitlines(keepends=True) if self._path.is_file() else []
+        whole = [row for line in lines if line.endswith(b"\n") and _is_row(row := _json(line), numbers)]
+        self.rows = {row["flight"]: row for row in whole}
+        if len(whole) < len(lines):
+            write_text(self._path, b"".join(map(_line, whole)).decode())
 
     def add(self, rows: Iterable[Row]) -> None:
         """Write rows, through to the disk."""
@@ -71,6 +67,19 @@ class Table:
         """Put the rows in the order of the flights: however often it was interrupted, the table is the same."""
         self._file.close()
         write_text(self._path, b"".join(_line(self.rows[number]) for number in sorted(self.rows)).decode())
+
+
+def _json(text: bytes) -> Any:
+    """Return what a text says, None where it is no JSON."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _is_row(row: Any, numbers: Collection[int]) -> bool:
+    """Tell whether this is what the coverage needs of one of these flights."""
+    return isinstance(row, dict) and row.keys() >= COLUMNS and isinstance(row["flight"], int) and row["flight"] in numbers
 
 
 def _line(row: Row) -> bytes:

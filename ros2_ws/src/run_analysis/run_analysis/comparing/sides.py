@@ -135,18 +135,21 @@ def _summary(path: Path) -> Mapping[str, Any]:
         return {}
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise AnalysisError(f"{file}: can't be read: {error}") from None
     return content if isinstance(content, dict) else {}
 
 
 def _figure(summary: Mapping[str, Any], where: tuple[str, ...]) -> float | None:
+    value = _number(summary, where)
+    if value is not None and where[0] == "recovery":
+        failure_s = _number(summary, ("recovery", "failure_s"))
+        return None if failure_s is None else value - failure_s
+    return value
+
+
+def _number(summary: Mapping[str, Any], where: tuple[str, ...]) -> float | None:
     value: Any = summary
     for name in where:
         value = value.get(name) if isinstance(value, dict) else None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    if where[0] == "recovery":
-        failure_s = summary["recovery"].get("failure_s")
-        return None if failure_s is None else float(value) - float(failure_s)
-    return float(value)
+    return None if isinstance(value, bool) or not isinstance(value, int | float) else float(value)

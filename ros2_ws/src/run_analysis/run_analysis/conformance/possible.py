@@ -14,7 +14,8 @@ from skill_model import semantics
 from skill_model.conditions import NO_DATA, judge, whatever_the_data
 from skill_model.deadlines import nanoseconds, waits
 from skill_model.execution_state import ExecutionState as S
-from skill_model.model import TRUE, Invariant, Precondition, Skill, Skillset
+from skill_model.expressions import TRUE
+from skill_model.model import Invariant, Precondition, Skill, Skillset
 from skill_model.situation import Entered, Running, Situation, Step
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 

@@ -1,0 +1,132 @@
+"""What failed in a run, what followed from each fault, and what the mission did about it (see ``run_analysis.causes``)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypedDict
+
+from alula_common.faults import parse_fault
+from alula_common.scenarios import Scenario
+from alula_flight.report.events import History
+from alula_flight.report.facts import RunFacts
+from alula_flight.report.phases import Phases
+from alula_flight.report.recording import MENDED, FaultChange, Recording
+from run_analysis.causes.answers import Answer, answer_to_fault
+from run_analysis.causes.faults import Fault, RunTimes, Traced, faults_asked, trace
+from run_analysis.causes.reach import reach_of
+from skill_runtime.core.events import EngineEvent, TransitionEvent
+
+RADIO = "radio"
+SAME_MOMENT_S = 1.0
+"""The radio tells its state twice a second: a fault of it and what it says of it are no farther apart."""
+
+
+@dataclass(frozen=True)
+class FaultAnswer:
+    """A fault, what followed from it, and the recovery's seconds; ``mode`` is empty where it is not known in which way it failed."""
+
+    what: str
+    mode: str
+    traced: Traced
+    answer: Answer
+    after_s: float | None
+
+
+class AnswerSummary(TypedDict):
+    """A fault, or the radio that ended the video, and what followed from it (``run_analysis.causes``).
+
+    ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the
+    executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table of a campaign.
+    """
+
+    sensor: str
+    mode: str
+    t_s: float | None
+    until_s: float | None
+    detected_s: float | None
+    detected_by: str
+    failed: list[str]
+    answered_by: str
+    skill: str
+    after_s: float | None
+
+
+def injected(recording: Recording) -> tuple[FaultChange, ...]:
+    """Return what the simulator, the supervisor or the mocks broke, in the order of time."""
+    return tuple(change for change in _changes(recording) if change.mode != MENDED)
+
+
+def find_answers(
+    facts: RunFacts, scenario: Scenario, history: History, recording: Recording, phases: Phases, *, radio_lost_s: float | None = None
+) -> tuple[FaultAnswer, ...]:
+    """Return every fault of the run with its answer, in the order of time.
+
+    ``radio_lost_s``: when the radio was lost that ended the video; a process whose end explains that is not told as the radio.
+    """
+    known = [*_told(recording), *_asked(facts, scenario, history, phases)]
+    if radio_lost_s is not None and not any(_explains(fault, change, radio_lost_s) for change, fault in known):
+        change = FaultChange(RADIO, "", radio_lost_s)
+        known.append((change, Fault(RADIO, radio_lost_s, reach=reach_of(RADIO))))
+    known.sort(key=lambda one: one[1].at_s)
+    found = []
+    for (change, _), traced in zip(known, trace([fault for _, fault in known], history.events), strict=True):
+        answer, after_s = answer_to_fault(traced, history.events, history.places)
+        found.append(FaultAnswer(change.sensor, change.mode, traced, answer, after_s))
+    return tuple(found)
+
+
+def _changes(recording: Recording) -> list[FaultChange]:
+    sensors = recording.simulator.faults if recording.simulator is not None else ()
+    return sorted((*sensors, *recording.processes), key=lambda change: change.t_s)
+
+
+def _told(recording: Recording) -> Iterator[tuple[FaultChange, Fault]]:
+    """Yield what the recordings tell; a fault lasts until the next change of the same thing."""
+    changes = _changes(recording)
+    for at, change in enumerate(changes):
+        if change.mode != MENDED:
+            until_s = next((later.t_s for later in changes[at + 1 :] if later.sensor == change.sensor), math.inf)
+            yield change, Fault(change.sensor, change.t_s, until_s, reach_of(change.sensor))
+
+
+def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases) -> Iterator[tuple[FaultChange, Fault]]:
+    """Yield what was asked for and no recording tells: in the simulator the radio's faults."""
+    if not facts.mock:
+        untold = dict(scenario.faults).keys() - dict(scenario.processes).keys()
+        requests = [request for request in map(parse_fault, facts.faults) if request.what in untold]
+        times = RunTimes.of(history.events, phases.zero_s if phases.lifted_off else None)
+        for request, fault in faults_asked(requests, times):
+            yield FaultChange(request.what, request.how, fault.at_s), fault
+
+
+def _explains(fault: Fault, change: FaultChange, radio_lost_s: float) -> bool:
+    """Tell whether a fault is what the loss of the radio was: a process of the video, or the radio at that moment."""
+    if change.sensor == RADIO:
+        return abs(fault.at_s - radio_lost_s) < SAME_MOMENT_S
+    return fault.holds(radio_lost_s) and bool(fault.reach.ends & reach_of(RADIO).ends)
+
+
+def summarise_answer(one: FaultAnswer, phases: Phases) -> AnswerSummary:
+    """Return a fault with its answer for ``summary.json``."""
+    fault = one.traced.fault
+    first = one.traced.first
+    return AnswerSummary(
+        sensor=one.what,
+        mode=one.mode,
+        t_s=phases.since(fault.at_s),
+        until_s=phases.since(fault.until_s) if math.isfinite(fault.until_s) else None,
+        detected_s=phases.since(one.traced.detected_s),
+        detected_by="" if first is None else _in_words(first),
+        failed=[failure.end.id for failure in one.traced.failures],
+        answered_by=one.answer.branch,
+        skill=one.answer.skill,
+        after_s=None if one.after_s is None else round(one.after_s, 3),
+    )
+
+
+def _in_words(event: EngineEvent) -> str:
+    if isinstance(event, TransitionEvent):
+        return f"{event.skillset}.{event.resource} {event.from_state} -> {event.to_state}"
+    return f"{event.skillset}.{event.skill} {event.state.value} {event.result}".rstrip()
