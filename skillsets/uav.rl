@@ -1,7 +1,7 @@
 // A vehicle whose pilot may take over at any time, in the Robot Language.
 //
 // `goto` is wrong on purpose, as such models easily are: it starts whenever the pilot does not hold the authority, but it may run
-// only while the drone does, and nobody may hold it at all. `./alula check` shows that: its invariant is false right after the
+// only while the drone does, and the authority may be free. `./alula check` shows that: its invariant is false right after the
 // start when `authority == None`. `goto_asking` and `goto_taking` are two ways to mend it.
 
 type Position

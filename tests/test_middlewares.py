@@ -154,7 +154,7 @@ def states(trace: dict[str, Any], label: str) -> list[str]:
     return [event[3] for event in trace["events"] if len(event) == 8 and event[2] == label]
 
 
-def test_refusals_with_their_reasons_to_the_one_who_asked(players):
+def test_refusals_with_their_reasons_to_the_caller(players):
     script = Script(
         (
             Step("start", "early", "takeoff", TAKEOFF),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from skill_model.expressions import ResourceIs
 from skill_model.model import (
     Assignment,
     Effect,
@@ -13,7 +14,6 @@ from skill_model.model import (
     Precondition,
     Progress,
     Resource,
-    ResourceIs,
     Result,
     Skill,
     Skillset,

@@ -82,11 +82,11 @@ class Child:
 
 
 def follow(connection: Connection, handlers: Handlers) -> None:
-    """Do what one is ordered to, until the other end of the connection is closed; an error is an answer, too."""
+    """Do what is ordered, until the other end of the connection is closed; an error is an answer, too."""
     for word, values in _orders(connection):
         try:
             reply = (handlers[word](*values), "")
-        except Exception as error:  # noqa: BLE001 - told to who has asked
+        except Exception as error:  # noqa: BLE001 - told to the process that ordered it
             reply = (None, "".join(traceback.format_exception_only(error)).strip())
         connection.send(reply)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-Header = Any  # rclpy's note of who asked
+Header = Any  # rclpy's id of a request and of its client
 Take = Callable[[Any, Header], None]
 
 

@@ -1,4 +1,4 @@
-"""What runs in the two worlds, as plain values: who publishes, subscribes and serves what. The bridges' own ends are not in it."""
+"""The publishers, subscribers and servers of the two worlds, as plain values; without the bridges' own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bridge's state as a latched heartbeat in both worlds: who hears none for half a second knows that there is no bridge."""
+"""The bridge's state as a latched heartbeat in both worlds: half a second without one means that there is no bridge."""
 
 from __future__ import annotations
 

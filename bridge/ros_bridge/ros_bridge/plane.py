@@ -47,7 +47,7 @@ class Plane:
         self.links = PublisherLinks(library, self._tokens)
         self.node = Ros1Node(name, master, host=host, topics_port=library.port(self.context), changed=self.links.publishers_changed)
         self.links.node = self.node
-        # The master may hang: those who ask it do not hold up those who hear events.
+        # The master may hang: the threads that ask it do not hold up the one that takes events.
         self._lookers = ThreadPoolExecutor(LOOKING_THREADS, thread_name_prefix="plane_look")
         self._threads = [
             threading.Thread(target=self._listen, name="plane_events", daemon=True),

@@ -83,7 +83,7 @@ class PublisherLinks:
         self.node.unregister(Kind.SUBSCRIBER, subscription.topic, subscription.type_name)
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """Take the master's word on who publishes a topic. What the bridge itself publishes is never fetched back."""
+        """Take the master's list of a topic's publishers. What the bridge itself publishes is never fetched back."""
         publishers = set(uris) - {self.node.uri}
         with self._lock:
             for route, subscription in self._subscriptions.items():

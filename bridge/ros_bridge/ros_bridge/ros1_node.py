@@ -190,7 +190,7 @@ class Ros1Node:
         return (self._host, self._topics_port) if published else None
 
     def changed(self, topic: str, publishers: list[str]) -> None:
-        """Take the master's word on who publishes a topic."""
+        """Take the master's list of a topic's publishers."""
         self._changed(topic, publishers)
 
     def close(self) -> None:
@@ -217,7 +217,7 @@ class _SlaveApi:
         self._node = node
 
     def publisherUpdate(self, _caller: str, topic: str, publishers: list[str]) -> list[Any]:  # noqa: N802
-        """Hear from the master who publishes a topic."""
+        """Receive a topic's publishers from the master."""
         self._node.changed(topic, [str(uri) for uri in publishers])
         return [OK, "", 0]
 

@@ -17,7 +17,7 @@ CONFIG = """
 topics: []
 actions:
   - {name: /ba/in_ros1, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 10.0}
-  - {name: /ba/nobody, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 0.6}
+  - {name: /ba/unserved, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 0.6}
   - {name: /ba/mortal, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 10.0}
   - {ros1_name: /ba/simple, ros2_name: /ba/renamed, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 10.0}
 """
@@ -128,7 +128,7 @@ def test_states_in_ros2_go_from_accepted_to_executing_to_the_end(ros2):
 
 
 def test_goal_without_a_server_in_ros1_is_rejected_when_its_time_is_over(ros2):
-    client = ros2.client("/ba/nobody")
+    client = ros2.client("/ba/unserved")
     start = time.monotonic()
     assert not Sent(client).answered().accepted
     assert time.monotonic() - start > 0.5

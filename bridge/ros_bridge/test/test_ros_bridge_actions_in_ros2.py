@@ -12,14 +12,14 @@ topics: []
 actions:
   - {name: /ba/in_ros1, server: ros1, type: bridge_test_interfaces/Count, timeout_s: 10.0}
   - {name: /ba/in_ros2, server: ros2, type: bridge_test_interfaces/Count, timeout_s: 10.0}
-  - {name: /ba/nobody2, server: ros2, type: bridge_test_interfaces/Count, timeout_s: 0.6}
+  - {name: /ba/unserved2, server: ros2, type: bridge_test_interfaces/Count, timeout_s: 0.6}
 """
 
 
 @pytest.fixture(scope="module")
 def ros1(action_ros1):
     action_ros1.do("serve", name="/ba/in_ros1")
-    for name in ("/ba/in_ros2", "/ba/nobody2"):
+    for name in ("/ba/in_ros2", "/ba/unserved2"):
         action_ros1.do("client", name=name)
         assert action_ros1.expect("connected")["found"]
     return action_ros1
@@ -96,7 +96,7 @@ def test_several_goals_of_ros1_and_cancelling_by_stamp_and_all(ros1, ros2):
 
 
 def test_goal_without_a_server_in_ros2_is_rejected_with_a_reason(ros1):
-    send(ros1, "/ba/nobody2", "lonely", target=1)
+    send(ros1, "/ba/unserved2", "lonely", target=1)
     end = ending(ros1, "lonely")
     assert (end["terminal"], end["text"]) == ("REJECTED", "no server in ROS 2")
 

@@ -1,4 +1,4 @@
-"""The decision what to bridge: pure, so every case is a table of who publishes and subscribes where."""
+"""The decision what to bridge: pure, so every case is a table of publishers and subscribers in each world."""
 
 from itertools import pairwise
 
@@ -61,7 +61,7 @@ def decided(one, two, selection=ALL, configured=()):
     return decide(Graphs(one, two), selection, Types(), configured)
 
 
-def test_a_ros1_publisher_is_offered_and_flows_when_somebody_receives():
+def test_a_ros1_publisher_is_offered_and_flows_when_it_has_a_subscriber():
     (alone,) = decided(ros1(["/a"]), ros2())
     assert alone == RouteDecision(TopicRoute("/a", "/a", UP, STRING, latched=True, depth=DEPTH, ros2_type=STRING))
     assert not alone.flows
@@ -99,7 +99,7 @@ def test_depth_has_room_for_every_publisher_and_is_short_for_bulky_types():
     assert decided(ros1(["/i"], types={"/i": "sensor_msgs/Image"}), ros2())[0].spec.depth == BULKY_DEPTH
 
 
-def test_a_topic_of_any_type_waits_until_somebody_says_it():
+def test_a_topic_of_any_type_waits_until_the_other_world_tells_it():
     listener = ros1(subscribers=["/a"], types={"/a": "*"})
     assert decided(listener, ros2()) == []
     (one,) = decided(listener, ros2({"/a": (end(),)}))

@@ -62,8 +62,8 @@ def test_bridge_is_one_node_of_each_world_and_imports_no_ros1(ros2_domain, maste
 
 
 def test_interrupt_ends_a_bridge_that_waits_for_its_master(ros2_domain, tmp_path):
-    nobody = Master(free_port())
-    process = BridgeProcess(nobody, tmp_path, "topics: []\n")
+    no_master = Master(free_port())
+    process = BridgeProcess(no_master, tmp_path, "topics: []\n")
     wait_until(lambda: any("waiting for a ROS master" in line for line in process.lines), "it says that it waits", 20.0)
     process.process.send_signal(signal.SIGTERM)
     assert process.process.wait(2.0) == 0

@@ -28,7 +28,7 @@ topics:
   - {name: /bm/pose, direction: ros2_to_ros1, type: geometry_msgs/PoseStamped, depth: 100}
 services:
   - {name: /bm/in_ros1, server: ros1, type: std_srvs/SetBool, timeout_s: 10.0}
-  - {name: /bm/nobody, server: ros1, type: std_srvs/SetBool, timeout_s: 0.5}
+  - {name: /bm/unserved, server: ros1, type: std_srvs/SetBool, timeout_s: 0.5}
   - {name: /bm/in_ros2, server: ros2, type: std_srvs/SetBool, timeout_s: 10.0}
 """
 FLOAT32_SUM = "73fcbf46b49191e672908e50842a83d4"
@@ -95,7 +95,7 @@ def test_ros2_client_calls_a_ros1_server(ros1, ros2):
 
 
 def test_ros2_client_gets_a_refusal_without_a_server(ros2, bridge):
-    response, _ = ros2.call("/bm/nobody", Takeoff, Takeoff.Request(height_m=1.0))
+    response, _ = ros2.call("/bm/unserved", Takeoff, Takeoff.Request(height_m=1.0))
     assert response.accepted is False
     assert "no server" in response.reason
 

@@ -108,7 +108,7 @@ def test_a_field_of_one_world_alone_is_zero_one_way_and_told(world):
         ("geometry_msgs/Point p\nint8 x\n", "int8 x\ngeometry_msgs/Vector3 p\n", ["geometry_msgs/Point in ROS 1", "geometry_msgs/Vector3"]),
     ],
 )
-def test_what_nobody_can_place_is_refused_by_its_field(world, ros1, ros2, words):
+def test_a_field_without_a_place_in_the_other_type_is_refused_by_name(world, ros1, ros2, words):
     if ros1.startswith("int32 one\nint32 old"):  # the same layout under other names is no problem ...
         assert world({"a_msgs/Same": ros1}, {"a_msgs/Same": ros2}).message("a_msgs/Same").same_layout
         ros1, ros2 = ros1 + "int8 x\n", "int8 x\n" + ros2  # ... but another order is

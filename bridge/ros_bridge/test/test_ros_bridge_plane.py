@@ -119,10 +119,10 @@ def test_subscribers_are_checked_and_answered(ros2, master, bridge):
             assert (answer["type"], answer["md5sum"], answer["latching"]) == ("std_msgs/String", STRING_SUM, "0")
             assert answer["callerid"] == "/ros_bridge"
             assert "string data" in answer["message_definition"]
-            until_it_arrives(publisher, connection, "for those who fit")
+            until_it_arrives(publisher, connection, "for a subscriber that fits")
 
 
-def test_garbage_on_the_listening_socket_harms_nobody(ros2, master, bridge):
+def test_garbage_on_the_listening_socket_harms_no_subscriber(ros2, master, bridge):
     place = place_in_ros1(master, "/bp/down")
     publisher = ros2.publisher("/bp/down", String, 10)
     chance = random.Random(7)  # noqa: S311
@@ -142,7 +142,7 @@ def test_garbage_on_the_listening_socket_harms_nobody(ros2, master, bridge):
     assert bridge.process.poll() is None
 
 
-def test_publisher_that_breaks_off_or_talks_nonsense_is_tried_again_and_harms_nobody(ros2, master, bridge):
+def test_publisher_that_breaks_off_or_talks_nonsense_is_tried_again_and_harms_no_subscriber(ros2, master, bridge):
     """Two routes lead from the topic, so each reply goes to two connections; all of them are tried again until the good message comes."""
     received, too = texts(ros2, "/bp/fake"), texts(ros2, "/bp/fake_too")
     hello = greeting("/bp/fake")

@@ -33,7 +33,7 @@ def test_name_is_what_roslaunch_says(arguments, namespace, name, monkeypatch):
     assert own_name(arguments) == name
 
 
-def test_who_is_reached_by_loopback_listens_there_only():
+def test_a_node_that_is_reached_by_loopback_listens_there_only():
     assert [bind_address(host) for host in ("localhost", "127.0.0.1", "robot")] == ["127.0.0.1", "127.0.0.1", "0.0.0.0"]  # noqa: S104
 
 
@@ -117,7 +117,7 @@ def test_what_the_master_has_not_heard_it_hears_later(node):
     assert master.asked[before:] == [("registerService", "/untold", "rosrpc://127.0.0.1:7", node.uri)]
     node.register_again()
     assert [asked[0] for asked in master.asked[before + 1 :]] == ["registerPublisher", "registerService"]
-    assert node.place_of_service("/nobody") is None
+    assert node.place_of_service("/unserved") is None
 
 
 def test_parameters_are_read_at_first_when_told_and_after_a_restart(node):
@@ -160,7 +160,7 @@ def test_monitor_tells_loss_return_restart_and_change():
         "<value><int>1</int></value><value><string></string></value><value><array><data><value><string>/ros_bridge</string></value>"
         "</data></array></value>"
     ).encode()
-    forgotten = master.system.replace(b"/ros_bridge", b"/nobody")
+    forgotten = master.system.replace(b"/ros_bridge", b"/other")
     known = master.system
     for system, away in ((known, False), (known, False), (known, True), (known, True), (known, False), (forgotten, False), (known, False)):
         master.system, master.away = system, away

@@ -106,7 +106,7 @@ def test_calls_that_are_held_hold_up_no_others(world):
     held.service.close()
 
 
-def test_garbage_on_the_service_socket_harms_nobody(world):
+def test_garbage_on_the_service_socket_harms_no_client(world):
     serve_echo(world)
     chance = random.Random(11)  # noqa: S311 - repeatable, not secret
     whole = header(callerid="/t", service="/bv/in_ros2", md5sum="*", persistent="1")

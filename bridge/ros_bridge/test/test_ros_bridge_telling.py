@@ -116,11 +116,11 @@ def test_a_type_that_only_its_publisher_has_is_told_by_its_name(ros1, bridge):
 
 @pytest.mark.parametrize("arguments", [["--all"], ["--list"], ["--include", "/a*"]])
 def test_no_master_is_one_clear_error(ros2_domain, arguments):
-    nobody = Master(free_port())
-    run = subprocess.run(bridge_command(*arguments), env=nobody.environment, capture_output=True, text=True, timeout=60, check=False)
+    no_master = Master(free_port())
+    run = subprocess.run(bridge_command(*arguments), env=no_master.environment, capture_output=True, text=True, timeout=60, check=False)
     assert run.returncode == 2
     assert run.stderr.count("\n") == 1
-    assert f"no ROS master answers at {nobody.uri}: start one" in run.stderr
+    assert f"no ROS master answers at {no_master.uri}: start one" in run.stderr
 
 
 def test_options_that_ask_for_nothing_are_an_error():

@@ -149,7 +149,7 @@ def test_heartbeat_in_both_worlds(ros1, ros2):
     assert json.loads(text)["topics"] == 8
 
 
-def test_subscriber_that_does_not_read_loses_the_oldest_and_stalls_nobody(ros2, master, bridge):
+def test_subscriber_that_does_not_read_loses_the_oldest_and_stalls_no_other(ros2, master, bridge):
     """A stopped ROS 1 process: its socket fills up, drops are counted, the other subscriber gets everything."""
     stopped, alive = Ros1Peer(master), Ros1Peer(master)
     publisher = ros2.publisher("/bt/pose_down", PoseStamped)

@@ -10,10 +10,10 @@ constexpr size_t kMostKnown = 256;
 // Each takes the 100 ms that rmw waits for a client that it sees but is not connected to; one that has gone is not waited for.
 constexpr int kTries = 20, kLastTries = 3;
 
-Gid gid_of(const rmw_request_id_t & who) {
+Gid gid_of(const rmw_request_id_t & request_id) {
   Gid gid{};
-  static_assert(sizeof who.writer_guid <= sizeof gid);
-  std::memcpy(gid.data(), who.writer_guid, sizeof who.writer_guid);
+  static_assert(sizeof request_id.writer_guid <= sizeof gid);
+  std::memcpy(gid.data(), request_id.writer_guid, sizeof request_id.writer_guid);
   return gid;
 }
 
@@ -22,19 +22,19 @@ Gid gid_of(const rmw_request_id_t & who) {
 Replies::Replies(Context & context, const ServiceSpecification & specification, const Ros2Service & service, Counters & counters)
 : context_(context), specification_(specification), service_(service), counters_(counters) {}
 
-void Replies::answer(const rmw_request_id_t & who, Frame bytes, size_t offset, int64_t start_ns) {
-  send_soon({who, std::move(bytes), offset, start_ns});
+void Replies::answer(const rmw_request_id_t & request_id, Frame bytes, size_t offset, int64_t start_ns) {
+  send_soon({request_id, std::move(bytes), offset, start_ns});
 }
 
-void Replies::refuse(const rmw_request_id_t & who, const std::string & reason) {
+void Replies::refuse(const rmw_request_id_t & request_id, const std::string & reason) {
   counters_.errors.fetch_add(1);
   const std::string text = specification_.ros2_service + " by the bridge: " + reason;
   context_.events.put(EventKind::kCallFailed, specification_.token, text);
-  if (specification_.refusal.has_flag) send_soon({who, refusal_frame(specification_.refusal, text), sizeof(uint32_t), 0});
+  if (specification_.refusal.has_flag) send_soon({request_id, refusal_frame(specification_.refusal, text), sizeof(uint32_t), 0});
 }
 
 void Replies::send_soon(Reply reply) {
-  const Gid client = gid_of(reply.who);
+  const Gid client = gid_of(reply.request_id);
   if (!defers_ || (reply.bytes->size() <= kLargeBytes && known_.count(client))) return send(reply);
   if (known_.size() >= kMostKnown) known_.clear();
   known_.insert(client);
@@ -49,8 +49,8 @@ void Replies::send(const Reply & reply) {
   const uint8_t * bytes = reply.bytes->data() + reply.offset;
   const size_t size = reply.bytes->size() - reply.offset;
   const Outgoing response{&specification_.response, bytes, size, cdr_size(specification_.response, bytes, size)};
-  bool sent = service_.answer(response, reply.who);
-  for (int i = 1; !sent && i < (defers_ ? kTries : kLastTries); ++i) sent = service_.answer(response, reply.who);
+  bool sent = service_.answer(response, reply.request_id);
+  for (int i = 1; !sent && i < (defers_ ? kTries : kLastTries); ++i) sent = service_.answer(response, reply.request_id);
   if (reply.start_ns == 0) return;
   if (sent) counters_.crossed(reply.start_ns, size);
   else counters_.errors.fetch_add(1);

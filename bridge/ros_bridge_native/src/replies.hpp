@@ -20,9 +20,9 @@ class Replies : public Job {
   Replies(Context & context, const ServiceSpecification & specification, const Ros2Service & service, Counters & counters);
 
   // The loop's thread only. The response is in the bytes, from the offset on, and has the layout.
-  void answer(const rmw_request_id_t & who, Frame bytes, size_t offset, int64_t start_ns);
+  void answer(const rmw_request_id_t & request_id, Frame bytes, size_t offset, int64_t start_ns);
   // Say no, and why, if the type can.
-  void refuse(const rmw_request_id_t & who, const std::string & reason);
+  void refuse(const rmw_request_id_t & request_id, const std::string & reason);
   // From here on everything goes at once, in the thread that says so.
   void stop_deferring() { defers_ = false; }
   // Send what the worker has not come to, and leave it alone from then on. After stop_deferring(), in another thread than the loop's.
@@ -30,7 +30,7 @@ class Replies : public Job {
 
  private:
   struct Reply {
-    rmw_request_id_t who;
+    rmw_request_id_t request_id;
     Frame bytes;
     size_t offset;
     int64_t start_ns;  // 0: a refusal

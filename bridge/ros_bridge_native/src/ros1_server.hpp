@@ -29,11 +29,11 @@ class Server : public Handler, public std::enable_shared_from_this<Server> {
   void offer(const std::shared_ptr<Ros1Publisher> & publisher);
   void withdraw(const std::shared_ptr<Ros1Publisher> & publisher);  // returns when it has no subscriber left
   void offer_service(ServiceHandler & handler);
-  void withdraw_service(ServiceHandler & handler);  // in the loop's thread; who is connected stays so
+  void withdraw_service(ServiceHandler & handler);  // in the loop's thread; clients that are connected stay so
 
   void on_ready(uint32_t epoll_events) override;
 
-  // For those who connect:
+  // For the connections:
   std::vector<std::shared_ptr<Ros1Publisher>> find(const std::string & topic);
   ServiceHandler * find_service(const std::string & service);
   Loop & loop;
@@ -42,7 +42,7 @@ class Server : public Handler, public std::enable_shared_from_this<Server> {
 
  private:
   int fd_ = -1;
-  int spare_ = -1;  // given up for a moment when descriptors have run out, to turn away who waits
+  int spare_ = -1;  // given up for a moment when descriptors have run out, to turn away the connection that waits
   Key key_ = 0;
   uint16_t port_ = 0;
   std::mutex mutex_;

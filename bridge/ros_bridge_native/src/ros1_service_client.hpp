@@ -21,7 +21,7 @@ enum class Loss {
   kIdle,
 };
 
-// Who calls. All calls come from the loop's thread.
+// The maker of calls. It is called in the loop's thread.
 class CallListener {
  public:
   virtual ~CallListener() = default;

@@ -12,7 +12,7 @@ namespace plane {
 
 class ServiceConnection;
 
-// Who answers. All calls come from the loop's thread.
+// A service of this process. It is called in the loop's thread.
 class ServiceHandler {
  public:
   virtual ~ServiceHandler() = default;

@@ -75,15 +75,15 @@ void Ros2Service::stop_listening() {
   if (rcl_service_set_on_new_request_callback(&service_, nullptr, nullptr) != RCL_RET_OK) rcl_reset_error();
 }
 
-void Ros2Service::take(Incoming & incoming, rmw_request_id_t & who) const {
-  if (rcl_take_request(&service_, &who, &incoming) == RCL_RET_OK) return;
+void Ros2Service::take(Incoming & incoming, rmw_request_id_t & request_id) const {
+  if (rcl_take_request(&service_, &request_id, &incoming) == RCL_RET_OK) return;
   incoming.touched = false;
   rcl_reset_error();
 }
 
-bool Ros2Service::answer(const Outgoing & response, rmw_request_id_t who) const {
+bool Ros2Service::answer(const Outgoing & response, rmw_request_id_t request_id) const {
   auto * bytes = const_cast<Outgoing *>(&response);  // rcl only reads it, but says otherwise
-  if (rcl_send_response(&service_, &who, bytes) == RCL_RET_OK) return true;
+  if (rcl_send_response(&service_, &request_id, bytes) == RCL_RET_OK) return true;
   rcl_reset_error();
   return false;
 }

@@ -47,10 +47,10 @@ class Ros2Service {
   // As of a client, for requests.
   void listen(std::function<void(size_t)> arrived);
   void stop_listening();
-  // Take one request and the note of who asked; incoming.touched tells whether there was one.
-  void take(Incoming & incoming, rmw_request_id_t & who) const;
+  // Take one request and its id; incoming.touched tells whether there was one.
+  void take(Incoming & incoming, rmw_request_id_t & request_id) const;
   // Answer. Waits up to 100 ms for a client that DDS has not connected to yet. Returns false when that fails.
-  bool answer(const Outgoing & response, rmw_request_id_t who) const;
+  bool answer(const Outgoing & response, rmw_request_id_t request_id) const;
   // Return when the clients have what they were answered, or the time is over.
   void wait_for_arrival(int64_t most_ns) const;
 

@@ -59,29 +59,31 @@ void ServiceInRos1::take_requests() {
     }
     Frame frame = pool_->get();
     Incoming incoming{&specification_.request, frame.get(), sequence_.load() + 1, true};
-    rmw_request_id_t who{};
+    rmw_request_id_t request_id{};
     const int64_t start_ns = now_ns();
-    service_->take(incoming, who);
+    service_->take(incoming, request_id);
     if (!incoming.touched) return;
     ++sequence_;
     ++posted_;
     if (!incoming.good) frame.reset();
-    context_.loop.post([this, who, frame = std::move(frame), start_ns] {
-      on_request(who, frame, start_ns);
+    context_.loop.post([this, request_id, frame = std::move(frame), start_ns] {
+      on_request(request_id, frame, start_ns);
       if (--posted_ == 0 && !closed_ && left_over_.exchange(false)) take_requests();
     });
   }
 }
 
-void ServiceInRos1::on_request(const rmw_request_id_t & who, Frame request, int64_t start_ns) {
-  if (closed_) return replies_.refuse(who, kBridgeEnds);
-  if (!request) return replies_.refuse(who, "the request is none of " + specification_.ros1.type);
+void ServiceInRos1::on_request(const rmw_request_id_t & request_id, Frame request, int64_t start_ns) {
+  if (closed_) return replies_.refuse(request_id, kBridgeEnds);
+  if (!request) return replies_.refuse(request_id, "the request is none of " + specification_.ros1.type);
   if (calls_.size() >= kConcurrentCalls + kWaitingCalls) {
-    return replies_.refuse(who, "the bridge has " + std::to_string(kConcurrentCalls + kWaitingCalls) + " calls of this service waiting");
+    const std::string calls = std::to_string(kConcurrentCalls + kWaitingCalls) + " calls";
+    return replies_.refuse(request_id, "the bridge has " + calls + " of this service waiting");
   }
   if (calls_.empty()) problem_ = kNotAsked;
   const uint64_t number = next_number_++;
-  Call & call = calls_.emplace_hint(calls_.end(), number, Call{who, nullptr, start_ns, start_ns + specification_.timeout_ns, nullptr})->second;
+  const int64_t deadline_ns = start_ns + specification_.timeout_ns;
+  Call & call = calls_.emplace_hint(calls_.end(), number, Call{request_id, nullptr, start_ns, deadline_ns, nullptr})->second;
   if (specification_.converts) {
     context_.python.put({specification_.token, PythonKind::kRequest, number, start_ns, "", std::move(request), kRequestHeadBytes}, SIZE_MAX);
   } else {
@@ -206,7 +208,7 @@ void ServiceInRos1::on_good_answer(Calls::iterator call, Frame answer, size_t of
   }
   const Call done = std::move(call->second);
   calls_.erase(call);
-  replies_.answer(done.who, std::move(answer), offset, done.start_ns);
+  replies_.answer(done.request_id, std::move(answer), offset, done.start_ns);
 }
 
 void ServiceInRos1::on_lost(const std::shared_ptr<CallConnection> & connection, Loss loss, const std::string & reason) {
@@ -230,7 +232,7 @@ void ServiceInRos1::fail(Calls::iterator call, const std::string & reason) {
   calls_.erase(call);
   if (failed.connection && failed.connection->calling()) failed.connection->drop();  // no caller waits for its answer any more
   end_spare_attempts();
-  replies_.refuse(failed.who, reason);
+  replies_.refuse(failed.request_id, reason);
 }
 
 void ServiceInRos1::end_spare_attempts() {

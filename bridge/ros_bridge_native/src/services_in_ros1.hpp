@@ -30,7 +30,7 @@ class ServiceInRos1 : public Route, public CallListener {
 
  private:
   struct Call {
-    rmw_request_id_t who;
+    rmw_request_id_t request_id;
     Frame request;  // until it has been handed on
     int64_t start_ns;
     int64_t deadline_ns;
@@ -43,7 +43,7 @@ class ServiceInRos1 : public Route, public CallListener {
   void on_lost(const std::shared_ptr<CallConnection> & connection, Loss loss, const std::string & reason) override;
 
   void take_requests();
-  void on_request(const rmw_request_id_t & who, Frame request, int64_t start_ns);
+  void on_request(const rmw_request_id_t & request_id, Frame request, int64_t start_ns);
   void on_good_answer(Calls::iterator call, Frame answer, size_t offset);
   void begin_waiting();
   bool begin_one(uint64_t number);

@@ -48,11 +48,11 @@ def test_an_execution_from_request_to_result(navigation):
     execution.terminate("ARRIVED", "there")
     assert handle.wait(SOON_S)
     assert (handle.state, handle.outcome, handle.result, handle.message) == (S.TERMINATED, "TERMINATED", "ARRIVED", "there")
-    until(lambda: states_at_end == ["AVAILABLE"], "who is told of the end sees the resources after it")
+    until(lambda: states_at_end == ["AVAILABLE"], "a callback that is told of the end sees the resources after it")
     assert [states["axes_authority"] for states in seen] == ["USED", "AVAILABLE"]
 
 
-def test_refusals_reach_the_one_who_asked(navigation):
+def test_refusals_reach_the_caller(navigation):
     check_refusals(navigation, SOON_S)
 
 
@@ -72,10 +72,10 @@ def test_interrupt_and_violation_reach_client_and_function(navigation):
     check_interrupt_and_violation(navigation, SOON_S)
 
 
-def test_a_hook_that_waits_holds_up_nobody(navigation):
+def test_a_hook_that_waits_holds_up_no_other_skill(navigation):
     navigation.bring(FLYING)
     go_on = threading.Event()
-    navigation.hooks["hover"].acts["validate"] = lambda _: "" if go_on.wait(SOON_S) else "nobody let me go on"
+    navigation.hooks["hover"].acts["validate"] = lambda _: "" if go_on.wait(SOON_S) else "the test did not let the hook go on"
     slow = navigation.client.start("hover", duration=1)
     handle = navigation.fly()
     navigation.execution(handle).terminate("ARRIVED")
@@ -142,12 +142,12 @@ def test_a_cancellation_that_overtakes_its_goal(navigation):
     assert "validate" not in navigation.hooks["takeoff"].calls
 
 
-def test_who_subscribes_late_hears_all_events(navigation):
+def test_a_late_subscriber_hears_all_events(navigation):
     navigation.bring(FLYING)
     handle = navigation.fly()
     navigation.execution(handle).terminate("ARRIVED", "there")
     assert handle.wait(SOON_S)
-    # Subscribers of one process share a connection: the first one's must go, or nobody would be late.
+    # Subscribers of one process share a connection: the first one's must go, or none would be late.
     navigation.client.close()
     heard = {}
     late = rospy.Subscriber(navigation.name("events"), Event, lambda event: heard.setdefault(event.sequence, event))
@@ -234,7 +234,7 @@ def test_pause_and_resume(navigation):
     until(lambda: handle.state is S.RUNNING, "it goes on")
 
 
-def test_who_comes_late_learns_the_last_results(navigation):
+def test_a_late_client_learns_the_last_results(navigation):
     navigation.bring(FLYING)
     handle = navigation.fly()
     navigation.execution(handle).terminate("ARRIVED", "there")
@@ -295,7 +295,7 @@ def test_the_generated_client_works_here_too(navigation):
     assert handle.get(SOON_S).state is S.INTERRUPTED
 
 
-def test_nobody_waits_on_the_thread_that_brings_the_news(navigation):
+def test_a_wait_on_the_thread_that_brings_the_news_is_refused(navigation):
     navigation.bring(FLYING)
     caught = []
 

@@ -65,6 +65,49 @@ def failing_story(name: str = "navigate") -> Story:
     return [*sorted(story, key=lambda entry: entry[0]), (start + 61, MISSION, end)]
 
 
+def lost_video() -> Story:
+    """Return the entries of an inspection whose ground station is killed; the autopilot's failsafe overtakes the reaction."""
+    start, why = LIFT_OFF_S, "sdk_authority: SDK_authority is UNAVAILABLE"
+    inspect, lost = ({"kind": "sequence", "skill": "", "message": "", "children": []} for _ in range(2))
+
+    def shape(first: str, second: str, third: str) -> dict[str, Any]:
+        stream = {**inspect, "name": "send the video", "kind": "skill", "skill": "video.stream", "status": first}
+        land = {**lost, "name": "land", "kind": "skill", "skill": "navigation.land", "status": second}
+        branches = [
+            {**inspect, "name": "inspect", "status": first, "children": [stream]},
+            {**lost, "name": "the video was lost", "status": second, "children": [land]},
+            {**lost, "name": "given up", "status": third},
+        ]
+        return {**inspect, "name": "inspection", "kind": "selector", "status": "RUNNING", "children": branches}
+
+    def guided(t_s: float, mode: str) -> tuple[float, str, dict[str, Any]]:
+        return (start + t_s, "/data", {"skillset": "navigation", "data": "guidance_state", "value": {"mode": mode}, "stamp_s": 0.0})
+
+    picture = {"skillset": "video", "data": "picture", "value": {"fps_margin": -6}, "stamp_s": 1.0}
+    low = execution("video.stream", "RESOURCE_INVARIANT_VIOLATED", 2, result="enough_frames", message="picture.fps_margin is -6 for 1 s")
+    return [
+        (start - 3, MISSION, {"scenario": "inspection", "outcome": "running", "reason": "", "waypoints": 10, "waypoints_reached": 0}),
+        (start, EVENTS, transition("navigation.flight_status", "ON_GROUND", "IN_AIR")),
+        (start + 1, EVENTS, execution("video.stream", "RUNNING", 1)),
+        (start + 2, EVENTS, execution("navigation.goto", "RUNNING", 1)),
+        (start + 1, TREE, shape("RUNNING", "INVALID", "INVALID")),
+        guided(2.0, "GUIDED"),
+        (start + 40, "/fault", {"sensor": "ground_station", "mode": "killed"}),
+        (start + 43, "/data", picture),
+        (start + 43, EVENTS, low),
+        (start + 43, TREE, shape("FAILURE", "RUNNING", "INVALID")),
+        (start + 43.02, EVENTS, execution("navigation.goto", "INTERRUPTED", 2)),
+        (start + 43.04, EVENTS, execution("navigation.hover", "RUNNING", 3)),
+        (start + 43.06, EVENTS, execution("navigation.hover", "FAILED", 4, message="refused")),  # the reaction before is not its own
+        guided(45.0, "RTL"),
+        (start + 45, EVENTS, transition("navigation.SDK_authority", "AVAILABLE", "UNAVAILABLE")),
+        (start + 45, EVENTS, execution("navigation.land", "NOT_READY", 3, result="sdk_authority", message=why)),
+        (start + 45, TREE, shape("FAILURE", "FAILURE", "RUNNING")),
+        (start + 57, EVENTS, transition("navigation.flight_status", "IN_AIR", "ON_GROUND")),
+        (start + 58, MISSION, {"outcome": "given_up", "reason": why, "waypoints": 10, "waypoints_reached": 2, "end_s": start + 58}),
+    ]
+
+
 def write_record(folder: Path, story: Story, *, over: bool = True) -> RecordWriter:
     """Write a story's record; ``over`` also ends the file."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import threading
 import urllib.error
 import urllib.request
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -65,3 +67,44 @@ async def heard(viewer: ClientConnection, wanted: Callable[[dict[str, Any]], boo
 async def answer_to(viewer: ClientConnection, **asked: object) -> str:
     await viewer.send(json.dumps(asked))
     return str((await heard(viewer, lambda message: "answer" in message))["answer"])
+
+
+class Served:
+    """A console in a thread of its own, which can be stopped and started."""
+
+    def __init__(self, fixed: Path) -> None:
+        self._fixed, self.port = fixed, free_port()
+        self._stop: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        up = threading.Event()
+
+        async def main() -> None:
+            over = asyncio.Event()
+            loop = asyncio.get_running_loop()
+            self._stop = lambda: loop.call_soon_threadsafe(over.set)
+            async with Console(Admission("127.0.0.1", self.port, ""), fixed=self._fixed).open():
+                up.set()
+                await over.wait()
+
+        self._thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
+        self._thread.start()
+        assert up.wait(WAIT_S)
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+    def stop(self) -> None:
+        self._stop()
+        self._thread.join(WAIT_S)
+
+
+@contextlib.contextmanager
+def served(fixed: Path) -> Iterator[Served]:
+    console = Served(fixed)
+    console.start()
+    try:
+        yield console
+    finally:
+        console.stop()

@@ -101,7 +101,7 @@ def test_skills_are_shown_started_paused_interrupted_and_the_record_says_so(run_
     assert not [command for command, _ in done if command.startswith("why")]
 
 
-def test_who_watches_drives_nothing_and_who_does_not_look_is_sent_nothing(run_of: Path) -> None:
+def test_a_viewer_without_hands_drives_nothing_and_one_that_does_not_look_is_sent_nothing(run_of: Path) -> None:
     async def play(bench: Bench) -> None:
         first = await bench.viewer("first", hands=True)
         await heard(first, lambda message: bool(skill_of(message, "hover")))
@@ -115,7 +115,7 @@ def test_who_watches_drives_nothing_and_who_does_not_look_is_sent_nothing(run_of
     serve(play, fixed=run_of)
 
 
-def test_listening_ends_with_the_last_who_looks(run_of: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_listening_ends_with_the_last_viewer_that_looks(run_of: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     closed: list[bool] = []
     close = Hands.close
     monkeypatch.setattr(Hands, "close", lambda self: (closed.append(True), close(self))[1])

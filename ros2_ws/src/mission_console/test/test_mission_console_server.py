@@ -47,7 +47,7 @@ def test_viewers_follow_a_run_that_grows(make_run: Callable[..., Path]) -> None:
     serve(play, fixed=folder)
 
 
-def test_who_comes_back_is_sent_what_is_new(make_run: Callable[..., Path]) -> None:
+def test_a_viewer_that_comes_back_is_sent_what_is_new(make_run: Callable[..., Path]) -> None:
     folder = make_run()
 
     async def play(bench: Bench) -> None:

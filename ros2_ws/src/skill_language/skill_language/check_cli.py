@@ -1,9 +1,7 @@
-"""`python -m skill_language.check_cli FILE... [--json] [--strict] [--to rl|paper]`: read models and say what is wrong with them.
+"""`./alula check FILE...`: read models, say what is wrong with them, and prove the rest.
 
-A model without errors is handed to the prover (``--no-proofs`` leaves that out), what that finds is told with the rest.
-Ends with 0 when all is well (warnings do not count, unless ``--strict``), 1 when a model has errors, of syntax or of meaning, or a
-property fails, 2 when a file can't be read: because it is not there, is no UTF-8 text or far too large (ALU0..).
-With ``--to`` the models are printed in that notation instead, findings go to the standard error stream.
+A model without errors is handed to the prover; what that finds is told with the rest, on standard output. With ``--to`` the models
+are printed there instead, and findings go to standard error.
 """
 
 from __future__ import annotations
@@ -47,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def exit_code(findings: Sequence[Diagnostic]) -> int:
-    """Return 0, 1 or 2 as in this module's docstring."""
+    """Return 0, 1 or 2 (``EXIT_CODES``)."""
     if any(finding.severity is Severity.ERROR and finding.code.startswith(UNREADABLE) for finding in findings):
         return 2
     return 1 if has_errors(findings) else 0

@@ -11,7 +11,8 @@ from skill_language.lexer import MAX_CHARACTERS
 from skill_language.models import ModelFile
 from skill_language.occurrences import Entity, Occurrence, at, occurrences
 from skill_language.syntax.cursor import OPERATOR_WORDS
-from skill_model.model import Data, Effect, Parameter, Resource, Skill, Skillset, Span, Transition
+from skill_model.model import Data, Effect, Parameter, Resource, Skill, Skillset, Transition
+from skill_model.span import Span
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 

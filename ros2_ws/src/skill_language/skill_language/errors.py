@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from skill_language.stories import NO_STORY, Story
-from skill_model.model import NOWHERE, Span
+from skill_model.span import NOWHERE, Span
 
 
 class Severity(Enum):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from skill_language.errors import Diagnostic
-from skill_model.model import Span
+from skill_model.span import Span
 
 MAX_CHARACTERS = 300_000
 """Models are a few kilobytes; whatever is larger than this is no model, and is refused before it costs time."""

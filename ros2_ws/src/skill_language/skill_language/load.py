@@ -12,8 +12,9 @@ from skill_language.errors import Diagnostic, LanguageError, Severity, has_error
 from skill_language.models import about, check_files
 from skill_language.notation import SUFFIXES
 from skill_language.robot import Bindings, Robot
-from skill_model.model import Skillset, Span
+from skill_model.model import Skillset
 from skill_model.ros_types import PRIMITIVES, RosType
+from skill_model.span import Span
 
 FOR_GENERATOR = frozenset({"ALU215", "ALU216", "ALU217", "ALU218"})
 """What a model may have by itself, but not when interfaces and managers are made of it: these warnings are errors then."""

@@ -20,7 +20,8 @@ from skill_language.errors import Diagnostic, LanguageError, Severity
 from skill_language.lexer import MAX_CHARACTERS, Source, tokenize
 from skill_language.notation import SUFFIXES, Notation, read
 from skill_language.syntax.document import Document, typed_elements, with_known_types
-from skill_model.model import Skillset, Span
+from skill_model.model import Skillset
+from skill_model.span import Span
 
 MAX_BYTES = 4 * MAX_CHARACTERS
 STANDARD_INPUT = "<standard input>"

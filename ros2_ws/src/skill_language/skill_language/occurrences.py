@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from skill_language.lexer import Kind, Source, Token, tokenize
 from skill_language.models import ModelFile
-from skill_model.model import DataIs, Effect, Expression, Resource, ResourceIs, Skill, SkillRuns, Skillset, Span, atoms
+from skill_model.expressions import DataIs, Expression, ResourceIs, SkillRuns, atoms
+from skill_model.model import Effect, Resource, Skill, Skillset
 from skill_model.ros_types import PRIMITIVES
+from skill_model.span import Span
 
 RESOURCE_WORDS = frozenset({"state", "initial", "transition", "extern", "all"})
 

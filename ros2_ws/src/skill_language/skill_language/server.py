@@ -22,7 +22,7 @@ from skill_language.layout import formatted
 from skill_language.lexer import MAX_CHARACTERS
 from skill_language.models import ModelFile, check_texts, models_in
 from skill_language.occurrences import Occurrence
-from skill_model.model import Span
+from skill_model.span import Span
 
 PROOFS_S = 10.0
 """How long the proofs of a saved file may take."""

@@ -13,8 +13,8 @@ from alula_common.suggestions import nearest, quoted
 from skill_language.errors import Diagnostic
 from skill_language.lexer import MAX_CHARACTERS
 from skill_language.robot import Bindings, BridgedService, BridgedTopic, DataSource
-from skill_model.model import Span
 from skill_model.ros_types import PRIMITIVES, RosType, parse_type
+from skill_model.span import Span
 
 T = TypeVar("T", DataSource, BridgedTopic, BridgedService)
 

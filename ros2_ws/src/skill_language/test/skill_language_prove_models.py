@@ -6,33 +6,24 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
+from skill_model.expressions import TRUE, And, Comparison, Constant, DataIs, Implies, Not, Or, ResourceIs, SkillRuns
 from skill_model.model import (
     NO_EFFECT,
-    TRUE,
-    And,
     Assignment,
-    Comparison,
-    Constant,
     Data,
-    DataIs,
     Effect,
     Event,
     Hold,
-    Implies,
     Interrupt,
     Invariant,
-    Not,
-    Or,
     Precondition,
     Progress,
     Property,
     PropertyKind,
     Resource,
-    ResourceIs,
     Result,
     ResultKind,
     Skill,
-    SkillRuns,
     Skillset,
     Transition,
 )

@@ -11,34 +11,25 @@ from skill_language.rl import skill as rl
 from skill_language.syntax.cursor import OPERATOR_WORDS
 from skill_language.syntax.document import MEMBERS
 from skill_language.syntax.resources import every_arrow, occurring
+from skill_model.expressions import TRUE, And, Comparison, Constant, DataIs, Implies, Not, Or, ResourceIs, SkillRuns
 from skill_model.model import (
     NO_EFFECT,
-    TRUE,
-    And,
     Assignment,
-    Comparison,
-    Constant,
     Data,
-    DataIs,
     Effect,
     Event,
     Hold,
-    Implies,
     Interrupt,
     Invariant,
-    Not,
-    Or,
     Parameter,
     Precondition,
     Progress,
     Property,
     PropertyKind,
     Resource,
-    ResourceIs,
     Result,
     ResultKind,
     Skill,
-    SkillRuns,
     Skillset,
     Transition,
 )

@@ -31,7 +31,7 @@ def checked(tmp_path, *texts):
     return [[(finding.code, finding.span.line) for finding in file.findings] for file in check_files(paths)]
 
 
-# --- nobody takes an arrow --------------------------------------------------------------------------------------------
+# --- an arrow not taken -----------------------------------------------------------------------------------------------
 
 GOTO = """
 skillset uav {
@@ -52,7 +52,7 @@ skillset uav {
 
 
 @BOTH
-def test_what_only_an_arrow_that_nobody_takes_leads_to_is_an_error(most, tmp_path):
+def test_what_only_an_untaken_arrow_leads_to_is_an_error(most, tmp_path):
     errors = [f for f in proved(tmp_path, GOTO, most=most) if f.severity.value == "error"]
     assert [f.code for f in errors] == ["ALU510", "ALU531"]
     assert errors[0].counterexample == (
@@ -119,14 +119,14 @@ def test_what_is_no_regular_file_is_refused_unread(path, capsys):
     assert "ALU001" in capsys.readouterr().out
 
 
-def test_a_pipe_that_nobody_writes_to_is_refused(tmp_path, capsys):
+def test_a_pipe_without_a_writer_is_refused(tmp_path, capsys):
     os.mkfifo(tmp_path / "pipe.skill")
     assert check_cli.main([str(tmp_path / "pipe.skill")]) == 2
     assert "no regular file" in capsys.readouterr().out
 
 
 class Endless(io.RawIOBase):
-    """Gives zeros as long as somebody reads."""
+    """Gives zeros without end."""
 
     def read(self, size=-1):
         assert 0 < size < 10_000_000

@@ -108,7 +108,7 @@ skillset uav {
   }
   skill goto {
     input target: Pose
-    precondition { nobody_flies: authority != Pilot  free: motion == Free }
+    precondition { no_pilot: authority != Pilot  free: motion == Free }
     start motion -> Used
     invariant {
       in_control { guard authority == Drone effect motion -> Free }

@@ -7,7 +7,7 @@ import pytest
 from alula_common.suggestions import nearest
 from skill_language.errors import Diagnostic, LanguageError
 from skill_language.paper import parse
-from skill_model.model import Span
+from skill_model.span import Span
 
 
 def test_several_errors_of_one_file_are_told_in_order():

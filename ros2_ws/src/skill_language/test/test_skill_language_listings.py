@@ -6,23 +6,16 @@ import pytest
 
 from skill_language.errors import LanguageError
 from skill_language.paper import parse
+from skill_model.expressions import And, Comparison, Constant, DataIs, Implies, Not, Or, ResourceIs
 from skill_model.model import (
-    And,
     Assignment,
-    Comparison,
-    Constant,
-    DataIs,
     Effect,
-    Implies,
     Interrupt,
     Invariant,
-    Not,
-    Or,
     Parameter,
     Precondition,
     Progress,
     Resource,
-    ResourceIs,
     Result,
     Skill,
     Transition,

@@ -20,7 +20,7 @@ from skill_language.prove.steps import World
 from skill_language.prove.symbolic import search as by_sets
 from skill_model import semantics
 from skill_model.conditions import holds
-from skill_model.model import TRUE
+from skill_model.expressions import TRUE
 from skill_runtime.core import SkillsetEngine
 from skill_runtime.hooks import SkillHooks
 
@@ -248,7 +248,7 @@ def test_local_checks_say_what_trying_every_state_says(skillset):
             messages = {f.code for f in certain if f"precondition `{precondition.name}` of `{skill.name}`" in f.message}
             here = [s for s in before if holds(precondition.condition, s, {})]
             assert ("ALU504" in messages) == (bool(before) and not here)
-            # The test's models have no places: a `true` of theirs is taken for one that nobody wrote.
+            # The test's models have no places: a `true` of theirs is taken for one that is not in the source.
             assert ("ALU505" in messages) == (bool(here) and len(here) == len(before) and precondition.condition != TRUE)
             before = here
         for index, invariant in enumerate(skill.invariants):

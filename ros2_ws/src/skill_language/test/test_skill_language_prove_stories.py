@@ -10,10 +10,9 @@ from test_skill_language_prove_page import PAGE, proved
 
 from skill_language.load import check_file
 from skill_language.prove import bench, prove
+from skill_model.expressions import Comparison, DataIs, ResourceIs, SkillRuns
 from skill_model.model import (
     Assignment,
-    Comparison,
-    DataIs,
     Effect,
     Hold,
     Interrupt,
@@ -22,10 +21,8 @@ from skill_model.model import (
     Property,
     PropertyKind,
     Resource,
-    ResourceIs,
     Result,
     Skill,
-    SkillRuns,
     Skillset,
     Transition,
 )

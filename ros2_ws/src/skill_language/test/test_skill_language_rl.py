@@ -17,30 +17,23 @@ from skill_language.lexer import MAX_ERRORS
 from skill_language.models import ModelFile, check_texts
 from skill_language.notation import Notation, notation_of
 from skill_language.printer import print_skillset
+from skill_model.expressions import TRUE, And, Comparison, DataIs, Implies, Not, ResourceIs, SkillRuns
 from skill_model.json_form import to_json
 from skill_model.model import (
-    TRUE,
-    And,
     Assignment,
-    Comparison,
     Data,
-    DataIs,
     Effect,
     Event,
     Hold,
-    Implies,
     Interrupt,
     Invariant,
-    Not,
     Parameter,
     Precondition,
     Progress,
     Property,
     PropertyKind,
-    ResourceIs,
     Result,
     ResultKind,
-    SkillRuns,
 )
 
 UAV = next(p / "skillsets" / "uav.rl" for p in Path(__file__).resolve().parents if (p / "skillsets").is_dir())

@@ -11,8 +11,9 @@ from skill_language_strategies import skillsets
 from skill_language import paper, rl
 from skill_language.notation import Notation
 from skill_language.printer import NotInThisNotationError, print_skillset
+from skill_model.expressions import Comparison, DataIs
 from skill_model.json_form import from_json, to_json
-from skill_model.model import Assignment, Comparison, DataIs, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
+from skill_model.model import Assignment, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
 
 SLOW = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 

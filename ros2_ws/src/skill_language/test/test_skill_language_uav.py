@@ -12,8 +12,9 @@ from test_skill_language_listings import LISTING_2, LISTING_3, TAKEOFF, wrapped
 from skill_language.load import check_file, load_robot
 from skill_language.paper import parse
 from skill_language.printer import print_skillset
+from skill_model.expressions import ResourceIs
 from skill_model.json_form import from_json, to_json
-from skill_model.model import Effect, Interrupt, ResourceIs, Skill
+from skill_model.model import Effect, Interrupt, Skill
 
 SKILLSETS = next(parent / "skillsets" for parent in Path(__file__).resolve().parents if (parent / "skillsets").is_dir())
 MODELS = sorted((SKILLSETS / "uav").glob("*.skill"))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from skill_model.errors import DataMissingError, UnsupportedModelError
-from skill_model.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
+from skill_model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, atoms
 from skill_model.units import UNIT_IN_SI
 
 States = Mapping[str, str]

@@ -1,15 +1,8 @@
 """What time decides: invariants that may be false for a while, values that must recover, progress that must not stand still.
 
-An invariant over data without a fresh value is unknown, and what is unknown counts as false: a camera that has died does not
-keep its ``fps >= 10``. With ``for 2 s`` it is broken when it has counted as false at the end of every step for 2 s, to the
-nanosecond (at 2 s it is). An execution's own time begins with its start.
-
-With ``recovers at 12`` a value that was seen below the threshold counts as bad until one of at least 12 is seen. That is
-remembered for the skillset, whoever runs: a skill that was ended can't hold on before the value has recovered. A value that
-gets lost counts as false while it is, and changes nothing in what is remembered.
-
-An execution makes progress when the number that its ``progress`` hook gives changes. ``deadline 5 s`` is broken 5 s after the
-last change, or after the start; an execution that is being interrupted has none.
+The rules are in skillsets/LANGUAGE.md, under Quantities. What they remember is in the situation: ``fallen`` belongs to the skillset,
+whichever skills run; ``false_since`` and ``progressed`` belong to an execution and go with it. A condition counts as false, or not,
+at the end of each step.
 """
 
 from __future__ import annotations
@@ -18,7 +11,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from skill_model.conditions import judge
-from skill_model.model import DataIs, Invariant, Skill, Skillset
+from skill_model.expressions import DataIs
+from skill_model.model import Invariant, Skill, Skillset
 from skill_model.situation import Running, Situation
 
 NS_PER_S = 1_000_000_000

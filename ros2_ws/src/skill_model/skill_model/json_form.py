@@ -16,19 +16,19 @@ from enum import Enum
 from functools import cache, lru_cache
 from typing import Any
 
-from skill_model import model
 from skill_model.errors import ModelFormatError
-from skill_model.model import Skillset, Span
+from skill_model.expressions import And, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from skill_model.model import Skillset
 
 _CONDITIONS: dict[str, type] = {
-    "resource": model.ResourceIs,
-    "data": model.DataIs,
-    "running": model.SkillRuns,
-    "constant": model.Constant,
-    "not": model.Not,
-    "and": model.And,
-    "or": model.Or,
-    "implies": model.Implies,
+    "resource": ResourceIs,
+    "data": DataIs,
+    "running": SkillRuns,
+    "constant": Constant,
+    "not": Not,
+    "and": And,
+    "or": Or,
+    "implies": Implies,
 }
 _TAGS = {cls: tag for tag, cls in _CONDITIONS.items()}
 _MAX_DEPTH = 100
@@ -78,7 +78,7 @@ def _decode(value: object, wanted: Any, where: str, depth: int) -> object:
     """Return ``value`` as an instance of the annotation ``wanted``."""
     if depth > _MAX_DEPTH:
         raise _NoModelError(where, "nested less deeply", value)
-    if wanted == model.Expression:
+    if wanted == Expression:
         return _decode_condition(value, where, depth)
     origin = typing.get_origin(wanted)
     if origin is tuple:
@@ -108,7 +108,7 @@ def _decode_plain(value: object, wanted: type, where: str) -> object:
 def _decode_union(value: object, options: tuple[Any, ...], where: str, depth: int) -> object:
     if value is None and types.NoneType in options:
         return None
-    if set(typing.get_args(model.Expression)) <= set(options):
+    if set(typing.get_args(Expression)) <= set(options):
         return _decode_condition(value, where, depth)
     for option in options:
         # A truth value is an int to Python, but not to the model: exact types decide.
@@ -150,4 +150,4 @@ def _decode_object(value: object, cls: type, where: str, depth: int) -> object:
 
 @cache
 def _annotations(cls: type) -> dict[str, Any]:
-    return typing.get_type_hints(cls, {**vars(model), "Span": Span})
+    return typing.get_type_hints(cls)

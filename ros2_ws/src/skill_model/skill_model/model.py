@@ -7,139 +7,15 @@ it came from, so that a tool that finds something wrong with it can show where.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 
-
-@dataclass(frozen=True)
-class Span:
-    """A place in a source file: 1-based line and column, ``end_column`` exclusive on the same line."""
-
-    file: str
-    line: int
-    column: int
-    end_column: int
-
-    def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}"
-
-
-NOWHERE = Span(file="", line=0, column=0, end_column=0)
-
-
-# --- expressions -----------------------------------------------------------------------------------------------------
-# Conditions are over resource states (`axes == USED`), in preconditions and invariants over data (`battery.level > 0.2`),
-# and in properties over executions (`takeoff running`).
-
-
-class Comparison(Enum):
-    """How the two sides of an atom are compared."""
-
-    EQ = "=="
-    NE = "!="
-    LT = "<"
-    LE = "<="
-    GT = ">"
-    GE = ">="
-
+from skill_model.expressions import TRUE, Comparison, DataIs, Expression
+from skill_model.span import NOWHERE, Span
 
 _INCLUSIVE = {Comparison.GT: Comparison.GE, Comparison.LT: Comparison.LE}
-
-
-@dataclass(frozen=True)
-class ResourceIs:
-    """``resource == STATE`` or ``resource != STATE``."""
-
-    resource: str
-    state: str
-    negated: bool = False
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class DataIs:
-    """``data.field < number [unit]``; ``path`` is empty for a plain value."""
-
-    data: str
-    path: tuple[str, ...]
-    comparison: Comparison
-    value: float | str | bool
-    unit: str = ""
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class Constant:
-    """``true`` or ``false``."""
-
-    value: bool
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class SkillRuns:
-    """``skill running``: an execution of the skill is running (Figure 5: RUNNING). Only properties ask it."""
-
-    skill: str
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class Not:
-    """Negation."""
-
-    operand: Expression
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class And:
-    """Conjunction of two or more operands."""
-
-    operands: tuple[Expression, ...]
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class Or:
-    """Disjunction of two or more operands."""
-
-    operands: tuple[Expression, ...]
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-@dataclass(frozen=True)
-class Implies:
-    """Implication, ``premise => conclusion``."""
-
-    premise: Expression
-    conclusion: Expression
-    span: Span = field(default=NOWHERE, compare=False)
-
-
-Atom = ResourceIs | DataIs | SkillRuns | Constant
-Expression = Atom | Not | And | Or | Implies
-TRUE = Constant(value=True)
-
-
-def atoms(expression: Expression) -> Iterator[Atom]:
-    """Yield the leaves of an expression from left to right."""
-    match expression:
-        case Not(operand=operand):
-            yield from atoms(operand)
-        case And(operands=operands) | Or(operands=operands):
-            for operand in operands:
-                yield from atoms(operand)
-        case Implies(premise=premise, conclusion=conclusion):
-            yield from atoms(premise)
-            yield from atoms(conclusion)
-        case _:
-            yield expression
-
-
-# --- elements --------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

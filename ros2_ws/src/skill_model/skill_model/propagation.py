@@ -1,4 +1,4 @@
-"""Invariant propagation: what a step breaks, until nothing more is broken (see ``semantics`` for the order)."""
+"""Invariant propagation: what a step breaks, until nothing more is broken (skillsets/LANGUAGE.md, Meaning, has the order)."""
 
 from __future__ import annotations
 

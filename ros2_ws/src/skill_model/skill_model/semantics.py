@@ -2,15 +2,9 @@
 
 The engine takes its steps here and nowhere else, so a tool that explores all steps of a model explores what is executed.
 
-A step is atomic: what asks for it, its resource changes, and every invariant that these break, with the effects of those
-and what they break in turn, until nothing more is broken. Happenings of a step are in this order: the changes of the
-request's effect, then the state that it puts its execution in; then, for each broken execution, the changes of the
-violation's effect and the violated state. Executions break in the order in which they were found broken; those found
-after the same change in the order of their start, each by the first false invariant of the model. An execution once found
-broken ends so, even if the effect of another would have mended its invariant: it was false.
-
-What resources alone make false comes first. When nothing of that is left, what data and time have broken (see ``deadlines``)
-ends one execution after another, in the order of their start, each with all that its end breaks.
+The rules are in skillsets/LANGUAGE.md, under Meaning. Happenings of a step are in this order: the changes of the request's
+effect, then the state that it puts its execution in; then, for each broken execution, the changes of the violation's effect
+and the violated state. An execution is broken by the first false invariant in the order of the model.
 """
 
 from __future__ import annotations
@@ -23,7 +17,8 @@ from skill_model.conditions import Data, States, data_of, holds, in_si, judge, p
 from skill_model.effects import after, effect_changes, event_changes, given_back, without
 from skill_model.errors import DataMissingError, EffectError, UnsupportedModelError
 from skill_model.execution_state import ExecutionState
-from skill_model.model import Event, Expression, Skill, Skillset
+from skill_model.expressions import Expression
+from skill_model.model import Event, Skill, Skillset
 from skill_model.propagation import propagate, violate
 from skill_model.situation import Change, Entered, Running, Situation, Step
 

@@ -8,18 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from skill_model.execution_state import ExecutionState
-from skill_model.model import (
-    Comparison,
-    DataIs,
-    Parameter,
-    Precondition,
-    Resource,
-    ResourceIs,
-    Skill,
-    Skillset,
-    Transition,
-)
+from skill_model.expressions import Comparison, DataIs, ResourceIs
 from skill_model.model import Data as ModelData
+from skill_model.model import Parameter, Precondition, Resource, Skill, Skillset, Transition
 from skill_panel.form import Field, FormError, fields, value_of, values
 from skill_panel.memory import Memory
 from skill_panel.view import DataRow, ResourceRow, Running, SkillRow, SkillsetView, one_line

@@ -1,4 +1,4 @@
-"""Who wants to be told of something again and again."""
+"""Callbacks that are called again and again, until they are forgotten."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ OutputsT = TypeVar("OutputsT", bound=Mapping[str, object])
 ResultT = TypeVar("ResultT", bound=str)
 
 REPORTS_KEPT = 1000
-"""Reports that a reader may lag behind; the oldest are dropped for one who is slower, never the last."""
+"""Reports that a reader may lag behind; the oldest are dropped for a slower one, never the last."""
 
 
 class SkillFailedError(SkillRuntimeError):

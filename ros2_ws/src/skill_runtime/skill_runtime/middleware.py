@@ -43,7 +43,7 @@ class Topic:
 
     Args:
         name: relative to the skillset; of the functional layer, as it is bound.
-        keep: so many of the last values are given to who subscribes late.
+        keep: so many of the last values are given to a late subscriber.
         type_name: of a data, ``package/Name``; empty: the codec of this name has it, or the graph tells.
         wrapped: the values are primitives, which come as std_msgs/Float64 and the like.
         outside: of the functional layer.

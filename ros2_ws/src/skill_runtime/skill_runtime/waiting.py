@@ -21,7 +21,7 @@ class CannotWaitError(SkillRuntimeError):
 
 
 class Host(Protocol):
-    """How a thread waits where the answers come from: a middleware's client knows who serves it."""
+    """How a thread waits where the answers come from: the client's middleware has it."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
         """Wait for the event; None: until it comes or can't come any more.
@@ -95,7 +95,7 @@ class Waitable:
                     self._after.remove(tell)
 
     def _end(self) -> None:
-        """Wake all who wait; called once."""
+        """Wake all waiting threads; called once."""
         with self._lock:
             self._ended.set()
             after, self._after = self._after, []

@@ -71,7 +71,7 @@ class Mission:
                 if b"--parent" in words and str(self.supervisor.pid).encode() in words and part.encode() in words:
                     return int(place.parent.name)
             assert time.monotonic() < end, f"no process of {part}"
-            time.sleep(0.02)  # /proc tells nobody of new processes
+            time.sleep(0.02)  # /proc gives no notice of new processes
 
     def run_until(self, moment_s: float):
         """Start one execution after another until this moment (monotonic); return the last."""

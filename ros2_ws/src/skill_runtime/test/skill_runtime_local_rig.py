@@ -9,7 +9,7 @@ from skill_runtime.local import LocalWorld
 
 
 class Timed(SkillHooks):
-    """Ends with DONE after a while, if nobody stops it."""
+    """Ends with DONE after a while, if it is not stopped."""
 
     def __init__(self, managers, duration_s: float = 1.0) -> None:
         self.managers = managers

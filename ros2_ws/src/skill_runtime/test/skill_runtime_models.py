@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from alula_testing.recorder import Recorder
+from skill_model.expressions import ResourceIs
 from skill_model.model import (
     Assignment,
     Effect,
@@ -12,7 +13,6 @@ from skill_model.model import (
     Precondition,
     Progress,
     Resource,
-    ResourceIs,
     Result,
     Skill,
     Skillset,

@@ -11,23 +11,8 @@ from hypothesis import strategies as st
 
 from skill_model.conditions import holds
 from skill_model.execution_state import ExecutionState
-from skill_model.model import (
-    And,
-    Assignment,
-    Effect,
-    Implies,
-    Interrupt,
-    Invariant,
-    Not,
-    Or,
-    Precondition,
-    Resource,
-    ResourceIs,
-    Result,
-    Skill,
-    Skillset,
-    Transition,
-)
+from skill_model.expressions import And, Implies, Not, Or, ResourceIs
+from skill_model.model import Assignment, Effect, Interrupt, Invariant, Precondition, Resource, Result, Skill, Skillset, Transition
 from skill_runtime.core import ExecutionEvent, TransitionEvent
 
 S = ExecutionState

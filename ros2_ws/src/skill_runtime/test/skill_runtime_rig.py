@@ -90,7 +90,7 @@ class Spinning:
 
 
 class Navigation:
-    """The managers with recorders, a client, and the events as somebody else hears them."""
+    """The managers with recorders, a client, and the events as another subscriber hears them."""
 
     def __init__(self, spinning: Spinning, *, separate: bool = False, **node_options: object) -> None:
         self.hooks = {skill.name: NavigationRecorder() for skill in SKILLSET.skills}

@@ -136,7 +136,7 @@ def test_the_emergency_follows_the_mission_clock(spinning, separate):
     release.set()
 
 
-def test_hooks_that_hang_hold_up_nobody(anyhow):
+def test_hooks_that_hang_hold_up_no_other_skill(anyhow):
     navigation = anyhow
     navigation.bring(FLYING)
     release = threading.Event()

@@ -281,7 +281,7 @@ def test_a_pause_that_waits_for_a_hook_that_hangs_is_answered(hanging):
     assert "that has not ended" in replies[0].reason
 
 
-def test_progress_that_takes_its_time_is_not_asked_again_and_holds_up_nobody(hanging):
+def test_progress_that_takes_its_time_is_not_asked_again_and_holds_up_no_other_skill(hanging):
     bench, hooks = hanging.bench, hanging.bench.hooks
     hooks["takeoff"].acts["progress"] = hanging.hang
     execution, other = hanging.running(), hanging.run("watch")

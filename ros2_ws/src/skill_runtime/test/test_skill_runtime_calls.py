@@ -68,7 +68,7 @@ def bench(monkeypatch):
     return SimpleNamespace(service=service, calls=calls, ask=ask, run_for=run_for, answers=answers, now=now)
 
 
-def test_what_is_withdrawn_is_not_asked_again_and_answers_nobody(bench):
+def test_what_is_withdrawn_is_not_asked_again_and_gives_no_answer(bench):
     withdraw = bench.calls.call("a", lambda *_: bench.answers.append("a"), bench.answers.append, timeout_s=60.0, once=False)
     bench.ask("b", timeout_s=60.0)
     withdraw()

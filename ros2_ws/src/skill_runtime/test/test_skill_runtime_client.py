@@ -97,7 +97,7 @@ def test_a_script_calls_a_skill_and_waits(uav, managers):
     until(lambda: takeoff.last == ended, "the last end is known")
 
 
-def test_who_comes_late_learns_the_last_ends(managers, ros2_domain):
+def test_a_late_client_learns_the_last_ends(managers, ros2_domain):
     managers.engine.request("takeoff", None)
     managers.running().terminate("BLOCKED", "a branch")
     managers.engine.request("land", None)
@@ -163,7 +163,7 @@ def test_callbacks_and_coroutines_of_an_rclpy_node(managers):
     """In a callback of the spinning thread a blocking wait says so instead of deadlocking; ``await`` works there."""
     node = Node(f"skill_runtime_client_{next(NUMBERS)}")
     uav = Uav(node)
-    assert uav.wait_ready(READY_S, NAVIGATION)  # nobody spins the node: the wait does
+    assert uav.wait_ready(READY_S, NAVIGATION)  # only the wait spins the node
     told: dict[str, object] = {}
     over = threading.Event()
 
@@ -212,7 +212,7 @@ def test_a_callback_may_wait_where_other_threads_spin(managers):
     assert ends == ["TERMINATED"]
 
 
-def test_a_wait_spins_a_node_that_nobody_spins(managers):
+def test_a_wait_spins_a_node_that_is_not_spun(managers):
     node = Node(f"skill_runtime_client_{next(NUMBERS)}")
     uav = Uav(node)
     assert uav.wait_ready(READY_S, NAVIGATION)
@@ -281,7 +281,7 @@ def test_the_first_value_has_the_stamp_that_the_managers_gave_it(managers, ros2_
     sent_s = managers.node.get_clock().now().nanoseconds / 1e9
     period_s = next(data.period_s for data in SKILLSET.data if data.name == "guidance_state")
     too_old_s = sent_s + STALE_PERIODS * period_s
-    until(lambda: managers.node.get_clock().now().nanoseconds / 1e9 > too_old_s, "the value has grown stale before anybody asks")
+    until(lambda: managers.node.get_clock().now().nanoseconds / 1e9 > too_old_s, "the value has grown stale before a client asks")
     with Uav.connect(domain=ros2_domain, skillsets=NAVIGATION, timeout_s=READY_S) as late:
         data = late.navigation.data.guidance_state
         until(lambda: data.stamp is not None, "the value and its stamp arrive")
@@ -334,7 +334,7 @@ def test_generic_names_that_are_not_there_are_told(managers, ros2_domain):
             robot["mapping"]
 
 
-def test_nobody_there_is_one_error_with_a_remedy(ros2_domain):
+def test_managers_that_are_not_there_are_one_error_with_a_remedy(ros2_domain):
     begun_s = time.monotonic()
     with pytest.raises(NotThereError, match=rf"/robot9/navigation, /robot9/mapping in DDS domain {ros2_domain} within 0.3 s.*panel --list"):
         Robot.connect("navigation", "mapping", namespace="/robot9", domain=ros2_domain, timeout_s=0.3)

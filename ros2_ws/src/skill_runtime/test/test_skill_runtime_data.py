@@ -5,7 +5,8 @@ from __future__ import annotations
 from std_msgs.msg import Float64
 
 from skill_model.conditions import holds
-from skill_model.model import Comparison, Data, DataIs
+from skill_model.expressions import Comparison, DataIs
+from skill_model.model import Data
 from skill_runtime.plain import carried
 
 

@@ -10,7 +10,8 @@ from skill_runtime_models import AXES_FREE, AXES_USED, RELEASE, RESET, SDK, Benc
 
 from alula_testing.recorder import Recorder
 from skill_model.execution_state import ExecutionState
-from skill_model.model import And, Assignment, Comparison, Data, DataIs, Effect, Event, Interrupt, Invariant, Not, Precondition, Result
+from skill_model.expressions import And, Comparison, DataIs, Not
+from skill_model.model import Assignment, Data, Effect, Event, Interrupt, Invariant, Precondition, Result
 from skill_runtime.core import SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.hook_calls import LocalHooks
@@ -76,7 +77,7 @@ def test_validate_refuses_in_its_own_words():
 
 
 @pytest.mark.parametrize(("wrote", "jobs"), [((), 0), (("on_dispatch",), 1), (("validate",), 1), (("validate", "on_dispatch"), 1)])
-def test_only_hooks_that_somebody_wrote_are_given_a_thread(wrote, jobs):
+def test_only_written_hooks_are_given_a_thread(wrote, jobs):
     called = []
     hooks = type("Hooks", (SkillHooks,), {hook: lambda _, given, hook=hook: called.append(hook) or "" for hook in wrote})()
     skillset = flying_skillset()

@@ -126,7 +126,7 @@ def gone(graph):
     graph.silent = False
 
 
-def test_a_goal_that_nobody_acknowledges_is_given_up_and_cancelled_when_it_is_heard_of(graph, client):
+def test_an_unacknowledged_goal_is_given_up_and_cancelled_when_it_is_heard_of(graph, client):
     handle = client.start("takeoff", height=3.0)
     graph.run_for(ACKNOWLEDGE_S - 0.1)
     assert not handle.done
@@ -240,7 +240,7 @@ def test_two_managers_at_a_time_are_told(graph, client):
 def test_a_late_sign_of_life_of_managers_that_were_killed_is_no_second_process(graph, client):
     graph.states("two", sdk="AVAILABLE")
     graph.run_for(2 * RIVALS_NS / 1e9)
-    graph.sign("one")  # DDS says that others live before it says who
+    graph.sign("one")  # DDS says that other managers live before it says which
     assert graph.errors == []
     graph.sign("one", graph.clock.now_ns)
     assert graph.errors == ["two processes manage the skillset flying; end one of them"]

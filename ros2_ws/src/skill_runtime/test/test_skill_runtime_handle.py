@@ -1,4 +1,4 @@
-"""Handles and answers without middleware: who waits is woken once, in his own way, and every reader sees every change."""
+"""Handles and answers without middleware: every waiting caller is woken once, in its own way, and every reader sees every change."""
 
 from __future__ import annotations
 
@@ -82,10 +82,10 @@ def test_readers_in_threads_see_every_change_and_stop_at_the_end():
     for thread in threads:
         thread.join(SOON_S)
     assert seen == [REPORTS, REPORTS]
-    assert list(one) == REPORTS[-1:]  # who comes late
+    assert list(one) == REPORTS[-1:]  # a late reader
 
 
-def test_a_listener_that_raises_keeps_nobody_waiting():
+def test_a_listener_that_raises_keeps_no_caller_waiting():
     one = handle()
     one.on_report(lambda report: 1 / 0)
     with pytest.raises(ZeroDivisionError):
@@ -131,7 +131,7 @@ def test_an_await_that_is_cancelled_leaves_nothing_behind():
     assert one.done
 
 
-def test_a_coroutine_without_a_loop_is_resumed_by_whoever_drives_it():
+def test_a_coroutine_without_a_loop_is_resumed_by_its_driver():
     one = handle()
 
     async def waits() -> str:
@@ -166,7 +166,7 @@ def test_an_answer_comes_once_or_says_why_not():
     asyncio.run(main())
 
 
-def test_pauses_are_asked_for_where_there_is_somebody_to_ask():
+def test_pauses_are_asked_for_where_there_are_managers_to_ask():
     asked: list[bool] = []
 
     def pause(paused: bool) -> Pending[str]:  # noqa: FBT001 - the client's signature

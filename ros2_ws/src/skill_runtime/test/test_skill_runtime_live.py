@@ -293,7 +293,7 @@ def process(ros2_domain):
 
 
 @pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + DOUBT_S + 2.0)])
-def test_nobody_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
+def test_no_client_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
     served = process("--ros-args", "-p", "use_sim_time:=false", "__name:=from_roslaunch")
     node = Node(f"skill_runtime_tester_{next(NUMBERS)}")
     client = SkillsetClient(node, "navigation")

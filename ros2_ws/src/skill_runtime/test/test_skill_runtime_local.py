@@ -62,7 +62,7 @@ def test_a_refused_transition_says_why():
     assert reply.reason == "resource sdk is AVAILABLE and has no extern transition AVAILABLE -> AVAILABLE"
 
 
-def test_refusals_reach_the_one_who_asked():
+def test_refusals_reach_the_caller():
     world, client = make()
     other = world.client("flying")
     assert other.wait_ready(0.0)

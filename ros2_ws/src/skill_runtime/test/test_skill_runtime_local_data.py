@@ -10,7 +10,8 @@ from skill_runtime_models import SDK, flying_skill, flying_skillset
 
 from alula_testing.recorder import Recorder
 from skill_model.execution_state import ExecutionState
-from skill_model.model import Assignment, Comparison, Data, DataIs, Effect, Event, Invariant, Parameter, Precondition
+from skill_model.expressions import Comparison, DataIs
+from skill_model.model import Assignment, Data, Effect, Event, Invariant, Parameter, Precondition
 from skill_model.ros_types import parse_type
 from skill_runtime.core.events import event_record
 from skill_runtime.waiting import NoAnswerError

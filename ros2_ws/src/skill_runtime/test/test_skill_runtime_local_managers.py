@@ -20,7 +20,7 @@ from skill_runtime.local.middleware import VirtualMiddleware
 from skill_runtime.managers import Managers
 
 
-def test_managers_that_are_not_there_or_have_gone_leave_nobody_waiting():
+def test_managers_that_are_not_there_or_have_gone_leave_no_client_waiting():
     world = LocalWorld()
     client = world.client("flying")
     assert not client.wait_ready(3.0)

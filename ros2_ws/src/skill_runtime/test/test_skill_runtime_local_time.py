@@ -90,7 +90,7 @@ def test_coroutines_run_in_virtual_time():
         world.run(endless(), timeout_s=5.0)
 
 
-def test_who_waits_for_what_can_not_come_is_told():
+def test_a_wait_for_what_can_not_come_is_refused():
     _, client = make(hooks=lambda _: {"takeoff": Recorder()}, skillset=flying_skillset(flying_skill("takeoff", progress=None)))
     handle = client.start("takeoff", height=3.0)
     with pytest.raises(CannotWaitError, match="nothing can happen in this world any more"):

@@ -176,7 +176,7 @@ def test_transitions_of_a_skill_come_at_their_moment_unless_it_is_stopped_before
     assert mocked.client.resources["sdk"] == "AVAILABLE"
 
 
-def test_who_is_stopped_half_way_leaves_the_memory_half_way(read):
+def test_a_mock_that_is_stopped_half_way_leaves_the_memory_half_way(read):
     behaviour = read("memory: {at: [0, 0], level: 1}\nskills: {flying.takeoff: {delay: 10, moves: {at: '[height, 10]', level: 3}}}")
     mocked = Mocked(behaviour)
     handle = mocked.client.start("takeoff", height=4.0)

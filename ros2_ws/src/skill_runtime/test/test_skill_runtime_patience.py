@@ -11,7 +11,8 @@ from skill_runtime_models import AXES_USED, RELEASE, RESET, SDK, Bench, flying_s
 
 from alula_testing.recorder import Recorder
 from skill_model.execution_state import ExecutionState
-from skill_model.model import Assignment, Comparison, Data, DataIs, Effect, Event, Hold, Implies, Interrupt, Invariant, Or, Progress
+from skill_model.expressions import Comparison, DataIs, Implies, Or
+from skill_model.model import Assignment, Data, Effect, Event, Hold, Interrupt, Invariant, Progress
 from skill_runtime.core import SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import TransitionEvent
@@ -23,7 +24,7 @@ FAST = DataIs("fps", (), Comparison.GE, 10.0)
 
 
 class Timed(Bench):
-    """A bench whose clock stands until ``at`` sets it; nobody ticks by himself."""
+    """A bench whose clock stands until ``at`` sets it; nothing ticks by itself."""
 
     def clock(self) -> int:
         return self.now_ns
@@ -125,7 +126,7 @@ def test_a_late_tick_changes_no_outcome():
     execution = bench.run("film")
     bench.fps(3.0)
     bench.at(2500, tick=False)
-    bench.fps(30.0)  # too late: nobody had looked, but it had been too slow for 2 s
+    bench.fps(30.0)  # too late: no step had looked, but it had been too slow for 2 s
     assert execution.state is S.RESOURCE_INVARIANT_VIOLATED
     assert execution.message == "fast: fps is 3.0 for 2 s"
 
@@ -146,7 +147,7 @@ def test_a_value_that_has_fallen_is_good_again_from_the_recovery_value_on():
     assert execution.state is S.RUNNING
 
 
-def test_a_fallen_value_is_remembered_whoever_runs_and_a_lost_one_changes_nothing_in_that():
+def test_a_fallen_value_is_remembered_whatever_runs_and_a_lost_one_changes_nothing_in_that():
     bench = watching(Hold(hysteresis=12.0))
     bench.fps(9.0)
     bench.fps(None)
@@ -322,7 +323,7 @@ def test_an_invariant_breaks_when_the_page_says_so(values, hold, punctual):
 
 
 def pass_to(bench, at_ms, *, punctual):
-    """Let time pass; who is punctual calls at each moment that is due on the way, others leave it to what comes next."""
+    """Let time pass: ``punctual`` calls at each moment that is due on the way, else all is left to what comes next."""
     while punctual and (due_ns := bench.engine.due_ns) is not None and due_ns <= at_ms * MS:
         bench.at(due_ns / MS)
     bench.at(at_ms, tick=False)

@@ -39,7 +39,7 @@ def running(mission):
 
 
 def alive(pid: int) -> bool:
-    """Tell whether a process has not ended; who ended without a parent that asks stays as a zombie."""
+    """Tell whether a process has not ended; one whose parent does not ask for its end stays as a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
@@ -72,7 +72,7 @@ def test_the_death_of_a_skill_manager_fails_its_execution_and_gives_back_what_it
     assert again.state is S.INTERRUPTED
 
 
-def test_the_death_of_the_resource_manager_stops_functions_and_hangs_nobody(mission):
+def test_the_death_of_the_resource_manager_stops_functions_and_hangs_no_client(mission):
     handle = running(mission)
     os.kill(mission.pid("resources"), signal.SIGKILL)
     assert handle.wait(END_S)

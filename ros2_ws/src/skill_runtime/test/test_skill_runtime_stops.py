@@ -49,7 +49,7 @@ def test_a_stop_that_takes_time_holds_resources_until_it_is_done():
     assert bench.story()[-4:] == ["RUNNING", "INTERRUPTING", "axes AVAILABLE", "INTERRUPTED"]
 
 
-def test_nothing_is_interrupted_that_nobody_asked_for():
+def test_only_what_was_asked_for_is_interrupted():
     bench = Bench()
     execution = bench.run()
     assert not execution.interrupted()
@@ -197,7 +197,7 @@ def test_what_is_asked_while_the_function_is_being_started_waits_for_its_turn(th
     def dispatch(execution):
         bench.engine.set_paused(execution.id, replies.append, paused=True)
         bench.engine.set_paused(execution.id, replies.append, paused=False)
-        refusal = bench.engine.pause(execution.id)  # who waits for the answer in the hook itself is refused
+        refusal = bench.engine.pause(execution.id)  # a wait for the answer in the hook itself is refused
         assert not refusal.accepted
         assert "being started" in refusal.reason
         assert replies == []

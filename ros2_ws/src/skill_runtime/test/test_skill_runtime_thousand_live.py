@@ -20,7 +20,7 @@ from skill_model.execution_state import ExecutionState  # noqa: E402
 WARM, MEASURED = 300, 1000
 """The events' topic keeps the last 1000 of them: four of each execution, and it is full."""
 GROWTH_KB = 8000
-"""Of all of the process, rclpy and DDS included; goals that rcl keeps for those who ask late are part of it."""
+"""Of all of the process, rclpy and DDS included; goals that rcl keeps for late questions are part of it."""
 
 
 def rss_kb() -> int:

@@ -1,4 +1,4 @@
-"""Data, durations, deadlines and events on a live ROS 2 graph: what nobody calls for happens when it is due."""
+"""Data, durations, deadlines and events on a live ROS 2 graph: what no request causes happens when it is due."""
 
 from __future__ import annotations
 
@@ -25,18 +25,8 @@ from std_msgs.msg import Float64  # noqa: E402
 from alula_testing import waits  # noqa: E402
 from alula_testing.recorder import Recorder  # noqa: E402
 from skill_model.execution_state import ExecutionState  # noqa: E402
-from skill_model.model import (  # noqa: E402
-    Assignment,
-    Comparison,
-    Data,
-    DataIs,
-    Effect,
-    Event,
-    Hold,
-    Invariant,
-    Progress,
-    ResourceIs,
-)
+from skill_model.expressions import Comparison, DataIs, ResourceIs  # noqa: E402
+from skill_model.model import Assignment, Data, Effect, Event, Hold, Invariant, Progress  # noqa: E402
 from skill_runtime.ros2 import SkillsetNode  # noqa: E402
 from skill_runtime.ros2.names import EVENTS  # noqa: E402
 

@@ -8,7 +8,8 @@ import pytest
 from skill_runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_skillset
 
 from skill_model.execution_state import ExecutionState
-from skill_model.model import And, Assignment, Comparison, Data, DataIs, Effect, Invariant, Not, Precondition
+from skill_model.expressions import And, Comparison, DataIs, Not
+from skill_model.model import Assignment, Data, Effect, Invariant, Precondition
 from skill_runtime.managers import questions
 
 S = ExecutionState

@@ -124,7 +124,7 @@ def test_without_the_sensor_that_looks_ahead_it_is_given_up_and_landed():
 
 
 @pytest.mark.parametrize("taker", ["pilot", "control"])
-def test_who_takes_the_vehicle_is_left_alone_until_it_is_down(taker: str):
+def test_the_vehicle_is_left_to_its_taker_until_it_is_down(taker: str):
     mission = fly(f"{taker}@20")
     assert mission.end.outcome is Outcome.GIVEN_UP
     taken = itertools.dropwhile(lambda end: end[1] != "RESOURCE_INVARIANT_VIOLATED", ends(mission))

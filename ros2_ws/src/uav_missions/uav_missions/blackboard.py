@@ -9,7 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from skill_missions.blackboard import Blackboard
-from uav_missions.remarks import AUTHORITY_INVARIANT, who_has_it
+from uav_missions.remarks import AUTHORITY_INVARIANT, holder_of_the_vehicle
 from uav_missions.route import Route, Waypoint
 
 
@@ -28,9 +28,9 @@ class RouteBlackboard(Blackboard):
         return {**super().values(), **own}
 
     def explained(self) -> str:
-        """Return the reason; where the authority was lost, with who has it."""
+        """Return the reason; where the authority was lost, with its holder."""
         lost = any(failure.result == AUTHORITY_INVARIANT for failure in self.failures)
-        remark = who_has_it(self) if lost else ""
+        remark = holder_of_the_vehicle(self) if lost else ""
         return f"{self.reason} ({remark})" if remark else self.reason
 
 

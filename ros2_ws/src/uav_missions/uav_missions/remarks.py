@@ -1,4 +1,4 @@
-"""What the functional layer says of the drone's resources: why a sensor is not believed, and who took the authority."""
+"""What the functional layer says of the drone's resources: why a sensor is not believed, and what took the authority."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def note_authority(blackboard: Blackboard, state: GuidanceState | Any) -> None:
     blackboard.remarks[AUTHORITY] = remark
 
 
-def who_has_it(blackboard: Blackboard) -> str:
-    """Return who has a vehicle whose authority was lost; empty where the guidance was not listened to."""
+def holder_of_the_vehicle(blackboard: Blackboard) -> str:
+    """Return what has a vehicle whose authority was lost; empty where the guidance was not listened to."""
     # The guidance takes it from the skills and keeps it in one case only.
     return (blackboard.remarks[AUTHORITY] or "the autopilot has restarted") if AUTHORITY in blackboard.remarks else ""

@@ -51,7 +51,7 @@ def main() -> None:
         for line in sys.stdin:
             try:
                 answer = play(Script.from_plain(json.loads(line)), make_stage)
-            except Exception as error:  # noqa: BLE001 - the one who asked must hear of it
+            except Exception as error:  # noqa: BLE001 - the test that asked must hear of it
                 answer = {"error": "".join(traceback.format_exception(error))}
             answers.write(json.dumps(answer) + "\n")
             answers.flush()

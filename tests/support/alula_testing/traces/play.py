@@ -20,7 +20,7 @@ _EVENT_FIELDS = {
     "TRANSITION": ("resource", "from_state", "to_state", "cause"),
 }
 _CURTAIN = ("homepoint_status", {"VALID": "INVALID", "INVALID": "VALID"})
-"""The resource that is changed at the very end: who has heard that has heard everything."""
+"""The resource that is changed at the very end: a client that has heard that has heard everything."""
 
 
 class Player:
@@ -99,7 +99,7 @@ class Player:
             told = {skill: self._stage.last(client, skill) for skill in skills}
             return {skill: last[0] for skill, last in told.items() if last is not None} == ended
 
-        self._stage.until(is_told, f"the last results are known to who comes {step.do}")
+        self._stage.until(is_told, f"the last results are known to a client that comes {step.do}")
         self._replies.append([client.resources, {skill: self._stage.last(client, skill) for skill in ended}])
 
     # --- what follows ------------------------------------------------------------------------------------------------

@@ -107,7 +107,7 @@ def socket_in(namespace: str) -> socket.socket:
 class KernelChannel:
     """One direction of the radio, with the interface of ``Channel``; time is the kernel's own, so the wall's.
 
-    ``socket`` is where the datagrams arrive: who waits on it reads it, and tells by ``arrived``.
+    ``socket`` is where the datagrams arrive: the loop that waits on it reads it, and tells by ``arrived``.
     """
 
     def __init__(self, radio: netem.Radio, direction: Direction, condition: Condition) -> None:

@@ -39,7 +39,7 @@ class MissionLoop(Generic[Item]):
     ``others``: sockets that are there already; they count on behind those of the ports.
 
     ``now_ns`` is the mission clock: simulated where there is one, else the ROS clock at 50 Hz. After each tick ``~done`` tells its
-    time, so that a simulator can wait for who works for it.
+    time, so that a simulator can wait for this loop.
     """
 
     def __init__(

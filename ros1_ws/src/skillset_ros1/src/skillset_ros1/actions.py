@@ -32,10 +32,10 @@ _RESULT_FIELDS = ("outcome", "result", "message")
 
 
 class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # neither actionlib nor rospy has types
-    """An action server whose results reach everybody and are never empty.
+    """An action server whose results reach every client and are never empty.
 
     A subscriber of ROS 1 takes itself for connected a moment before the publisher knows of it, so an action client can lose the
-    result of its first goal: who subscribes is sent the last results. And actionlib itself recalls a goal whose cancellation came
+    result of its first goal: a new subscriber is sent the last results. And actionlib itself recalls a goal whose cancellation came
     first, without a word.
     """
 
@@ -185,7 +185,7 @@ class RospyLink:
         self._base.submit(lambda: on_count(None))
 
     def ask_ending(self, goal_id: str) -> None:
-        """Ask nothing: results are sent to everybody, and arrive over their connections."""
+        """Ask nothing: results are sent to every subscriber, and arrive over their connections."""
 
     def release(self, goal_id: str) -> None:
         """Follow a goal no more."""

@@ -166,7 +166,7 @@ class RospyMiddleware(RospyBase):
         heard_s: list[float] = []
 
         def hear(sign: Any) -> None:
-            self.server = sign._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell who sent it
+            self.server = sign._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell the sender
             heard_s[:] = [time.monotonic()]
             on_sign(sign.frame_id, stamp_ns_of(sign.stamp))
 
@@ -183,7 +183,7 @@ class RospyMiddleware(RospyBase):
 
 
 class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy has no types
-    """A topic's writing end, with a history for who subscribes late.
+    """A topic's writing end, with a history for late subscribers.
 
     A latched topic of ROS 1 keeps one message. Where more are to be kept, every new subscriber is sent what the others have had, as
     a transient local topic of ROS 2 would; a message that is published in that very moment may come before, and once more within it.

@@ -10,6 +10,7 @@ const OUTCOMES = {
 };
 
 const APART_S = 0.1; // an event's stamp may be some ticks of the clock older than what caused it
+const SAME_S = 1; // a fault of the radio and what the recordings tell of it are no farther apart
 const REACTION_S = 3; // how long after a failure the tree's reaction is looked for
 
 function headline(run) {
@@ -85,8 +86,15 @@ const named = (sensor) => String(sensor).replaceAll("_", " ");
 /** A failure that was made, in words; mocks do not tell in which way something fails. */
 const faultWords = ({ sensor, mode }) => `${named(sensor)} failed (${mode && mode !== "mock" ? `${mode}, ` : ""}injected)`;
 
-/** The failure that was made before an execution ended badly: the one that it names (`sure`), else the last one; null without one. */
+/** What a summary tells of a fault: when it was detected, what failed because of it; undefined while there is no summary of it. */
+const answerTo = (run, fault) => run.facts["/summary"]?.answers?.find(({ sensor, t_s: since }) => sensor === fault.sensor && Math.abs(origin(run) + since - fault.t) < SAME_S);
+
+/** The failure that was made behind an execution that ended badly, null without one: in a summary the one that it follows from (`sure`). Without a summary the one that it names (`sure`), else the last one before. */
 function faultBehind(run, failure) {
+  if (run.facts["/summary"]?.answers) {
+    const fault = faultsOf(run).find((one) => one.mode !== "ok" && answerTo(run, one)?.failed.includes(failure.id));
+    return fault ? { ...fault, sure: true } : null;
+  }
   const before = faultsOf(run).filter(({ t, mode }) => t <= failure.end + APART_S && mode !== "ok");
   const sensor = blamed(run, failure)?.resource.replace(/_status$/, "");
   const own = before.findLast((fault) => fault.sensor === sensor || failure.message.includes(fault.sensor));
@@ -111,8 +119,10 @@ function makeChain(run, failure) {
   const sensor = change ? change.resource.replace(/_status$/, "") : "";
   const fault = faultBehind(run, failure);
   if (fault) add(fault.sure ? "failure" : "before", fault.t, faultWords(fault));
-  const measured = measurement(run, failure, sensor);
+  const measured = measurement(run, failure, sensor || (fault?.sure ? fault.sensor : ""));
   if (measured) add("measurement", measured.t, measured.text);
+  const told = fault && !change ? answerTo(run, fault) : undefined;
+  if (told?.detected_by.includes(" -> ")) add("resource", origin(run) + told.detected_s, `${told.detected_by.replace(" ", ": ").replace("->", "→")}, reported by the functional layer`);
   if (change) add("resource", change.t, `${change.name}: ${change.from} → ${change.state}${change.cause === "extern" ? ", reported by the functional layer" : ` (${change.cause})`}`);
   const why = failure.message || failure.result || words(failure.state);
   if (endingOf(failure) === "violated") add("invariant", failure.end, `${failure.result} of ${failure.skill}: ${why.replace(`${failure.result}: `, "")}`);
@@ -196,7 +206,9 @@ function branchOf(run, failure) {
   while (top.parent && failedAround(top.parent, failure.end, until) !== null) top = top.parent;
   const chain = [{ step: "branch", t: failedAround(top, failure.end, until) ?? failure.end, text: `“${top.name}” failed` }];
   const siblings = top.parent?.children ?? [];
-  const next = siblings.slice(siblings.indexOf(top) + 1).find((node) => node.track.v.some(({ status }) => status !== "INVALID"));
+  const later = siblings.slice(siblings.indexOf(top) + 1).filter((node) => node.track.v.some(({ status }) => status !== "INVALID"));
+  const answer = run.facts["/summary"]?.answers?.find(({ failed }) => failed.includes(failure.id))?.answered_by;
+  const next = later.find(({ name }) => name === answer) ?? later[0]; // one that was tried and failed at once answered nothing
   if (next && top.parent.kind === "selector") {
     const index = next.track.v.findIndex(({ status }) => status !== "INVALID");
     const t = next.track.t[index] <= until ? Math.max(failure.end, next.track.t[index]) : failure.end;
@@ -321,7 +333,7 @@ function answers(run) {
     groups.get(key).failures.push(failure);
   }
   for (const { fault, failures: own } of groups.values()) rows.push(failureRow(run, fault, own, failed));
-  for (const fault of faultsOf(run)) if (fault.mode !== "ok" && !groups.has(`${fault.sensor} ${fault.t}`)) rows.push({ what: faultWords(fault), t: fault.t, until: endOf(run, fault), done: running ? "nothing so far" : "nothing: no skill failed of it", cost: "" });
+  for (const fault of faultsOf(run)) if (fault.mode !== "ok" && !groups.has(`${fault.sensor} ${fault.t}`)) rows.push({ what: faultWords(fault), t: fault.t, until: endOf(run, fault), done: running ? "nothing so far" : answerTo(run, fault)?.answered_by === "not detected" ? "nothing: it was not detected" : "nothing: no skill failed of it", cost: "" });
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) {
     const t = when === null ? run.begin : origin(run) + when;
     if (!rows.some((row) => Math.abs(row.t - t) < REACTION_S)) rows.push({ what: `the process ${name} died: ${how}`, t, done: "nothing that the record tells of", cost: "" });
@@ -347,9 +359,11 @@ function failureRow(run, fault, own, failed) {
   if (later) done.push(`afterwards ${later}`);
   const since = fault?.t ?? first.end;
   const cost = [];
-  if (fault) cost.push(`noticed after ${seconds(Math.max(0, first.end - since), 2)}`);
+  const noticed = fault ? answerTo(run, fault)?.detected_s : null;
+  if (fault) cost.push(`noticed after ${seconds(Math.max(0, (noticed == null ? first.end : origin(run) + noticed) - since), 2)}`);
   const recovery = run.facts["/summary"]?.recovery;
-  const recovered = recovery && Math.abs(origin(run) + (recovery.failure_s ?? recovery.detected_s) - since) < 1;
+  const answered = failed.find((one) => faultBehind(run, one)) ?? failed[0]; // of two faults at once, the recovery is from the one that failed first
+  const recovered = recovery && own.includes(answered) && Math.abs(origin(run) + (recovery.failure_s ?? recovery.detected_s) - since) < 1;
   if (recovered && recovery.fallback_running_s != null) cost.push(`the fallback ran after ${seconds(recovery.fallback_running_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
   if (recovered && recovery.moving_again_s != null) cost.push(`the vehicle moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
   const why = own.map((failure) => endingTold(failure)).join(" ");

@@ -9,7 +9,9 @@ from typing import Protocol
 from alula_common.suggestions import nearest, quoted
 from skill_language.errors import Diagnostic, Severity
 from skill_model import ros_types
-from skill_model.model import Comparison, DataIs, Effect, Expression, Resource, ResourceIs, SkillRuns, Skillset, Span, atoms
+from skill_model.expressions import Comparison, DataIs, Expression, ResourceIs, SkillRuns, atoms
+from skill_model.model import Effect, Resource, Skillset
+from skill_model.span import Span
 from skill_model.units import UNIT_IN_SI
 
 
@@ -118,7 +120,7 @@ def _arrow(effect: Effect, resource: Resource, target: str, span: Span, *, any_a
         return
     targets = dict.fromkeys(arrow.target for arrow in resource.transitions if not arrow.extern)
     hint = f"skills can take it to {quoted(list(targets))}" if targets else f"add `STATE -> {target}` to resource `{resource.name}`"
-    # Who is in the initial state may stay there, though it is an effect that never does anything.
+    # A resource in the initial state may stay there, though the effect then never does anything.
     tell = warning if target == resource.initial else error
     yield tell("ALU209", f"{_called(effect)} would take `{resource.name}` to `{target}`, but no arrow leads there", span, hint=hint)
 

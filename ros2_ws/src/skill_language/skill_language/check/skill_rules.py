@@ -20,7 +20,8 @@ from skill_language.check.references import (
     warning,
 )
 from skill_language.errors import Diagnostic
-from skill_model.model import NO_EFFECT, Comparison, DataIs, Effect, Hold, Invariant, Skill, Skillset, atoms
+from skill_model.expressions import Comparison, DataIs, atoms
+from skill_model.model import NO_EFFECT, Effect, Hold, Invariant, Skill, Skillset
 from skill_model.units import UNIT_IN_SI
 
 

@@ -26,7 +26,8 @@ from skill_language.errors import Diagnostic
 from skill_language.syntax.document import typed_elements
 from skill_language.syntax.resources import occurring
 from skill_model import ros_types
-from skill_model.model import Resource, Skillset, Span
+from skill_model.model import Resource, Skillset
+from skill_model.span import Span
 
 
 def _skillset_names(skillset: Skillset) -> Iterator[Diagnostic]:

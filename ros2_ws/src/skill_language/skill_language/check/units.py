@@ -7,7 +7,9 @@ from itertools import chain
 
 from skill_language.check.references import error, last_word
 from skill_language.errors import Diagnostic
-from skill_model.model import DataIs, Skillset, Span, atoms
+from skill_model.expressions import DataIs, atoms
+from skill_model.model import Skillset
+from skill_model.span import Span
 from skill_model.units import KIND_OF_UNIT
 
 Value = tuple[str, ...]

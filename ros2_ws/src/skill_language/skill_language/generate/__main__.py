@@ -15,7 +15,7 @@ from skill_language.errors import Diagnostic, LanguageError
 from skill_language.generate.robot_files import robot_files
 from skill_language.generate.writer import prune, write_files
 from skill_language.load import load_robot
-from skill_model.model import Span
+from skill_model.span import Span
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,4 +1,4 @@
-"""The module `<skillset>_managers.client`: a skillset's skills, resources and data with types, for those who call it."""
+"""The module `<skillset>_managers.client`: a skillset's skills, resources and data with types, for its callers."""
 
 from __future__ import annotations
 

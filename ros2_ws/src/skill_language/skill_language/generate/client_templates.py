@@ -77,7 +77,7 @@ class $camel(RobotClient):
     """The robot ``$robot``; its skillsets are attributes.
 
     Args:
-        node: serves it; somebody has to spin it.
+        node: serves it; the caller spins it.
         namespace: of the robot, as ``/robot1``; by default the node's.
     """
 

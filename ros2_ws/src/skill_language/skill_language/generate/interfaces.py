@@ -46,7 +46,7 @@ project($package)
 
 if("$$ENV{ROS_VERSION}" STREQUAL "1")
   find_package(catkin REQUIRED COMPONENTS message_generation actionlib_msgs)
-  # A type that has no ROS 1 form costs this skillset its managers there, and nobody else anything.
+  # A type that has no ROS 1 form costs this skillset its managers there, and no other skillset anything.
   set(missing)
   foreach(dependency$ros1_names)
     find_package($${dependency} QUIET)

@@ -1,12 +1,4 @@
-"""A skill of the paper's notation (Listing 3).
-
-Beyond the listing: an effect of several changes is written `name { r1 -> S1  r2 -> S2 }`, and in place of an effect's name its
-changes may stand in braces; `output { ... }` is an `input` the other way, `parameter { ... }` has what is set once for all;
-`interrupt { interrupting apply = effect }` says what an interruption does; `violation` and `apply` may be left out;
-`post resource = (...)` after a result says what must hold once its effect was applied (section 4.1.2); `success` or `failure`
-before a result says what it means for the mission; an invariant may be patient (`for 2 s recovers at 12`); `progress = 0.5
-deadline = 5 message T` has a deadline and a report.
-"""
+"""A skill of the paper's notation (Listing 3); skillsets/LANGUAGE.md, Skills and Grammar, has what goes beyond the listing."""
 
 from __future__ import annotations
 
@@ -19,20 +11,8 @@ from skill_language.syntax.cursor import Cursor, starts_block, starts_member
 from skill_language.syntax.elements import read_parameter
 from skill_language.syntax.quantities import duration, hold, setting
 from skill_language.syntax.skill_reader import SkillReader
-from skill_model.model import (
-    NO_EFFECT,
-    TRUE,
-    Effect,
-    Expression,
-    Interrupt,
-    Invariant,
-    Parameter,
-    Precondition,
-    Progress,
-    Result,
-    ResultKind,
-    Skill,
-)
+from skill_model.expressions import TRUE, Expression
+from skill_model.model import NO_EFFECT, Effect, Interrupt, Invariant, Parameter, Precondition, Progress, Result, ResultKind, Skill
 
 BLOCKS = ("progress", "parameter", "input", "output", "effect", "precondition", "invariant", "interrupt", "result")
 _OUTSIDE = ("resource", "event", "skill", "property")

@@ -19,25 +19,8 @@ from skill_language.printing.text import (
     hold_text,
     parameter_text,
 )
-from skill_model.model import (
-    NO_EFFECT,
-    TRUE,
-    And,
-    Constant,
-    DataIs,
-    Effect,
-    Expression,
-    Implies,
-    Interrupt,
-    Not,
-    Or,
-    Progress,
-    ResourceIs,
-    Result,
-    ResultKind,
-    Skill,
-    atoms,
-)
+from skill_model.expressions import TRUE, And, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
+from skill_model.model import NO_EFFECT, Effect, Interrupt, Progress, Result, ResultKind, Skill
 
 _WORDS_OF_RESULTS = frozenset({"success", "failure", "apply", "post"})
 """A result of such a name is written with a colon, so that it is not taken for the word."""

@@ -14,19 +14,8 @@ from skill_language.printing.text import (
     hold_text,
     parameter_text,
 )
-from skill_model.model import (
-    NO_EFFECT,
-    TRUE,
-    DataIs,
-    Effect,
-    Expression,
-    Interrupt,
-    Invariant,
-    Progress,
-    Result,
-    Skill,
-    atoms,
-)
+from skill_model.expressions import TRUE, DataIs, Expression, atoms
+from skill_model.model import NO_EFFECT, Effect, Interrupt, Invariant, Progress, Result, Skill
 
 
 def skill_lines(skill: Skill) -> Iterator[str]:

@@ -7,29 +7,8 @@ from dataclasses import dataclass
 
 from skill_language.lexer import quote
 from skill_language.syntax.resources import every_arrow, occurring
-from skill_model.model import (
-    NO_EFFECT,
-    TRUE,
-    And,
-    Constant,
-    Data,
-    DataIs,
-    Effect,
-    Event,
-    Expression,
-    Hold,
-    Implies,
-    Not,
-    Or,
-    Parameter,
-    Property,
-    PropertyKind,
-    Resource,
-    ResourceIs,
-    Skill,
-    SkillRuns,
-    Skillset,
-)
+from skill_model.expressions import TRUE, And, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from skill_model.model import NO_EFFECT, Data, Effect, Event, Hold, Parameter, Property, PropertyKind, Resource, Skill, Skillset
 from skill_model.units import UNIT_IN_SI
 
 ConditionText = Callable[[Expression], str]

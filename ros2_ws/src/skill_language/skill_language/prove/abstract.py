@@ -15,24 +15,8 @@ from skill_language.outside import Arrow
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
 from skill_model.conditions import whatever_the_data
-from skill_model.model import (
-    TRUE,
-    And,
-    Atom,
-    Constant,
-    DataIs,
-    Event,
-    Expression,
-    Implies,
-    Invariant,
-    Not,
-    Or,
-    Precondition,
-    ResourceIs,
-    Skill,
-    Skillset,
-    atoms,
-)
+from skill_model.expressions import TRUE, And, Atom, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, atoms
+from skill_model.model import Event, Invariant, Precondition, Skill, Skillset
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from skill_language.prove.prover import prove
+from skill_model.expressions import And, ResourceIs, SkillRuns
 from skill_model.model import (
-    And,
     Assignment,
     Effect,
     Interrupt,
@@ -27,10 +27,8 @@ from skill_model.model import (
     Property,
     PropertyKind,
     Resource,
-    ResourceIs,
     Result,
     Skill,
-    SkillRuns,
     Skillset,
     Transition,
 )

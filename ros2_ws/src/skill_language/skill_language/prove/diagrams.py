@@ -15,18 +15,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from skill_model.arrows import origins, targets_of
-from skill_model.model import (
-    And,
-    Constant,
-    Effect,
-    Expression,
-    Implies,
-    Not,
-    Or,
-    ResourceIs,
-    SkillRuns,
-    Skillset,
-)
+from skill_model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from skill_model.model import Effect, Skillset
 
 ENDED = "ended"
 """A variable to tell, where it matters, the steps that end a certain skill."""

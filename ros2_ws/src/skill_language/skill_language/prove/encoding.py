@@ -17,16 +17,8 @@ from dd import cudd
 from skill_language.prove.abstract import Abstraction, Breaker
 from skill_language.prove.diagrams import ENDED, Cluster, Encoded, Update, bits, broken_name, runs_name
 from skill_language.prove.limits import Deadline
-from skill_model.model import (
-    Effect,
-    Event,
-    Expression,
-    Resource,
-    ResourceIs,
-    Skill,
-    Skillset,
-    atoms,
-)
+from skill_model.expressions import Expression, ResourceIs, atoms
+from skill_model.model import Effect, Event, Resource, Skill, Skillset
 
 
 def encode(abstraction: Abstraction, copies: int, deadline: Deadline) -> Encoded:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from skill_language.errors import Diagnostic, Severity
 from skill_language.stories import NO_STORY, Story
-from skill_model.model import NOWHERE, Span
+from skill_model.span import NOWHERE, Span
 
 
 @dataclass(frozen=True)

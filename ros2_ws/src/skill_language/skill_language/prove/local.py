@@ -17,23 +17,9 @@ from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
 from skill_model.conditions import whatever_the_data
-from skill_model.model import (
-    NO_EFFECT,
-    NOWHERE,
-    TRUE,
-    DataIs,
-    Effect,
-    Event,
-    Expression,
-    Invariant,
-    ResourceIs,
-    Result,
-    ResultKind,
-    Skill,
-    Skillset,
-    Span,
-    atoms,
-)
+from skill_model.expressions import TRUE, DataIs, Expression, ResourceIs, atoms
+from skill_model.model import NO_EFFECT, Effect, Event, Invariant, Result, ResultKind, Skill, Skillset
+from skill_model.span import NOWHERE, Span
 
 EFFECT_HINT = "a change must be an arrow from the state that the resource is in, unless it is in the wanted state already"
 

@@ -1,9 +1,7 @@
 """The user's properties over the reachable situations.
 
 A run begins in the initial situation and goes on as long as any step is possible: it is infinite, or ends where nothing
-more can happen. A request that is refused and whatever else changes nothing is no step. Nothing is assumed of who takes
-the steps (a run may leave a skill running for ever, or an extern transition untaken for ever), with one exception: with
-``fair`` (`assuming termination`) only runs are looked at in which no execution runs for ever.
+more can happen. skillsets/PROOFS.md, How to read a finding, has what is assumed of runs; ``fair`` is `assuming termination`.
 
 NEVER and ALWAYS speak of single situations. EVENTUALLY and LEADS_TO are refuted by a lasso: a way to a loop (or to an
 end) that avoids what should come. A fair loop is one in which each skill either does not run somewhere, or is ended by a
@@ -21,18 +19,8 @@ from skill_language.prove.explore import Edge, Graph
 from skill_language.prove.finding import Finding
 from skill_language.prove.steps import State, World
 from skill_language.stories import Story
-from skill_model.model import (
-    And,
-    Constant,
-    Expression,
-    Implies,
-    Not,
-    Or,
-    Property,
-    PropertyKind,
-    ResourceIs,
-    SkillRuns,
-)
+from skill_model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from skill_model.model import Property, PropertyKind
 
 
 def check_property(graph: Graph, wanted: Property) -> Finding | None:

@@ -85,7 +85,8 @@ class _Search:
 
 def _from_outside(finding: Finding) -> Finding:
     """Say of a finding that it needs arrows which nothing in the model takes."""
-    hint = "nothing in the model takes the arrow that comes from outside: make it `extern`, add who takes it, or use `--closed-world`"
+    missing = "nothing in the model takes the arrow that comes from outside"
+    hint = f"{missing}: make it `extern`, add a skill or event that takes it, or use `--closed-world`"
     return replace(finding, hint=f"{finding.hint}; {hint}" if finding.hint else hint)
 
 

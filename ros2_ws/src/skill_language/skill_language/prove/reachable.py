@@ -12,7 +12,8 @@ from skill_language.prove.finding import Finding
 from skill_language.prove.local import Suspect
 from skill_language.prove.steps import Key, State
 from skill_language.stories import Story
-from skill_model.model import Skill, Skillset, Span
+from skill_model.model import Skill, Skillset
+from skill_model.span import Span
 
 MANY = 6
 """More states of one resource than this are not listed one by one."""
@@ -83,8 +84,8 @@ def dead_skill(skill: Skill) -> Finding:
 def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Story) -> Finding:
     """Return ALU523."""
     first, second = pair
-    who = f"two executions of `{first}`" if first == second else f"`{first}` and `{second}`"
-    message = f"{who} can hold `{resource}` at once: each has taken it to `{state}`"
+    holders = f"two executions of `{first}`" if first == second else f"`{first}` and `{second}`"
+    message = f"{holders} can hold `{resource}` at once: each has taken it to `{state}`"
     hint = f"let a precondition ask that `{resource}` is free, and an invariant that it is still taken"
     return Finding("ALU523", message, skillset.skill(second).span, hint=hint, story=run)
 
@@ -136,7 +137,7 @@ def _pairs(skillset: Skillset, state: State, taken: Mapping[str, Mapping[str, st
     if len(state.running) < 2:
         return
     for resource, value in zip(skillset.resources, state.resources, strict=True):
-        # In the model's order, so that a pair has one name whoever started first.
+        # In the model's order, so that a pair has one name whichever started first.
         holders = [
             skill.name
             for skill in skillset.skills

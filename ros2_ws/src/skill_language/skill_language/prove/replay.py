@@ -14,7 +14,8 @@ from skill_model import semantics
 from skill_model.conditions import judge
 from skill_model.deadlines import nanoseconds, waits
 from skill_model.execution_state import ExecutionState
-from skill_model.model import Expression, Invariant, Not, Skill
+from skill_model.expressions import Expression, Not
+from skill_model.model import Invariant, Skill
 from skill_model.situation import Change, Entered, Running, Situation, Step
 
 _KINDS: Mapping[str, StepKind] = {

@@ -11,20 +11,8 @@ import z3
 
 from skill_language.prove.limits import Deadline, OutOfTimeError
 from skill_model.arrows import origins, targets_of
-from skill_model.model import (
-    And,
-    Comparison,
-    Constant,
-    DataIs,
-    Effect,
-    Expression,
-    Implies,
-    Not,
-    Or,
-    ResourceIs,
-    SkillRuns,
-    Skillset,
-)
+from skill_model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from skill_model.model import Effect, Skillset
 from skill_model.ros_types import INTEGER_RANGES
 from skill_model.units import UNIT_IN_SI
 

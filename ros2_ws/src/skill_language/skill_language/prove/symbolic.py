@@ -19,7 +19,8 @@ from skill_language.prove.sets import Sets
 from skill_language.prove.steps import Key, World
 from skill_language.prove.walk import MOST_IN_A_LOOP, Walker
 from skill_language.stories import Story
-from skill_model.model import Constant, Property, PropertyKind, Skill, Skillset
+from skill_model.expressions import Constant
+from skill_model.model import Property, PropertyKind, Skill, Skillset
 
 
 def search(skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int) -> list[Finding]:

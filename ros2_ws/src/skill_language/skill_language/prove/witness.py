@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from skill_language.prove.limits import OutOfTimeError
 from skill_language.prove.solver import Solver
 from skill_language.stories import Path, Values
-from skill_model.model import DataIs, Expression, Invariant, Not, Skillset, atoms
+from skill_model.expressions import DataIs, Expression, Not, atoms
+from skill_model.model import Invariant, Skillset
 
 States = Mapping[str, str]
 

@@ -10,7 +10,8 @@ from skill_language.syntax.conditions import bare_condition
 from skill_language.syntax.cursor import Cursor, starts_member
 from skill_language.syntax.elements import read_changes
 from skill_language.syntax.quantities import duration, hold
-from skill_model.model import NO_EFFECT, TRUE, Assignment, Effect, Expression, Hold
+from skill_model.expressions import TRUE, Expression
+from skill_model.model import NO_EFFECT, Assignment, Effect, Hold
 
 OUTSIDE = ("resource", "event", "skill", "property")
 """What can't begin inside of a skill."""

@@ -1,9 +1,4 @@
-"""A skill of the Robot Language.
-
-Every block has a form for one entry without braces. Beyond the language of the authors: `effect { name: r -> S }` names effects
-(as the paper does), which `start`, `effect` and others may refer to; `result` is a result that says nothing about success; an
-invariant may be patient (`guard fps >= 10 for 2 s recovers at 12`), and `progress` may have a `deadline`.
-"""
+"""A skill of the Robot Language; skillsets/LANGUAGE.md, Skills and Grammar, has what goes beyond the language of the authors."""
 
 from __future__ import annotations
 
@@ -190,7 +185,7 @@ class _SkillReader(SkillReader):
         self.parts.results.append(Result(name.text, kind, effect, body.postcondition, comment, span=cursor.span(name)))
 
     def _free_name(self, stem: str) -> str:
-        """Return a name for what was written without one; `check` tells if somebody else has it."""
+        """Return a name for what was written without one; `check` tells if another element has it."""
         self._nameless[stem] += 1
         number = self._nameless[stem]
         return stem if number == 1 else f"{stem}_{number}"

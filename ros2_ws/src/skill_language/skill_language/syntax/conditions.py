@@ -14,7 +14,8 @@ from typing import NoReturn
 from skill_language.lexer import Kind, Token, string_value
 from skill_language.syntax.cursor import OPERATOR_WORDS, Cursor, SyntaxFault
 from skill_language.syntax.quantities import quantity
-from skill_model.model import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns, Span
+from skill_model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from skill_model.span import Span
 
 MAX_DEPTH = 40
 """Nesting beyond this is a mistake or an attack; it also keeps the recursion within Python's limit."""

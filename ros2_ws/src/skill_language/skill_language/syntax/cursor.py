@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from skill_language.lexer import Kind, Source, Token, tokenize
-from skill_model.model import Span
+from skill_model.span import Span
 
 
 class SyntaxFault(Exception):  # noqa: N818 - it never leaves the parser

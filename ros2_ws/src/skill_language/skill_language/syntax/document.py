@@ -16,21 +16,9 @@ from skill_language.syntax.cursor import Cursor, SyntaxFault, starts_member
 from skill_language.syntax.elements import one_or_block, read_changes, read_data, read_parameter
 from skill_language.syntax.properties import read_property
 from skill_language.syntax.resources import read_resource
-from skill_model.model import (
-    NO_EFFECT,
-    TRUE,
-    Assignment,
-    Data,
-    Effect,
-    Event,
-    Expression,
-    Parameter,
-    Property,
-    Resource,
-    Skill,
-    Skillset,
-    Span,
-)
+from skill_model.expressions import TRUE, Expression
+from skill_model.model import NO_EFFECT, Assignment, Data, Effect, Event, Parameter, Property, Resource, Skill, Skillset
+from skill_model.span import Span
 
 MEMBERS = ("use", "type", "parameter", "data", "resource", "event", "skill", "property")
 _TOP = ("skillset", "type")

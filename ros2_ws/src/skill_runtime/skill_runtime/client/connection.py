@@ -1,4 +1,4 @@
-"""Whether the managers of a skillset can be called: who they are, that they live, and that nothing sent would be lost."""
+"""Whether the managers of a skillset can be called: which they are, that they live, and that nothing sent would be lost."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ class GoalTracker:
         if self.handle.done:
             return
         if self._acknowledged:
-            # What was told of it may have got lost; who does not know the goal says so.
+            # What was told of it may have got lost; managers that do not know the goal say so.
             self.link.ask_ending(self.handle.id)
             self._timer = self._middleware.later(SILENCE_S, self._look)
             return

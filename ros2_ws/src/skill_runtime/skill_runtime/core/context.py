@@ -177,7 +177,7 @@ class ExecutionContext:
 
 
 def _set_state(execution: Execution, entered: Entered) -> None:
-    """Write the state last: who sees that the execution has ended sees why."""
+    """Write the state last: a reader that sees the end of the execution sees its reason."""
     execution.result = entered.result
     execution.message = entered.message
     execution.state = entered.state

@@ -1,4 +1,4 @@
-"""What an engine tells its listener, and how it is written down: one record for files, reports and everybody who listens."""
+"""What an engine tells its listener, and how it is written down: one record for files, reports and all listeners."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class HookCaller(Protocol):
     def call(self, execution: Execution, hook: str, then: Then) -> None:
         """Call a hook of the execution's skill; ``then`` gets the answer, once, in this call or later, from any thread.
 
-        Never raises. Who can't reach the hook any more answers with an error.
+        Never raises. A hook that can't be reached any more is answered with an error.
         """
         ...
 

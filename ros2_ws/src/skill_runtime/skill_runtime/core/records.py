@@ -1,4 +1,4 @@
-"""What has happened, for those who ask later: each skill's executions, each resource's last transitions."""
+"""What has happened, for later questions: each skill's executions, each resource's last transitions."""
 
 from __future__ import annotations
 

@@ -10,7 +10,8 @@ from skill_model import semantics
 from skill_model.conditions import Data, States, judge, present, value_of
 from skill_model.effects import effect_changes
 from skill_model.errors import EffectError
-from skill_model.model import DataIs, Expression, ResourceIs, Skill, Skillset, atoms
+from skill_model.expressions import DataIs, Expression, ResourceIs, atoms
+from skill_model.model import Skill, Skillset
 from skill_model.situation import Entered, Running, Situation
 from skill_runtime.core.events import TransitionEvent
 

@@ -22,7 +22,7 @@ from skill_runtime.workers import Workers
 AGAIN_S = 0.1
 """How often an engine that is not there is looked for, wall clock."""
 REPLY_S = 10.0
-"""Who has no reply for so long takes it for a no."""
+"""How long a hook waits for the engine's reply, wall clock; no reply by then counts as a refusal."""
 ENDED_KEPT = 100
 STOPS = frozenset({"on_violation", "on_failure"})
 

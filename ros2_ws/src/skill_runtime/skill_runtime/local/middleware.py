@@ -28,7 +28,7 @@ Run = Callable[[Callable[[], bool], float], bool]
 
 @dataclass
 class VirtualTopic:
-    """The values that are kept for late subscribers, and who has subscribed."""
+    """The values that are kept for late subscribers, and the subscribers."""
 
     values: deque[Any] = field(default_factory=deque)
     subscribers: list[OnValue] = field(default_factory=list)
@@ -146,7 +146,7 @@ class VirtualMiddleware:
             return
         try:
             job()
-        except Exception as error:  # noqa: BLE001 - handed over to who has to deal with it
+        except Exception as error:  # noqa: BLE001 - the managers report it
             self._on_raise(error)
 
     def log(self, error: str) -> None:
@@ -218,7 +218,7 @@ class VirtualMiddleware:
     # --- life --------------------------------------------------------------------------------------------------------
 
     def announce(self, life: str, on_rival: OnError) -> None:  # noqa: ARG002 - a world refuses rivals itself
-        """Tell all who watch that these managers live."""
+        """Tell all watchers that these managers live."""
         self._served.life = life
         for on_sign, _ in self.bus.watchers.get(self.skillset, ()):
             self.bus.send(functools.partial(on_sign, life, 0))

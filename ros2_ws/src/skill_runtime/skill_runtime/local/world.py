@@ -67,7 +67,7 @@ class LocalWorld:
         """All errors that no execution could carry."""
         return [error for managers in self.managers.values() for error in managers.errors]
 
-    # --- who is there ------------------------------------------------------------------------------------------------
+    # --- managers and clients ----------------------------------------------------------------------------------------
 
     def serve(self, skillset: Skillset, make_hooks: HooksFactory | Mapping[str, SkillHooks]) -> LocalManagers:
         """Start the managers of a skillset; clients of that name find them.

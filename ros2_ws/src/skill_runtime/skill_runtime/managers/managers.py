@@ -35,7 +35,7 @@ class Managers:
     Args:
         middleware: serves them.
         skillset: the model.
-        hooks: one a skill, or who calls them elsewhere.
+        hooks: one a skill, or what calls them in other processes.
         bindings: where each data comes from; None: nowhere but by ``data.receive``.
         make_inputs: by default the hooks' own ``make_inputs``; the plain values where the hooks are elsewhere.
         interrupt_timeout_s: how long a stop may take where the model does not say.
@@ -89,7 +89,7 @@ class Managers:
         self.resources.serve()
         servers = {name: manager.serve() for name, manager in self.skills.items()}
         Questions(middleware, self.engine, servers, make)
-        # The sign of life comes last: who hears it finds everything there.
+        # The sign of life comes last: a client that hears it finds everything there.
         middleware.announce(self.life, on_rival or self._on_rival)
 
     def close(self, reason: str) -> None:
@@ -101,7 +101,7 @@ class Managers:
         self._events.flush(FLUSH_S)
 
     def _on_events(self, events: Sequence[EngineEvent]) -> None:
-        """Pass on one step: resources before events before results, so that who sees a result sees its effects."""
+        """Pass on one step: resources before events before results, so that a client that sees a result sees its effects."""
         for on_step in self.on_step:
             on_step(events)
         self.resources.on_events(events)

@@ -1,4 +1,4 @@
-"""``skill_states``: every skill's open executions and its last result, latched, so that who joins late learns them."""
+"""``skill_states``: every skill's open executions and its last result, latched for late subscribers."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class Rule:
 
     ``call`` counts from 1, ``when`` is about the inputs, ``chance`` is a probability; all that are given must hold. ``progress`` is
     a formula of ``t`` (seconds since the start) and ``f`` (part of the delay, 0 to 1), or points (f, value). ``moves`` says where
-    parts of the memory get to, little by little; who is stopped half-way leaves them half-way.
+    parts of the memory get to, little by little; a skill that is stopped half-way leaves them half-way.
     """
 
     call: int | None = None

@@ -30,7 +30,7 @@ UUID_BYTES = 16
 RESULTS_KEPT_S = 900
 """How long after an execution's end (mission clock) its result can be asked for: rclpy's own default, whatever rcl's is."""
 GOAL_S = 60.0
-"""How long a goal is offered to managers that don't answer; who has offered it gives up before."""
+"""How long a goal is offered to managers that don't answer; the client gives up before."""
 _FEEDBACK_FIELDS = ("progress", "state")
 _RESULT_FIELDS = ("outcome", "result", "message")
 
@@ -179,7 +179,7 @@ class RclpyLink:
 
         def answered(response: Any, tries: int) -> None:
             self._offers.pop(goal_id, None)
-            # Who is offered a goal twice refuses the second offer; the first may have been taken.
+            # Managers that are offered a goal twice refuse the second offer; the first may have been taken.
             if response.accepted or tries == 1:
                 on_answer(bool(response.accepted))
 
@@ -200,7 +200,7 @@ class RclpyLink:
         self._cancels.call(CancelGoal.Request(), counted, on_error, timeout_s=CALL_S, once=False)
 
     def ask_ending(self, goal_id: str) -> None:
-        """Ask for a goal's result; who does not know the goal answers at once."""
+        """Ask for a goal's result; managers that do not know the goal answer at once."""
         identifier = self._goals.get(goal_id)
         if identifier is None:
             return
@@ -237,7 +237,7 @@ def _outputs(message: Any, others: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _nothing(reason: str) -> None:
-    """Leave it to who waits: the goal is given up elsewhere."""
+    """Do nothing: the goal's own time-outs give it up."""
 
 
 def _unexpected(handle: Any) -> Any:

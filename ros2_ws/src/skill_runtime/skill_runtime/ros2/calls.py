@@ -1,6 +1,6 @@
 """Calls of one service that end, whatever DDS loses.
 
-A DDS service may answer before it has discovered who asked: the answer is lost (rclpy 7.1.6 then warns of a "client [that] will not
+A DDS service may answer before it has discovered the client: the answer is lost (rclpy 7.1.6 then warns of a "client [that] will not
 receive response"). And a burst of requests that is longer than the queue at its end is cut. So no more than a window of requests is
 under way at a time, each is asked again after a while without an answer, and given up after its time. The graph does not tell of every
 end that is there (rmw_fastrtps, issue 792): after a while without being told of a service, one request is sent all the same.

@@ -70,7 +70,7 @@ class ServiceCaller:
         try:
             reply, error = answer.get(timeout=timeout_s + _PATIENCE_S)
         except queue.Empty:
-            raise ServiceCallError(f"{client.srv_name}: nobody spins the node") from None
+            raise ServiceCallError(f"{client.srv_name}: the node is not spun") from None
         if error:
             raise ServiceCallError(error)
         return reply

@@ -105,7 +105,7 @@ class RclpyMiddleware(RclpyBase):
             fields = {name: getattr(request, name) for name in codec.fields}
             handler(fields, functools.partial(reply, header))
             if service == "describe":
-                # Who asks may have given these managers up before this answer comes, and DDS tells of no change.
+                # The client may have given these managers up before this answer comes, and DDS tells of no change.
                 self._give_sign()
 
         # What rclpy takes for the sending of the callback's return value is where the request is dealt with.
@@ -180,7 +180,7 @@ class RclpyMiddleware(RclpyBase):
             if info.alive_count_change < 0 or info.not_alive_count_change > 0:
                 on_doubt()
             elif info.alive_count_change > 0 and last:
-                # Those who were heard last, perhaps: it may be others that live, whose name comes in a moment.
+                # Perhaps the managers that were heard last: it may be others that live, whose name comes in a moment.
                 on_sign(last[0], 0)
 
         self.node.create_subscription(
@@ -205,7 +205,7 @@ class RclpyPublisher:
         self._publisher.publish(self._encode(value))
 
     def flush(self, timeout_s: float) -> None:
-        """Wait (wall clock) until all who listen have all messages."""
+        """Wait (wall clock) until all subscribers have all messages."""
         self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
 

@@ -129,7 +129,7 @@ def _interfaces(skillset: Skillset) -> ModuleType:
         return importlib.import_module(f"{skillset.name}_interfaces.action")
     except ModuleNotFoundError as error:
         raise MockRequestError(
-            f"{error.name} is not built, and without it nobody could call {skillset.name};"
+            f"{error.name} is not built, and without it no client can call {skillset.name};"
             " put the robot's folder into skillsets/ and run ./alula setup"
         ) from None
 

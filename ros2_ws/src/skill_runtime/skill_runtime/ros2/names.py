@@ -15,7 +15,7 @@ LIVELINESS_LEASE_S = 2.0
 
 
 def latched(depth: int) -> QoSProfile:
-    """Return the quality of topics that keep their last messages for who subscribes late."""
+    """Return the quality of topics that keep their last messages for late subscribers."""
     return QoSProfile(
         depth=depth, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
     )

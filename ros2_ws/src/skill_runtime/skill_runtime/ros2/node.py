@@ -28,7 +28,7 @@ class SkillsetNode(Node):  # type: ignore[misc]  # rclpy has no types
     Args:
         skillset: the model.
         interfaces: the generated package ``<skillset>_interfaces``, or its module ``action``.
-        hooks: makes the hooks, one a skill, with this node at hand; or who calls them elsewhere.
+        hooks: makes the hooks, one a skill, with this node at hand; or what calls them in other processes.
         data_bindings: where each data of the model comes from; by default the generated ``<skillset>_managers.model.DATA_TOPICS``.
         on_rival: called with the reason when managers of this skillset are there already; by default these close.
         node_options: passed on to ``rclpy.node.Node`` (``namespace``, ``parameter_overrides``, ``context``).

@@ -93,7 +93,7 @@ class Part:
         with self._lock:
             if self._over.is_set():
                 return 0
-            # A group of its own: who ends the whole group of this process ends the parts through it, in order.
+            # A group of its own: a signal to the whole group of this process ends the parts through it, in order.
             self._process = subprocess.Popen([*self._command, "--parent", str(os.getpid())], start_new_session=True)
         code = self._process.wait()
         with self._lock:

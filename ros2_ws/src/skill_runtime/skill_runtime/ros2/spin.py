@@ -136,7 +136,7 @@ def make_part(
     if part != RESOURCES:
         return HooksNode(skillset, part, hooks_factory, address)
     hooks = RemoteHooks(skillset, address, get_logger(skillset.name).error)
-    # Who finds the skillset can call all of it.
+    # A client that finds the skillset can call all of it.
     while hooks.wait(PROCESSES_S):
         if stop.is_set():
             return None

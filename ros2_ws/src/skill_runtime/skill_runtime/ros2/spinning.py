@@ -104,4 +104,4 @@ class _Pulse:
             self._asked_s = now_s
             executor.create_task(self._felt.set)
         elif now_s - self._asked_s > PULSE_S:
-            raise CannotWaitError(f"nobody has spun the node's executor for {PULSE_S:g} s; nothing arrives any more")
+            raise CannotWaitError(f"the node's executor was not spun for {PULSE_S:g} s; nothing arrives any more")
