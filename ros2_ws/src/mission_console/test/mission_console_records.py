@@ -108,6 +108,27 @@ def lost_video() -> Story:
     ]
 
 
+def overtaken() -> tuple[Story, dict[str, Any]]:
+    """Return the entries and the summary of a lost video whose loss was noticed early; the autopilot takes the vehicle from the hover."""
+    start = LIFT_OFF_S
+    lost = "keep_sdk_authority: SDK_authority is UNAVAILABLE, after SDK_authority AVAILABLE -> UNAVAILABLE (extern)"
+    guided = {"skillset": "navigation", "data": "guidance_state", "stamp_s": 0.0}
+    kept = [entry for entry in lost_video() if entry[2].get("state") != "FAILED" and entry[2].get("data") != "guidance_state"]
+    more: Story = [
+        *[(start + t_s, "/data", {**guided, "value": {"mode": mode}}) for t_s, mode in ((2.0, "GUIDED"), (44.4, "GUIDED"), (45.4, "RTL"))],
+        (start + 41, EVENTS, transition("video.link", "UP", "DOWN")),
+        (start + 45, EVENTS, execution("navigation.hover", "RESOURCE_INVARIANT_VIOLATED", 4, result="keep_sdk_authority", message=lost)),
+    ]
+    answer = {
+        "sensor": "ground_station", "mode": "killed", "t_s": 40.0, "until_s": None,
+        "detected_s": 41.0, "detected_by": "video.link UP -> DOWN",
+        "failed": ["stream", "hover", "land"], "answered_by": "the video was lost", "skill": "navigation.hover", "after_s": 3.04,
+    }  # fmt: skip
+    recovery = {"failure_s": 40.0, "detected_s": 41.0, "fallback_running_s": 43.04, "moving_again_s": None}
+    summary = {"outcome": "given_up", "reason": "", "landed": True, "collisions": 0, "recovery": recovery, "answers": [answer]}
+    return sorted([*kept, *more], key=lambda entry: entry[0]), {**summary, "lift_off": {"stamp_s": start, "source": "simulator"}}
+
+
 def write_record(folder: Path, story: Story, *, over: bool = True) -> RecordWriter:
     """Write a story's record; ``over`` also ends the file."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -10,6 +10,8 @@ from mission_console_records import LIFT_OFF_S, Story, failing_story, write_reco
 
 from mission_console.page import REPORT, write_report
 
+OTHER_RECORDINGS = ("/fault", "/path")
+"""Topics of the page that the record of the mission does not hold."""
 SUMMARY = {
     "outcome": "degraded", "reason": "the ZED broke", "landed": True, "duration_s": 60.0, "distance_m": 60.0, "collisions": 0,
     "recovery": {"failure_s": 29.9, "detected_s": 30.0, "fallback_running_s": 30.5, "moving_again_s": 34.0},
@@ -30,8 +32,8 @@ def make_report(folder: Path, story: Story | None = None, *, world: str = "yard.
 
 def make_story_report(folder: Path, story: Story, summary: dict[str, Any]) -> str:
     """Write the report of a story: the record, and what other recordings tell."""
-    told = [entry for entry in story if entry[1] == "/fault"]
-    write_record(folder, [entry for entry in story if entry[1] != "/fault"])
+    told = [entry for entry in story if entry[1] in OTHER_RECORDINGS]
+    write_record(folder, [entry for entry in story if entry[1] not in OTHER_RECORDINGS])
     (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     (folder / "run.json").write_text(json.dumps({"scenario": "inspection", "seed": 1, "world": ""}), encoding="utf-8")
     write_report(folder, [(topic, t_s, value) for t_s, topic, value in told], title="inspection")

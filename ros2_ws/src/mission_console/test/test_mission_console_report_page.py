@@ -105,7 +105,7 @@ def test_pictures_and_the_figures_of_the_video_move_with_the_slider(browser: Any
     assert page.run("document.querySelectorAll('#pictures img[src]').length") == 0
     page.choose(10.5)
     assert page.text("#pictures figcaption b").startswith("10.0 s | 10.0 s")
-    assert "17 1/s, 0.93 SSIM, 1200 kbit/s, 0.21 s delay, 1.5 % lost" in page.text("#pictures .hint")
+    assert "17 frames/s, 0.93 SSIM, 1200 kbit/s, 0.21 s delay, 1.5 % lost" in page.text("#pictures .hint")
     page.wait("document.querySelector('#pictures img').naturalWidth === 300")
     early = page.run("document.querySelector('#pictures img').src")
     page.choose(19.9)
@@ -158,7 +158,7 @@ def test_what_follows_from_one_failure_is_one_row_with_what_the_autopilot_did(br
     )
     assert rows[0][3] == "noticed after 3.00 s"
     assert rows[1][2:] == ["mission given up; landed", "8 of 10 waypoints were not reached; nothing was hit"]
-    assert "enough_frames was violated: picture.fps_margin is -6 (fps is 6 1/s below its limit) for 1 s." in page.text("#lines")
+    assert "enough_frames was violated: frames per second: 6 below the limit for 1 s." in page.text("#lines")
     assert "navigation.land could not start, its precondition sdk_authority was not met: SDK_authority" in page.text("#lines")
     assert "57.00 sLanded." in page.text("#lines li")
     assert page.text(".chain li").startswith("before40.00 sground station failed (killed, injected) | measurement43.00 s")

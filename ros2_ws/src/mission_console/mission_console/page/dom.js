@@ -51,6 +51,6 @@ function shown(value) {
 
 /** The unit that a field's name ends with, as the project names them. */
 function unitOf(name) {
-  const units = [["_m_s", "m/s"], ["_rad", "rad"], ["_ms", "ms"], ["_hz", "Hz"], ["_bps", "bit/s"], ["_s", "s"], ["_m", "m"], ["fps", "1/s"], ["fps_margin", "1/s"]];
+  const units = [["_m_s", "m/s"], ["_rad", "rad"], ["_ms", "ms"], ["_hz", "Hz"], ["_bps", "bit/s"], ["_s", "s"], ["_m", "m"], ["fps", "frames/s"], ["fps_margin", "frames/s"]];
   return (units.find(([ending]) => name.endsWith(ending)) ?? ["", ""])[1];
 }

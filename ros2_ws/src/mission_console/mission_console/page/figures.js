@@ -2,7 +2,7 @@
 
 const PREFERRED = [/guidance_state\.distance_to_go_m$/, /guidance_state\.obstacle_m$/, /_obstacle\.distance_m$/, /picture\.fps$/, /picture\.quality$/, /picture\.delay_s$/, /mapping_state\.points$/, /mapping_state\.uncertainty_m$/];
 const MAX_CHARTS = 9;
-const CHART = { width: 320, height: 96, left: 40, bottom: 16 };
+const CHART = { width: 320, height: 96, left: 58, bottom: 16 };
 
 class FiguresView {
   constructor(choose) {
@@ -87,9 +87,8 @@ class FiguresView {
     const { t, v, unit } = this.series(name);
     if (chart.end !== this.end || chart.first !== t[0]) this.curve(chart, t, v, unit);
     [chart.end, chart.first] = [this.end, t[0]];
-    const index = indexAt(t, this.t);
-    const value = index < 0 ? null : v[index];
-    setText(chart.value, typeof value === "number" ? `${short(Number(fixed(value, 2)))} ${unit}` : "–");
+    const { value, since } = readingAt(t, v, this.t);
+    setText(chart.value, typeof value === "number" ? `${short(Number(fixed(value, 2)))} ${unit}` : since === null ? "–" : `no data since ${seconds(since - origin(this.run))}`);
     const x = this.x(this.t);
     chart.cursor.setAttribute("x1", x);
     chart.cursor.setAttribute("x2", x);
@@ -108,9 +107,9 @@ class FiguresView {
     const step = Math.max(1, Math.floor(t.length / 900));
     let drawn = "";
     let open = false;
-    for (let index = 0; index < t.length; index += step) {
-      if (typeof v[index] !== "number") open = false;
-      else {
+    for (let index = 0; index < t.length; index += 1) {
+      if (typeof v[index] !== "number" || t[index] - t[index - 1] > STALE_S) open = false;
+      if (typeof v[index] === "number" && (!open || index % step === 0 || typeof v[index + 1] !== "number" || t[index + 1] - t[index] > STALE_S)) {
         drawn += `${open ? "L" : "M"}${this.x(t[index]).toFixed(1)} ${y(v[index]).toFixed(1)}`;
         open = true;
       }

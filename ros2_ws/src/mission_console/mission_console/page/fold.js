@@ -68,7 +68,7 @@ const FOLDERS = {
     const before = last(run.mission.v);
     push(run.mission, t, value);
     if (value.lift_off_s != null) run.departure = value.lift_off_s;
-    if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.reason ? `: ${value.reason}` : ""}`);
+    if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.reason ? `: ${reasonInWords(value.reason)}` : ""}`);
   },
   "/ticks": (run, t, { unmet, conditions }) => {
     const known = Array.isArray(conditions) ? conditions.map(([needed, otherwise]) => [String(needed), String(otherwise ?? "")]) : sentences(unmet).map((sentence) => ["", sentence]);
@@ -163,8 +163,8 @@ function foldExecution(run, t, value) {
   if (value.state === "RUNNING") moment(run, t, "skill", `${value.skillset}.${value.skill} runs`);
   else if (TERMINAL.has(value.state)) {
     const ending = endingOf(execution);
-    const why = value.message ? `: ${value.message}` : "";
-    moment(run, t, "skill", `${value.skillset}.${value.skill} ${ENDINGS[ending].words}${value.result && !why ? ` (${value.result})` : ""}${why}`, ending === "violated" || ending === "failure");
+    const why = inWords((value.message || "").replace(`${value.result}: `, ""));
+    moment(run, t, "skill", `${value.skillset}.${value.skill} ${ENDINGS[ending].words}${why ? `: ${why}` : ""}${value.result ? ` (${value.result})` : ""}`, ending === "violated" || ending === "failure");
   }
 }
 
@@ -184,14 +184,42 @@ function foldData(run, t, { skillset, data, value }) {
   const name = `${skillset}.${data}`;
   if (!run.data.has(name)) run.data.set(name, { t: [], columns: new Map() });
   const samples = run.data.get(name);
+  const repeated = repeatedIn(value);
   samples.t.push(Math.max(t, last(samples.t) ?? t));
   for (const [field, leaf] of leaves(value, "")) {
     if (!samples.columns.has(field)) samples.columns.set(field, new Array(samples.t.length - 1).fill(null));
-    samples.columns.get(field).push(leaf);
+    const column = samples.columns.get(field);
+    column.push(repeated(field, leaf) ? repeatOf(column, samples.t) : leaf);
   }
   for (const column of samples.columns.values()) if (column.length < samples.t.length) column.push(null);
   const place = value?.position_enu_m;
   if (place && !run.told && [place.x, place.y, place.z].every(Number.isFinite)) push(run.path, t, [place.x, place.y, place.z]);
+}
+
+const OF_FRAMES = new Set(["quality", "quality_margin", "delay_s", "loss", "received_bps"]);
+
+/** Which fields of a message repeat an old measurement: of a video that is not sent every number, of one without frames those of frames. */
+function repeatedIn(value) {
+  if (value?.streaming === false) return (field, leaf) => typeof leaf === "number";
+  return value?.fps === 0 ? (field) => OF_FRAMES.has(field) : () => false;
+}
+
+/** What stands in a column instead of a repeated number: {since}, when it was measured last; null: never. */
+function repeatOf(column, times) {
+  const before = last(column);
+  if (before?.since !== undefined) return before;
+  return { since: typeof before === "number" ? times[column.length - 1] : null };
+}
+
+const STALE_S = 2.5; // the slowest data come every two seconds
+
+/** What a column held at t, {value, since}: a value that is too old, or that repeats an old one, is null, and `since` its moment. */
+function readingAt(times, column, t) {
+  const index = indexAt(times, t);
+  if (index < 0) return { value: null, since: null };
+  const value = column[index];
+  if (value?.since !== undefined) return { value: null, since: value.since };
+  return t - times[index] <= STALE_S ? { value, since: null } : { value: null, since: times[index] };
 }
 
 /** Numbers, words and truths in a value, by path; message headers say nothing to people. */
@@ -243,3 +271,18 @@ function nodeAt(node, t) {
 const sentences = (list) => (Array.isArray(list) ? list.map(String) : []);
 
 const words = (text) => String(text ?? "").replaceAll("_", " ").toLowerCase();
+
+const MEASURES = { fps: "frames per second", quality: "picture quality (SSIM)" };
+
+/** A message with its negative margins in words: of "picture.fps_margin is -6.0" "frames per second: 6.0 below the limit". */
+function inWords(text) {
+  return text.replace(/(?:\w+\.)*(\w+)_margin is -([\d.]+)/g, (all, name, number) => {
+    const unit = MEASURES[name] ? "" : unitOf(name);
+    return `${MEASURES[name] ?? words(name.replace(/_(m|s|m_s|rad)$/, ""))}: ${number}${unit ? ` ${unit}` : ""} below the limit`;
+  });
+}
+
+/** The mission's reason with the words first: "a.b: CODE name (why)" as "a.b: why (code name)". */
+function reasonInWords(text) {
+  return inWords(text).replace(/(\w+\.\w+): ([A-Z_]+)((?: \w+)?) \(((?:[^()]|\([^()]*\))*)\)/g, (all, skill, code, name, why) => `${skill}: ${why} (${words(code)}${name})`);
+}

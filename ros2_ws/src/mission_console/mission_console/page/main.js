@@ -2,11 +2,13 @@
 
 const run = newRun();
 let cursor = null; // the moment that was chosen; null: the last one, whatever comes
+let picked = null; // the event that was chosen, of several at one moment
 let playing = null;
 let drawn = false;
 
 const moment_ = () => cursor ?? run.end ?? 0;
-const choose = (t) => {
+const choose = (t, event = null) => {
+  picked = event;
   cursor = t === null || (run.end !== null && t >= run.end - 0.01) ? null : Math.max(t, run.begin ?? 0);
   draw();
 };
@@ -73,8 +75,19 @@ function showScrub(t) {
   setText(byId("now"), seconds(t - zero));
   setText(byId("latest"), live.on ? "now" : "end");
   byId("latest").setAttribute("aria-pressed", String(cursor === null));
-  const before = momentsUpTo(t);
-  setText(byId("at"), before > 0 ? `${seconds(run.moments[before - 1].t - zero, 2)}  ${run.moments[before - 1].text}` : "before the first event");
+  const entry = run.moments[currentEvent(t)];
+  const together = entry ? run.moments.filter((other) => sameMoment(other, entry)) : [];
+  const which = together.length > 1 ? ` (${together.indexOf(entry) + 1} of ${together.length})` : "";
+  setText(byId("at"), entry ? `${seconds(entry.t - zero, 2)}${which}  ${entry.text}` : "before the first event");
+  byId("at").title = entry?.text ?? "";
+}
+
+const sameMoment = (one, other) => Math.abs(one.t - other.t) < 0.005; // they show the same time
+
+/** Index of the event that is shown: the chosen one while its moment is, else the last that is not after t; -1 before the first. */
+function currentEvent(t) {
+  const index = picked && Math.abs(picked.t - t) <= 0.01 ? run.moments.indexOf(picked) : -1;
+  return index >= 0 ? index : momentsUpTo(t) - 1;
 }
 
 /** How many moments are not after t. */
@@ -85,14 +98,14 @@ function momentsUpTo(t) {
 const SHOWN_MOMENTS = 400;
 
 function showMoments(t) {
-  const upTo = momentsUpTo(t);
+  const upTo = currentEvent(t) + 1;
   const body = byId("moments").querySelector("tbody");
   const first = Math.max(0, Math.min(upTo - SHOWN_MOMENTS / 2, run.moments.length - SHOWN_MOMENTS));
   const zero = origin(run);
   const key = `${run.moments.length} ${first} ${zero}`;
   if (body.shown !== key) {
     body.shown = key;
-    body.replaceChildren(...run.moments.slice(first, first + SHOWN_MOMENTS).map((entry) => el("tr", { class: entry.bad ? "bad" : "", onclick: () => choose(entry.t) }, el("td", {}, el("button", { type: "button" }, seconds(entry.t - zero, 2))), el("td", {}, entry.kind), el("td", {}, entry.text))));
+    body.replaceChildren(...run.moments.slice(first, first + SHOWN_MOMENTS).map((entry) => el("tr", { class: entry.bad ? "bad" : "", onclick: () => choose(entry.t, entry) }, el("td", {}, el("button", { type: "button" }, seconds(entry.t - zero, 2))), el("td", {}, entry.kind), el("td", {}, entry.text))));
     body.current = null;
   }
   if (body.current === upTo) return;
@@ -108,29 +121,45 @@ function showMoments(t) {
 
 // --- choosing a moment -------------------------------------------------------------------------------------------------
 
-/** Goes to the nearest event before (-1) or after (+1) the moment. */
+/** Goes to the event before (-1) or after (+1) the one that is shown; of several at one moment to each. */
 function step(direction) {
   const t = moment_();
-  const times = run.moments.map((entry) => entry.t);
-  const index = direction > 0 ? indexAt(times, t + 1e-6) + 1 : indexAt(times, t - 1e-6);
-  if (times[index] !== undefined) choose(times[index]);
+  const index = currentEvent(t);
+  const between = index >= 0 && run.moments[index].t < t - 0.01;
+  const entry = run.moments[direction > 0 ? index + 1 : between ? index : index - 1];
+  if (entry) choose(entry.t, entry);
 }
 
 const PLAY_SPEED = 5;
 
+/** Sets what runs the playing, null to hold it, and what its button says. */
+function setPlaying(request) {
+  playing = request;
+  const pressed = String(request !== null);
+  if (byId("play").getAttribute("aria-pressed") === pressed) return;
+  byId("play").setAttribute("aria-pressed", pressed);
+  const label = request === null ? `play, ${PLAY_SPEED} times as fast as it was` : "pause";
+  byId("play").setAttribute("aria-label", label);
+  byId("play").title = `${label} (space)`;
+}
+
+setText(byId("speed"), `${PLAY_SPEED}×`);
+setPlaying(null);
+
 function play() {
-  if (playing !== null) cancelAnimationFrame(playing);
-  byId("play").setAttribute("aria-pressed", String(playing === null));
-  if (playing !== null) return void (playing = null);
+  if (playing !== null) {
+    cancelAnimationFrame(playing);
+    return setPlaying(null);
+  }
   if (cursor === null) cursor = run.begin;
   let before = performance.now();
   const advance = (now) => {
-    if (cursor === null) return void (playing = null, byId("play").setAttribute("aria-pressed", "false"));
+    if (cursor === null) return setPlaying(null);
     choose(cursor + (PLAY_SPEED * (now - before)) / 1000);
     before = now;
-    playing = requestAnimationFrame(advance);
+    setPlaying(requestAnimationFrame(advance));
   };
-  playing = requestAnimationFrame(advance);
+  return setPlaying(requestAnimationFrame(advance));
 }
 
 byId("slider").addEventListener("input", (event) => choose(Number(event.target.value) + origin(run)));
@@ -253,7 +282,7 @@ class Link {
 /** Forgets what was folded: the server has restarted, or another run is shown. */
 function clear() {
   Object.assign(run, newRun());
-  cursor = null;
+  [cursor, picked] = [null, null];
   showStory.news = "";
   for (const view of views) view.news = -1;
 }

@@ -32,7 +32,8 @@ class MapView {
     }).observe(this.canvas);
     const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
     const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
-    byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
+    const place = (letter) => svg("svg", { width: 16, height: 16 }, svg("circle", { cx: 8, cy: 8, r: 7, fill: "var(--card)", stroke: "var(--ink)", "stroke-width": 1.5 }), svg("text", { x: 8, y: 12, "text-anchor": "middle", "font-size": 10, "font-weight": 700, fill: "var(--ink)" }, letter));
+    byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [place("H"), "home: where it lifted off"], [place("L"), "where it landed"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
   }
 
   turn(view) {
@@ -289,8 +290,13 @@ class MapView {
       pen.strokeText(entry.label, u + 10, v - 8);
       pen.fillText(entry.label, u + 10, v - 8);
     }
+    const { home, landed } = places(this.run);
+    const both = home && landed && Math.hypot(home[0] - landed[0], home[1] - landed[1]) <= AT_PLACE_M;
+    if (home) this.sign(pen, home, "H", both ? "home, landed here" : "home");
+    if (landed && !both) this.sign(pen, landed, "L", "landed");
     if (index < 0) return;
     const here = path.v[index];
+    if (this.t - path.t[index] > STALE_S) pen.globalAlpha = 0.4;
     const ahead = this.obstacle();
     if (ahead) {
       this.line(pen, [here, ahead.place], "--bad", 2, [3, 3]);
@@ -298,6 +304,26 @@ class MapView {
     }
     if (this.view.pitch !== ABOVE.pitch) this.line(pen, [here, [here[0], here[1], 0]], "--place", 1, [2, 2]);
     this.dot(pen, here, "--place", 6);
+    pen.globalAlpha = 1;
+  }
+
+  /** A letter in a ring, with a word below it. */
+  sign(pen, place, letter, text) {
+    const [u, v] = this.project(...place);
+    [pen.strokeStyle, pen.fillStyle, pen.lineWidth, pen.textAlign] = [this.colour("--ink"), this.colour("--card"), 1.5, "center"];
+    pen.beginPath();
+    pen.arc(u, v, 9, 0, 2 * Math.PI);
+    pen.fill();
+    pen.stroke();
+    [pen.fillStyle, pen.strokeStyle, pen.lineWidth] = [this.colour("--ink"), this.colour("--card"), 3];
+    pen.font = "700 12px system-ui, sans-serif";
+    pen.fillText(letter, u, v + 4);
+    pen.font = "11px system-ui, sans-serif";
+    const half = pen.measureText(text).width / 2 + 2;
+    const x = Math.max(half, Math.min(u, this.size[0] - half));
+    pen.strokeText(text, x, v + 22);
+    pen.fillText(text, x, v + 22);
+    pen.textAlign = "start";
   }
 
   /** The obstacle that a sensor sees ahead at the moment: its place and distance. */
@@ -317,8 +343,11 @@ class MapView {
     const index = indexAt(path.t, this.t);
     const map = this.run.facts["/map"];
     const ahead = this.obstacle();
-    const parts = [index < 0 ? "Nothing is recorded of the vehicle's place." : `Vehicle at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
+    const old = index >= 0 && this.t - path.t[index] > STALE_S ? `No position since ${seconds(path.t[index] - origin(this.run))}; the last one: ` : "";
+    const parts = [index < 0 ? "Nothing is recorded of the vehicle's place." : `${old}Vehicle at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
     if (ahead) parts.push(`Obstacle ${Number.isFinite(ahead.distance) ? `${fixed(ahead.distance, 1)} m ` : ""}ahead (${ahead.name}).`);
+    const [landed, where] = [landing(this.run), landedWhere(this.run)];
+    if (where && this.t >= landed) parts.push(`Landed ${where}.`);
     const place = index < 0 ? null : path.v[index];
     const { radio = [], fence } = this.run.facts["/areas"] ?? {};
     const zone = place && radio.find((one) => holds(one, place)); // the first that is listed counts

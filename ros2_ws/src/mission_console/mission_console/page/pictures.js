@@ -1,7 +1,7 @@
 // What the cameras showed at the moment: the depth image, and the inspection's video as it was received, with its figures.
 
 const CAMERAS = { depth: "depth camera: near is yellow, 20 m and more violet, black was not measured", screen: "the telepilot's screen: the video as it was received" };
-const SCREEN_FIGURES = [["fps", "1/s", 0], ["quality", "SSIM", 2], ["bit_rate_bps", "kbit/s", 0, 1e-3], ["delay_s", "s delay", 2], ["loss", "% lost", 1, 100]];
+const SCREEN_FIGURES = [["fps", "frame rate", "frames/s", 0], ["quality", "quality", "SSIM", 2], ["bit_rate_bps", "bit rate", "kbit/s", 0, 1e-3], ["delay_s", "delay", "s delay", 2], ["loss", "loss", "% lost", 1, 100]];
 const OLD_S = 3;
 
 class PicturesView {
@@ -42,14 +42,19 @@ class PicturesView {
     figure.image.alt = `${CAMERAS[camera] ?? camera}; picture of ${said}. ${numbers}`;
   }
 
-  /** The figures of the received video at the moment. */
+  /** The figures of the received video at the moment, and since when some of them have not been measured. */
   numbers() {
     const samples = this.run.data.get("video.picture");
-    const index = samples ? indexAt(samples.t, this.t) : -1;
-    if (index < 0) return "";
-    return SCREEN_FIGURES.flatMap(([name, unit, digits, factor = 1]) => {
-      const value = samples.columns.get(name)?.[index];
-      return typeof value === "number" ? [`${fixed(factor * value, digits)} ${unit}`] : [];
-    }).join(", ");
+    const measured = [];
+    const missing = new Map();
+    for (const [name, title, unit, digits, factor = 1] of samples ? SCREEN_FIGURES : []) {
+      const column = samples.columns.get(name);
+      if (!column) continue;
+      const { value, since } = readingAt(samples.t, column, this.t);
+      if (typeof value === "number") measured.push(`${fixed(factor * value, digits)} ${unit}`);
+      else if (since !== null) missing.set(since, [...(missing.get(since) ?? []), title]);
+    }
+    const gaps = [...missing].map(([since, titles]) => `no data since ${seconds(since - origin(this.run))}: ${titles.join(", ")}`);
+    return [measured.join(", "), ...gaps].filter(Boolean).join("; ");
   }
 }

@@ -23,7 +23,7 @@ function headline(run) {
   if (outcome === "running" && (last(run.held.v) ?? null) !== null) return { text: `The mission is paused${failed ? `, after ${failed === 1 ? "a failure" : `${failed} failures`}` : ""}`, tone: "fair", reason: last(run.held.v) };
   if (outcome === "running" && failed) return { text: `The mission is under way, after ${failed === 1 ? "a failure" : `${failed} failures`}`, tone: "fair", reason: "" };
   const [text, tone] = OUTCOMES[outcome] ?? [`Outcome: ${words(outcome)}`, "now"];
-  return { text, tone, reason: reasonTold(run, outcome) ?? summary?.reason ?? mission.reason ?? "" };
+  return { text, tone, reason: reasonTold(run, outcome) ?? reasonInWords(summary?.reason ?? mission.reason ?? "") };
 }
 
 /** What failed, for the outcomes that follow from failures; null: the mission's own reason says it. */
@@ -40,7 +40,8 @@ function keyFigures(run) {
   const add = (label, value, unit = "", digits = 1) => {
     if (value !== null && value !== undefined) figures.push([label, typeof value === "number" ? `${fixed(value, digits)}${unit ? ` ${unit}` : ""}` : value]);
   };
-  add("landed", summary.landed === true ? "yes" : summary.landed === false ? "no" : null);
+  const landed = summary.landed ?? (landing(run) === null ? null : true);
+  add("landed", landed ? landedWhere(run) || "yes" : landed === false ? "no" : null);
   add("in the air", summary.duration_s, "s");
   add("flown", summary.distance_m, "m");
   const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
@@ -50,7 +51,7 @@ function keyFigures(run) {
   add("map coverage", summary.map?.coverage != null ? 100 * summary.map.coverage : null, "%");
   add("map error (RMS)", summary.map?.rmse_m, "m", 3);
   add("least picture quality (SSIM)", summary.video?.min_ssim, "", 2);
-  add("least frame rate", summary.video?.min_fps, "1/s", 0);
+  add("least frame rate", summary.video?.min_fps, "frames/s", 0);
   return figures;
 }
 
@@ -104,7 +105,7 @@ function faultBehind(run, failure) {
 
 const chains = new WeakMap(); // failure -> {key, chain}
 
-/** A failure's chain of causes: [{step, t, text}], from the measurement to what the tree did; made again only while something may be added. */
+/** A failure's chain of causes: [{step, t, text}], in the order of time, from the fault to what the tree did; made again only while something may be added. */
 function chainOf(run, failure) {
   const settled = run.end > reactsUntil(run, failure.end);
   const key = `${faultsOf(run).length} ${run.facts["/summary"] !== undefined} ${settled || run.news}`;
@@ -114,7 +115,7 @@ function chainOf(run, failure) {
 
 function makeChain(run, failure) {
   const chain = [];
-  const add = (step, t, text) => chain.push({ step, t, text });
+  const add = (step, t, text) => chain.push({ step, t: Math.min(t, failure.end), text }); // a cause is stamped some ticks late at most
   const change = blamed(run, failure);
   const sensor = change ? change.resource.replace(/_status$/, "") : "";
   const fault = faultBehind(run, failure);
@@ -125,9 +126,10 @@ function makeChain(run, failure) {
   if (told?.detected_by.includes(" -> ")) add("resource", origin(run) + told.detected_s, `${told.detected_by.replace(" ", ": ").replace("->", "→")}, reported by the functional layer`);
   if (change) add("resource", change.t, `${change.name}: ${change.from} → ${change.state}${change.cause === "extern" ? ", reported by the functional layer" : ` (${change.cause})`}`);
   const why = failure.message || failure.result || words(failure.state);
-  if (endingOf(failure) === "violated") add("invariant", failure.end, `${failure.result} of ${failure.skill}: ${why.replace(`${failure.result}: `, "")}`);
+  if (endingOf(failure) === "violated") add("invariant", failure.end, `${failure.result} of ${failure.skill}: ${inWords(why.replace(`${failure.result}: `, ""))}`);
   add("skill", failure.end, `${failure.skillset}.${failure.skill} ended: ${endingOf(failure) === "violated" ? "invariant violated" : `${words(failure.state)} ${failure.result}`.trim()}`);
-  return [...chain, ...branchOf(run, failure), ...reactionOf(run, failure)];
+  const effects = [...branchOf(run, failure), ...reactionOf(run, failure)].map((one) => ({ ...one, t: Math.max(one.t, failure.end) })); // and an effect early
+  return [...chain, ...effects].sort((one, other) => one.t - other.t);
 }
 
 /** The last change, before a failure, of a resource that its message names. */
@@ -152,23 +154,16 @@ function measurement(run, failure, sensor) {
     const data = name.split(".")[1];
     const column = [...samples.columns.keys()].filter((name_) => failure.message.includes(`${data}.${name_}`)).sort((one, other) => other.length - one.length)[0];
     const index = indexAt(samples.t, failure.end + APART_S);
-    if (column && index >= 0) return { t: samples.t[index], text: marginsTold(`${data}.${column} is ${short(samples.columns.get(column)[index])}`) };
+    const value = column && samples.columns.get(column)[index];
+    if (["number", "string", "boolean"].includes(typeof value)) return { t: samples.t[index], text: inWords(`${data}.${column} is ${short(value)}`) };
   }
   return null;
-}
-
-/** A sentence with what a negative margin means: "picture.fps_margin is -6" has the rate 6 1/s below its limit. */
-function marginsTold(text) {
-  return text.replace(/(\w+)_margin is -([\d.]+)/g, (all, name, number) => {
-    const unit = unitOf(name);
-    return `${all} (${name} is ${number}${unit ? ` ${unit}` : ""} below its limit)`;
-  });
 }
 
 /** How an execution ended, a sentence. */
 function endingTold(failure) {
   const name = `${failure.skillset}.${failure.skill}`;
-  const why = marginsTold((failure.message || "").replace(/, after .*$/, "").replace(`${failure.result}: `, ""));
+  const why = inWords((failure.message || "").replace(/, after .*$/, "").replace(`${failure.result}: `, ""));
   const because = why ? `: ${why}` : failure.result ? `: ${failure.result}` : "";
   if (endingOf(failure) === "violated") return `${name} was stopped, its invariant ${failure.result} was violated${why ? `: ${why}` : ""}.`;
   if (failure.state === "NOT_READY") return `${name} could not start, its precondition ${failure.result} was not met${why ? `: ${why}` : ""}.`;
@@ -258,20 +253,32 @@ function story(run) {
   if (run.departure !== null) say(run.departure, "Lift-off.");
   for (const fault of faultsOf(run)) say(fault.t, fault.mode === "ok" ? `The ${named(fault.sensor)} works again.` : `The ${named(fault.sensor)} was made to fail${fault.mode && fault.mode !== "mock" ? ` (${fault.mode})` : ""}.`, "bad");
   operatorTold(run, say);
+  for (const { t, text } of noticed(run)) say(t, `${text}.`, "bad");
+  for (const { t, text } of autopilotActs(run)) say(t, `The autopilot ${text}.`, "reaction");
   for (const failure of failures(run)) {
     say(failure.end, endingTold(failure), "bad");
     const reaction = reactionTold(chainOf(run, failure));
     if (reaction) say(Math.max(failure.end, reaction.t), `Reaction: ${reaction.text}.`, "reaction");
   }
-  if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, `The fallback runs${fallbackName(run, zero + recovery.fallback_running_s)} and keeps the flight safe.`, "reaction");
+  if (recovery?.fallback_running_s != null) say(zero + recovery.fallback_running_s, fallbackTold(run, zero + recovery.fallback_running_s), "reaction");
   if (recovery?.moving_again_s != null) say(zero + recovery.moving_again_s, "The vehicle moves on.", "reaction");
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
-  for (const { t, text } of autopilotActs(run)) say(t, `The autopilot ${text}.`, "reaction");
   const landed = landing(run);
-  if (landed !== null) say(landed, "Landed.");
+  const where = landedWhere(run);
+  if (landed !== null) say(landed, `Landed${where && `, ${where}`}.`);
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
   return lines.sort((one, other) => one.t - other.t);
+}
+
+/** Changes of resources that came before a skill failed of them, in the air: [{t, text}]. */
+function noticed(run) {
+  const ends = failures(run).map(({ end }) => end);
+  const changes = new Map(); // those that are a step of several chains count once
+  for (const failure of failures(run)) {
+    for (const { step, t, text } of chainOf(run, failure)) if (step === "resource") changes.set(`${t} ${text}`, { t, text });
+  }
+  return [...changes.values()].filter(({ t }) => t >= (run.departure ?? Infinity) && !ends.some((end) => Math.abs(end - t) <= APART_S));
 }
 
 /** Tells what the operator did; of pause, resume and abort what the mission says, where it says something. */
@@ -290,34 +297,6 @@ function operatorTold(run, say) {
     } else if (act.command === "resume") say(act.t, "The mission goes on.", "reaction");
     else if (act.command === "abort") say(act.t, `The mission is told to stop: ${act.reason}.`, "reaction");
   }
-}
-
-/** The name of the skill that came to run at a moment, as ` (hover)`; nothing where there is none. */
-function fallbackName(run, t) {
-  const found = [...run.executions.values()].find(({ running }) => running !== null && Math.abs(running - t) < APART_S / 2);
-  return found ? ` (${found.skill})` : "";
-}
-
-/** When the vehicle came to stand on the ground for the last time; null: it has not. */
-function landing(run) {
-  const [, track] = [...run.resources].find(([name]) => name.endsWith(".flight_status")) ?? [];
-  if (!track || last(track.v).state !== "ON_GROUND" || last(track.v).from !== "IN_AIR") return null;
-  return last(track.t);
-}
-
-// What ArduPilot's modes besides GUIDED and LAND mean for the flight; in these the mission does not command.
-const MODES = { RTL: "flies home and lands by itself", BRAKE: "brakes and hovers by itself", LOITER: "obeys the pilot", ALT_HOLD: "obeys the pilot", STABILIZE: "obeys the pilot" };
-
-/** When the autopilot changed, in the air, to a mode in which the mission does not command: [{t, text}]. */
-function autopilotActs(run) {
-  const acts = [];
-  const [begin, end] = [run.departure ?? Infinity, landing(run) ?? Infinity];
-  for (const { t, columns } of run.data.values()) {
-    (columns.get("mode") ?? []).forEach((mode, index, modes) => {
-      if (index && mode !== modes[index - 1] && MODES[mode] && t[index] > begin && t[index] < end) acts.push({ t: t[index], text: `changed to ${mode}: it ${MODES[mode]}` });
-    });
-  }
-  return acts;
 }
 
 /** A row for each failure, abort and pause, and one for the whole mission: [{what, why, t, until, done, cost}]; the last has no t. */
@@ -364,7 +343,10 @@ function failureRow(run, fault, own, failed) {
   const recovery = run.facts["/summary"]?.recovery;
   const answered = failed.find((one) => faultBehind(run, one)) ?? failed[0]; // of two faults at once, the recovery is from the one that failed first
   const recovered = recovery && own.includes(answered) && Math.abs(origin(run) + (recovery.failure_s ?? recovery.detected_s) - since) < 1;
-  if (recovered && recovery.fallback_running_s != null) cost.push(`the fallback ran after ${seconds(recovery.fallback_running_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
+  if (recovered && recovery.fallback_running_s != null) {
+    cost.push(`the fallback ran after ${seconds(recovery.fallback_running_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
+    cost.push(...[heldTold(run, origin(run) + recovery.fallback_running_s)].filter(Boolean));
+  }
   if (recovered && recovery.moving_again_s != null) cost.push(`the vehicle moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
   const why = own.map((failure) => endingTold(failure)).join(" ");
   return { what: fault ? faultWords(fault) : `${first.skillset}.${first.skill}: ${endingOf(first) === "violated" ? `invariant ${first.result} violated` : `${words(first.state)} ${first.result}`.trim()}`, why, t: since, until: fault ? endOf(run, fault) : null, done: done.join("; ") || "nothing followed", cost: cost.join("; ") };

@@ -5,7 +5,7 @@ const BAND_ROW = 17;
 const GROUP = 18;
 const AXIS = 22;
 const MARK_ROW = 15;
-const MARK_COLOURS = { failure: "var(--bad)", detected: "#8e5bd0", fallback_running: "var(--now)", moving_again: "var(--good)", pause: "var(--fair)" };
+const MARK_COLOURS = { failure: "var(--bad)", detected: "var(--detected)", fallback_running: "var(--now)", moving_again: "var(--good)", pause: "var(--fair)" };
 
 class TimelineView {
   constructor(choose) {
@@ -21,7 +21,7 @@ class TimelineView {
     this.box.addEventListener("pointermove", (event) => this.move(event));
     this.box.addEventListener("pointerup", (event) => this.up(event));
     new ResizeObserver(() => this.run && this.draw(this.run, this.t, true)).observe(this.box);
-    const keys = Object.entries(ENDINGS).map(([name, { words: text, mark }]) => el("li", {}, svg("svg", { width: 22, height: 12 }, svg("rect", { width: 22, height: 12, rx: 2, fill: `var(--${name})` }), svg("text", { x: 11, y: 10, "text-anchor": "middle", "font-size": 10, fill: "#111" }, mark)), text));
+    const keys = Object.entries(ENDINGS).map(([name, { words: text, mark }]) => el("li", {}, svg("svg", { width: 22, height: 12 }, svg("rect", { width: 22, height: 12, rx: 2, fill: `var(--${name})` }), svg("text", { x: 11, y: 10, "text-anchor": "middle", "font-size": 10, fill: "var(--bar-ink)" }, mark)), text));
     byId("legend").append(...keys);
   }
 
@@ -139,7 +139,7 @@ class TimelineView {
     const parts = [svg("rect", { x, y: y + 3, width, height: ROW - 6, rx: 2, fill: `var(--${ending})`, "data-text": text, "data-from": execution.start, "data-to": execution.end ?? "" }, svg("title", {}, text))];
     const name = execution.result || words(execution.state);
     const inside = width > 7 * name.length + 20 ? `${mark} ${name}` : width > 14 ? mark : "";
-    if (inside) parts.push(svg("text", { x: x + 5, y: y + ROW / 2 + 4, fill: "#111", "pointer-events": "none", style: null }, inside));
+    if (inside) parts.push(svg("text", { x: x + 5, y: y + ROW / 2 + 4, class: "on-bar", "pointer-events": "none" }, inside));
     return parts;
   }
 

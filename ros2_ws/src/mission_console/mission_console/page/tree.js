@@ -2,6 +2,15 @@
 // trapezium, a sequence an arrow, a selector a question mark.
 
 const SYMBOLS = { sequence: "→ ", selector: "? ", parallel: "⇉ ", decorator: "◇ " };
+const LEGEND = [
+  ["sequence", SYMBOLS.sequence, "one after the other, until one fails"],
+  ["selector", SYMBOLS.selector, "the next one when one fails"],
+  ["parallel", SYMBOLS.parallel, "all at once"],
+  ["decorator", SYMBOLS.decorator, "changes when its child runs, or what its end means"],
+  ["skill", "name", "skill"],
+  ["action", "name", "the mission's own action"],
+  ["condition", "name", "condition"],
+];
 const MARKS = { SUCCESS: "✓ succeeded", FAILURE: "✗ failed", RUNNING: "… runs", INTERRUPTED: "◦ interrupted", INVALID: "" };
 
 class TreeView {
@@ -15,6 +24,7 @@ class TreeView {
     byId("tree-active").addEventListener("click", () => this.show(true));
     byId("tree-all").addEventListener("click", () => this.show(false));
     this.box.addEventListener("keydown", (event) => this.key(event));
+    byId("tree-legend").append(...LEGEND.map(([kind, sign, text]) => el("li", {}, el("span", { class: `box ${kind}` }, sign), text)));
   }
 
   show(activeOnly) {

@@ -1,0 +1,78 @@
+// The flight itself, in words: when and where it landed, what took the vehicle from the mission, how long a fallback held.
+
+const AT_PLACE_M = 1; // so near counts as at home, or at a waypoint
+// What ArduPilot's modes besides GUIDED and LAND mean for the flight; in these the mission does not command.
+const MODES = { RTL: "flies home and lands by itself", BRAKE: "brakes and hovers by itself", LOITER: "obeys the pilot", ALT_HOLD: "obeys the pilot", STABILIZE: "obeys the pilot" };
+
+/** When the vehicle came to stand on the ground for the last time; null: it has not. */
+function landing(run) {
+  const [, track] = [...run.resources].find(([name]) => name.endsWith(".flight_status")) ?? [];
+  if (!track || last(track.v).state !== "ON_GROUND" || last(track.v).from !== "IN_AIR") return null;
+  return last(track.t);
+}
+
+/** The vehicle's places at lift-off and after the landing, {home, landed}; null for each that the record does not tell. */
+function places(run) {
+  const at = (t) => (t === null ? null : run.path.v[indexAt(run.path.t, t)] ?? null);
+  const home = run.departure === null && !run.facts["/summary"]?.lift_off ? null : at(origin(run));
+  return { home, landed: at(landing(run)) };
+}
+
+/** Where the vehicle landed, as "12.0 m east, 0.0 m north of home, at waypoint 3"; empty where the record does not tell. */
+function landedWhere(run) {
+  const { home, landed } = places(run);
+  if (!home || !landed) return "";
+  const [east, north] = [landed[0] - home[0], landed[1] - home[1]];
+  const away = Math.hypot(east, north);
+  if (away <= AT_PLACE_M) return `${fixed(away, 1)} m from home`;
+  const along = (value, positive, negative) => `${fixed(Math.abs(value), 1)} m ${fixed(value, 1).startsWith("-") ? negative : positive}`;
+  const ranges = (run.facts["/route"] ?? []).map(([x, y]) => Math.hypot(landed[0] - x, landed[1] - y));
+  const nearest = ranges.indexOf(Math.min(...ranges));
+  return `${along(east, "east", "west")}, ${along(north, "north", "south")} of home${ranges[nearest] <= AT_PLACE_M ? `, at waypoint ${nearest + 1}` : ""}`;
+}
+
+/** When the autopilot changed, in the air, to a mode in which the mission does not command: [{t, mode, text}]. */
+function autopilotActs(run) {
+  const acts = [];
+  const [begin, end] = [run.departure ?? Infinity, landing(run) ?? Infinity];
+  for (const { t, columns } of run.data.values()) {
+    (columns.get("mode") ?? []).forEach((mode, index, modes) => {
+      if (!index || mode === modes[index - 1] || !MODES[mode] || t[index] <= begin || t[index] >= end) return;
+      acts.push({ t: authorityLost(run, t[index - 1], t[index]) ?? t[index], mode, text: `changed to ${mode}: it ${MODES[mode]}` });
+    });
+  }
+  return acts;
+}
+
+/** When, between two samples of the mode, the loss of the authority was reported, which follows from the change; null: it was not. */
+function authorityLost(run, after, until) {
+  for (const [name, { t, v }] of run.resources) {
+    const index = name.endsWith("SDK_authority") ? v.findIndex(({ state }, at) => state === "UNAVAILABLE" && t[at] > after && t[at] <= until) : -1;
+    if (index >= 0) return t[index];
+  }
+  return null;
+}
+
+/** The skill that a failure's fallback began with: the one that the summary names, else one that came to run then. */
+function fallbackOf(run, t) {
+  const begun = [...run.executions.values()].filter(({ running }) => running !== null && Math.abs(running - t) < APART_S / 2);
+  const skills = (run.facts["/summary"]?.answers ?? []).map(({ skill }) => skill);
+  return begun.find((one) => skills.includes(`${one.skillset}.${one.skill}`)) ?? begun[0] ?? null;
+}
+
+/** How long a fallback held that ended badly, and what took over; empty of one that did not. */
+function heldTold(run, t) {
+  const skill = fallbackOf(run, t);
+  const ending = skill && endingOf(skill);
+  if (!["violated", "failure"].includes(ending)) return "";
+  const act = autopilotActs(run).find((one) => one.t > skill.running && one.t <= skill.end + APART_S);
+  const why = ending === "violated" ? `its invariant ${skill.result} was violated` : "it failed";
+  return `it held for ${seconds(skill.end - skill.running, 2)}, then ${act ? `the autopilot changed to ${act.mode}` : why}`;
+}
+
+/** That the fallback came to run, and what became of it where it ended badly. */
+function fallbackTold(run, t) {
+  const skill = fallbackOf(run, t);
+  const held = heldTold(run, t);
+  return `The fallback runs${skill ? `: ${skill.skill}` : ""}${held && `; ${held}`}.`;
+}
