@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -22,18 +22,25 @@ def frame(sender: mavlink.MAVLink, mode: int) -> bytes:
 
 
 class Ear:
-    def __init__(self, url: str) -> None:
+    """A link that is started; ``take`` is called with each mode that is heard."""
+
+    def __init__(self, url: str, take: Callable[[int], None] = lambda _mode: None) -> None:
         self.modes: list[int] = []
-        self.connected = threading.Semaphore(0)
-        self.idle = threading.Semaphore(0)
-        self.link = Link(
-            url,
-            57600,
-            on_message=lambda m: self.modes.append(m.custom_mode),
-            on_connect=self.connected.release,
-            on_idle=self.idle.release,
-        )
+        self.connected, self.idle = threading.Semaphore(0), threading.Semaphore(0)
+        self._take = take
+        self.link = Link(url, 57600, on_message=self._hear, on_connect=self.connected.release, on_idle=self.idle.release)
         self.link.start()
+
+    def _hear(self, message: mavlink.MAVLink_heartbeat_message) -> None:
+        self.modes.append(message.custom_mode)
+        self._take(message.custom_mode)
+
+
+def reached(ear: Ear, peer: socket.socket) -> object:
+    """Return the link's address, once it has sent something to the peer."""
+    assert ear.connected.acquire(timeout=5.0)
+    ear.link.send(heartbeat_message())
+    return peer.recvfrom(300)[1]
 
 
 @pytest.fixture
@@ -60,10 +67,7 @@ def test_udp_of_a_vehicle_that_sends_to_us(peer):
 
 def test_udp_towards_a_vehicle(peer):
     ear = Ear(f"udpout:127.0.0.1:{peer.getsockname()[1]}")
-    assert ear.connected.acquire(timeout=5.0)
-    ear.link.send(heartbeat_message())
-    _, address = peer.recvfrom(300)
-    peer.sendto(frame(AUTOPILOT, 9), address)
+    peer.sendto(frame(AUTOPILOT, 9), reached(ear, peer))
     wait_until(lambda: ear.modes == [9], timeout_s=5.0, what="the answer")
     ear.link.close()
 
@@ -89,54 +93,35 @@ def test_tcp_that_is_not_there_yet_and_goes_away():
 
 
 def test_a_message_that_can_not_be_dealt_with_does_not_end_the_link(peer):
-    heard: list[int] = []
-    connected = threading.Semaphore(0)
-
-    def take(message: object) -> None:
-        heard.append(message.custom_mode)
-        if message.custom_mode == 1:
-            raise ZeroDivisionError
-
-    idle = threading.Semaphore(0)
-    url = f"udpout:127.0.0.1:{peer.getsockname()[1]}"
-    link = Link(url, 57600, on_message=take, on_connect=connected.release, on_idle=idle.release)
-    link.start()
-    assert connected.acquire(timeout=5.0)
-    link.send(heartbeat_message())
-    _, address = peer.recvfrom(300)
+    ear = Ear(f"udpout:127.0.0.1:{peer.getsockname()[1]}", take=lambda mode: 1 // (mode - 1))
+    address = reached(ear, peer)
     # What was cut short takes its missing bytes from the one behind it; both are lost.
     for data in (frame(AUTOPILOT, 1), frame(AUTOPILOT, 2)[:-4], frame(AUTOPILOT, 3), frame(AUTOPILOT, 4)):
         peer.sendto(data, address)
-    wait_until(lambda: heard == [1, 4], timeout_s=5.0, what="a message behind those that raised and that were cut short")
-    assert idle.acquire(timeout=5.0)
-    link.close()
+    wait_until(lambda: ear.modes == [1, 4], timeout_s=5.0, what="a message behind those that raised and that were cut short")
+    assert ear.idle.acquire(timeout=5.0)
+    ear.link.close()
 
 
 def test_the_link_is_idle_when_all_that_has_arrived_has_been_handed_over(peer):
-    connected, idle = threading.Semaphore(0), threading.Semaphore(0)
     taken, go_on = threading.Semaphore(0), threading.Semaphore(0)
 
-    def take(_message: object) -> None:
+    def take(_mode: int) -> None:
         taken.release()
         assert go_on.acquire(timeout=5.0)
 
-    url = f"udpout:127.0.0.1:{peer.getsockname()[1]}"
-    link = Link(url, 57600, on_message=take, on_connect=connected.release, on_idle=idle.release)
-    assert link.idle, "there is no connection"
-    link.start()
-    assert connected.acquire(timeout=5.0)
-    link.send(heartbeat_message())
-    _, address = peer.recvfrom(300)
-    assert link.idle, "nothing has arrived"
+    ear = Ear(f"udpout:127.0.0.1:{peer.getsockname()[1]}", take)
+    address = reached(ear, peer)
+    assert ear.link.idle, "nothing has arrived"
     peer.sendto(frame(AUTOPILOT, 1), address)
     peer.sendto(frame(AUTOPILOT, 2), address)
     assert taken.acquire(timeout=5.0)
-    assert not link.idle, "the first message is being handled, the second one waits"
+    assert not ear.link.idle, "the first message is being handled, the second one waits"
     go_on.release()
     assert taken.acquire(timeout=5.0)
-    assert not link.idle
-    assert not idle.acquire(blocking=False), "the second message came before the link was idle"
+    assert not ear.link.idle
+    assert not ear.idle.acquire(blocking=False), "the second message came before the link was idle"
     go_on.release()
-    assert idle.acquire(timeout=5.0)
-    assert link.idle
-    link.close()
+    assert ear.idle.acquire(timeout=5.0)
+    assert ear.link.idle
+    ear.link.close()
