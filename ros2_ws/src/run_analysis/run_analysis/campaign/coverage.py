@@ -12,11 +12,11 @@ from xml.etree import ElementTree as ET
 
 from alula_common.faults import parse_fault
 from run_analysis.campaign.failures import FAULT, KINDS, Way, name_of
+from skill_missions.director import EXIT_CODES
 
 Row = Mapping[str, Any]
-
-EXIT_CODES = {"accomplished": 0, "degraded": 0, "given_up": 1, "aborted": 1, "not_started": 2}
-"""How ``./alula fly`` ends, by the outcome of the mission."""
+CODE_OF = {outcome.value: code for outcome, code in EXIT_CODES.items()}
+"""How ``./alula fly`` ends, by a row's outcome."""
 
 
 @dataclass
@@ -89,7 +89,7 @@ def is_troubled(row: Row) -> bool:
     """Tell whether something is wrong with a flight, whatever failed in it."""
     unfinished = row["outcome"] in {"not_started", "running", None}
     wrong = row["open"] or row["collisions"] or row["landed"] is False or row["problems"]
-    return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, EXIT_CODES.get(str(row["outcome"]))})
+    return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, CODE_OF.get(str(row["outcome"]))})
 
 
 def _count(one: Cover, row: Row, answer: str, after_s: float | None) -> None:
