@@ -1,4 +1,4 @@
-"""A bridge between ROS 1 and ROS 2: topics and services of any type, as raw bytes, in one Python process."""
+"""A bridge between ROS 1 and ROS 2: topics, services and actions of any type, as bytes, in one process."""
 
 from ros_bridge.errors import BridgeError
 

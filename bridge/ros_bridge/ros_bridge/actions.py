@@ -1,7 +1,8 @@
-"""Actions: a route an action, one class for each side that the server can be on. They join the goals (pure) to the ends in both worlds.
+"""Actions: one route for each action, one class for each world that the server can be in.
 
-Ends deliver from the data plane's thread for Python and from the executor's; a thread of the route brings time. All of them take
-the goals' lock, and nothing done under it waits.
+They connect the goals' state machines (``goals_to_ros1``, ``goals_to_ros2``) with the ends in both worlds. Ends call back on the data
+plane's thread for Python and on the executor's; a ``Ticker`` calls back on its own. All of them take the goals' lock, and nothing done
+under it waits.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ SHUTTING_DOWN = "the bridge is shutting down"
 Goals = TypeVar("Goals", GoalsToRos1, GoalsToRos2)
 
 
-class Clockwork:
+class Ticker:
     """A thread that ticks: every ``TICK_S`` while there is something to watch, else every ``IDLE_TICK_S``."""
 
     def __init__(self, name: str, tick: Callable[[float], None], busy: Callable[[], bool]) -> None:
@@ -68,8 +69,8 @@ class Clockwork:
             self._thread.join()
 
 
-class Crossing:
-    """Converts payloads and counts what crossed."""
+class PayloadConverter:
+    """Converts goals, feedback and results between the worlds, and counts them."""
 
     def __init__(self, stats: RouteStats) -> None:
         self._stats = stats
@@ -97,7 +98,7 @@ class _End(Protocol):
 
 
 class _ActionBridge(Generic[Goals]):
-    """What is the same whichever side the server is on: subclasses open the ends, which bring what ``_goals`` has to hear."""
+    """A route with the server in either world: subclasses open the ends and pass their messages to ``_goals``."""
 
     GOALS: type[Goals]
     _server: _End
@@ -107,17 +108,17 @@ class _ActionBridge(Generic[Goals]):
         """Open nothing yet."""
         self._spec, self._type, self._class, self._context = spec, action, action_class, context
         self._stats = RouteStats()
-        self._crossing = Crossing(self._stats)
+        self._payloads = PayloadConverter(self._stats)
         self._goals: Goals = self.GOALS(spec.label, spec.timeout_s)
         self._started = False
-        self._clockwork = Clockwork(spec.target_name, self._goals.tick, lambda: self._goals.busy)
+        self._ticker = Ticker(spec.target_name, self._goals.tick, lambda: self._goals.busy)
 
     def start(self) -> None:
-        """Reach for the server and offer the action to its clients; what the ends bring waits until both are there."""
+        """Connect to the server and offer the action to its clients; messages of the ends wait until both are open."""
         with self._goals.lock:
             self._open()
             self._started = True
-        self._clockwork.start()
+        self._ticker.start()
 
     def _open(self) -> None:
         """Open both ends and connect the goals to them."""
@@ -131,7 +132,7 @@ class _ActionBridge(Generic[Goals]):
         """End the open goals for their clients, cancel them at the server, and leave."""
         if not self._started:
             return
-        self._clockwork.close()
+        self._ticker.close()
         self._goals.give_up_all(SHUTTING_DOWN, time.monotonic())
         self._clients.close()
         self._server.close()
@@ -165,7 +166,7 @@ class ServerInRos1(_ActionBridge[GoalsToRos1]):
 
     def _on_goal_request(self, request: Any, header: Header) -> None:
         try:
-            payload = self._crossing.to_ros1(self._type.goal.pair, bytes(serialize_message(request.goal)))
+            payload = self._payloads.to_ros1(self._type.goal.pair, bytes(serialize_message(request.goal)))
         except Exception as error:  # noqa: BLE001 - a goal that can't be converted must not leave its client without an answer
             self._stats.failed()
             logger.error("%s: a goal can't be converted: %s: %s", self._spec.label, type(error).__name__, error)
@@ -186,12 +187,12 @@ class ServerInRos1(_ActionBridge[GoalsToRos1]):
     def _on_feedback(self, message: bytes) -> None:
         status, payload = actionlib_wire.decode_outcome(message)
         if self._goals.knows(status):
-            self._goals.on_feedback(status, self._crossing.to_ros2(self._type.feedback.pair, payload), time.monotonic())
+            self._goals.on_feedback(status, self._payloads.to_ros2(self._type.feedback.pair, payload), time.monotonic())
 
     def _on_result(self, message: bytes) -> None:
         status, payload = actionlib_wire.decode_outcome(message)
         if self._goals.knows(status):
-            self._goals.on_result(status, self._crossing.to_ros2(self._type.result.pair, payload), time.monotonic())
+            self._goals.on_result(status, self._payloads.to_ros2(self._type.result.pair, payload), time.monotonic())
 
 
 class ServerInRos2(_ActionBridge[GoalsToRos2]):
@@ -219,7 +220,7 @@ class ServerInRos2(_ActionBridge[GoalsToRos2]):
 
     def _on_goal(self, message: bytes) -> None:
         goal_id, payload = actionlib_wire.decode_goal(message)
-        self._goals.on_goal(goal_id, self._crossing.to_ros2(self._type.goal.pair, payload), time.monotonic())
+        self._goals.on_goal(goal_id, self._payloads.to_ros2(self._type.goal.pair, payload), time.monotonic())
 
     def _on_cancel(self, message: bytes) -> None:
         self._goals.on_cancel(actionlib_wire.decode_goal_id(message), time.monotonic())
@@ -231,14 +232,14 @@ class ServerInRos2(_ActionBridge[GoalsToRos2]):
 
     def _on_feedback(self, goal: bytes, cdr: bytes) -> None:
         if self._goals.knows(goal):
-            self._goals.on_feedback(goal, self._crossing.to_ros1(self._type.feedback.pair, cdr))
+            self._goals.on_feedback(goal, self._payloads.to_ros1(self._type.feedback.pair, cdr))
 
     def _on_result(self, goal: bytes, response: Any, error: str) -> None:
         if response is None:
             self._goals.on_result(goal, Ros2Status.ABORTED, None, error, time.monotonic())
             return
         try:
-            payload = self._crossing.to_ros1(self._type.result.pair, result_cdr(response))
+            payload = self._payloads.to_ros1(self._type.result.pair, result_cdr(response))
         except Exception as problem:  # noqa: BLE001 - a result that can't be converted must not leave the goal open
             self._stats.failed()
             reason = f"its result can't be converted: {type(problem).__name__}: {problem}"

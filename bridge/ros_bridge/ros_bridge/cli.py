@@ -11,11 +11,11 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-from ros_bridge.config_file import NAME, load_config
+from ros_bridge import discovery_options
+from ros_bridge.config_file import load_config
 from ros_bridge.errors import BridgeError, ConfigError, NoMasterError
 from ros_bridge.master import Connection
 from ros_bridge.ros1_node import own_name
-from ros_bridge.selection import Selection
 
 logger = logging.getLogger("ros_bridge")
 
@@ -25,16 +25,10 @@ LOOPBACK = ("http://127.0.0.1", "http://localhost")
 
 
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the command line; what roslaunch adds is not in it: ``__name:=`` is read by ``own_name``, all else means nothing here."""
+    """Read the command line without what roslaunch adds: ``own_name`` reads ``__name:=`` and ``__ns:=``, the rest has no effect."""
     parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
     parser.add_argument("--config", type=Path, action="append", default=[], help="what to bridge (YAML); several files are read as one")
-    parser.add_argument("--all", action="store_true", help="bridge every topic, service and action that appears in either world")
-    parser.add_argument(
-        "--include", metavar="PATTERN", action="append", default=[], help="bridge what appears under such a name: '/camera/*'"
-    )
-    parser.add_argument("--exclude", metavar="PATTERN", action="append", default=[], help="but not what has such a name in either world")
-    parser.add_argument("--namespace1", metavar="NAME", default="", help="put ROS 2's names below this one in ROS 1")
-    parser.add_argument("--namespace2", metavar="NAME", default="", help="put ROS 1's names below this one in ROS 2")
+    discovery_options.add_arguments(parser)
     parser.add_argument("--list", action="store_true", help="show what would be bridged and what can't be, with the reason, and end")
     parser.add_argument(
         "--stats", type=Path, metavar="FILE", help="write figures of all routes to this JSON file, every 2 s and at the end"
@@ -42,17 +36,8 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     options = parser.parse_args([argument for argument in arguments if ":=" not in argument])
     if not (options.config or options.all or options.include or options.list):
         parser.error("nothing to bridge: give --config FILE, or --all, or --include PATTERN")
+    options.all = options.all or (options.list and not options.config and not options.include)
     return options
-
-
-def selection(options: argparse.Namespace) -> Selection:
-    """Return what the command line selects for discovery; raises ConfigError for a namespace that is no name."""
-    for option in ("namespace1", "namespace2"):
-        value = getattr(options, option)
-        if value and not NAME.fullmatch(value):
-            raise ConfigError(f"--{option}: '{value}' is not an absolute ROS name such as /ros1")
-    everything = ("*",) if options.all or (options.list and not options.config and not options.include) else ()
-    return Selection((*options.include, *everything), tuple(options.exclude), options.namespace1, options.namespace2)
 
 
 def set_up_logging() -> None:
@@ -86,7 +71,7 @@ def main(arguments: list[str]) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
-        config = load_config(options.config, selection(options))
+        config = load_config(options.config, discovery_options.read_arguments(options))
     except BridgeError as error:
         logger.error("%s", error)
         return EXIT_CONFIG

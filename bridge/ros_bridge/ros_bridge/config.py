@@ -1,4 +1,4 @@
-"""What the bridge is asked to do, as values: routes, a selection of what to discover, rules for types. ``config_file`` reads them."""
+"""The configuration as values: routes, the selection of discovery, rules for types. ``config_file`` reads them from files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ros_bridge.selection import Selection
 
 
 class Direction(Enum):
-    """Which way a topic crosses."""
+    """The direction of a topic."""
 
     ROS1_TO_ROS2 = "ros1_to_ros2"
     ROS2_TO_ROS1 = "ros2_to_ros1"
@@ -60,7 +60,7 @@ class TopicRoute:
 
 @dataclass(frozen=True)
 class _ServedRoute:
-    """What services and actions have in common: a server in one world, and callers in the other."""
+    """A service or action: a server in one world, and callers in the other."""
 
     KIND: ClassVar[str]
 
@@ -109,7 +109,7 @@ def _both_names(spec: TopicRoute | _ServedRoute) -> str:
 
 @dataclass(frozen=True)
 class BridgeConfig:
-    """Routes that are named, and what to discover besides."""
+    """Named routes, and what discovery selects besides."""
 
     topics: tuple[TopicRoute, ...] = ()
     services: tuple[ServiceRoute, ...] = ()
@@ -119,5 +119,5 @@ class BridgeConfig:
 
     @property
     def routes(self) -> tuple[Spec, ...]:
-        """All that are named."""
+        """All named routes."""
         return (*self.topics, *self.services, *self.actions)

@@ -1,4 +1,4 @@
-"""Decide what is to be bridged, from what runs in both worlds: a pure function, asked again at every change.
+"""Decide which routes discovery wants, from the graphs of both worlds: a pure function, called at every change.
 
 A topic goes to the other world when a node publishes it here; both ways when both worlds publish it. It flows only while a node
 over there subscribes: before that it is offered, so that tools see it, and costs nothing. A service or an action goes from the world
@@ -24,10 +24,10 @@ BULKY_DEPTH = 10  # of types with an array of bytes without an end: images, clou
 
 
 class TypeLookup(Protocol):
-    """What is asked about types."""
+    """Questions about types."""
 
     def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> tuple[str, str]:
-        """Complete a pair of which one may be unknown, and check that it can cross; raises BridgeError."""
+        """Return both types of a topic, of which one may be unknown; raises BridgeError when they can't be converted."""
 
     def check_service(self, ros1_type: str | None, ros2_type: str | None) -> tuple[str, str]:
         """Do the same for a service."""
@@ -51,7 +51,7 @@ class RouteDecision:
 
 @dataclass(frozen=True)
 class Refused:
-    """Something selected that can't be bridged, and why."""
+    """A selected name that can't be bridged, and the reason."""
 
     kind: str
     ros1_name: str
@@ -63,7 +63,7 @@ Decision = RouteDecision | Refused
 
 
 def decide(graphs: Graphs, selection: Selection, types: TypeLookup, configured: Iterable[Spec] = ()) -> list[Decision]:
-    """Return everything that is selected: what to bridge and what can't be. Names of configured routes are left to these."""
+    """Return a decision for each selected name: a route, or the reason why there is none. Names of configured routes are skipped."""
     taken1 = {spec.ros1_name for spec in configured}
     taken2 = {spec.ros2_name for spec in configured}
     decisions: list[Decision] = []

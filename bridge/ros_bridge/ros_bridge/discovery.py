@@ -1,4 +1,4 @@
-"""Follow both worlds' graphs and keep the table of routes equal to what they want: one thread.
+"""Follow both worlds' graphs and keep the routes as `decisions` wants them: one thread.
 
 ROS 2 tells when its graph changes, and the monitor of the master when ROS 1's does. A new route first offers its
 target's end and begins to flow when the subscribers over there have connected to it (or after a second), so that the only message of
@@ -41,7 +41,7 @@ AGAIN_AFTER_S = 0.5
 
 
 class GraphReader:
-    """Both graphs, and what can be asked about their types."""
+    """Reads both graphs and their types."""
 
     def __init__(self, node: Node, types: Types, master: Connection, caller_id: str) -> None:
         """Ask nothing yet."""
@@ -115,7 +115,7 @@ class Discovery:
             changed = self._events.wait(LOOK_EVERY_S if waiting else IDLE_S)
 
     def _read_ros1(self) -> bool:
-        """Read ROS 1's graph. A master that was away knows less than before: what still has connections then goes on."""
+        """Read ROS 1's graph. A restarted master knows less than before: routes that still have connections go on."""
         state = self._monitor.state
         if not state.reachable or not state.system:
             return False
@@ -129,7 +129,7 @@ class Discovery:
         return changed
 
     def _report(self) -> None:
-        """Say once for each reason what can't be bridged."""
+        """Log once for each reason what can't be bridged."""
         for refused in self.decisions:
             if isinstance(refused, Refused) and refused.reason not in self._said:
                 self._said.add(refused.reason)

@@ -1,4 +1,4 @@
-"""ROS 1 topics whose other end is Python: publish bytes, or be called with bytes.
+"""ROS 1 topics whose other end is Python: publish bytes, or receive bytes in a callback.
 
 They are routes of the data plane without an end in ROS 2.
 """
@@ -23,7 +23,7 @@ QUEUE = 100  # messages towards each peer, or towards Python; the oldest gives w
 
 
 class Ros1Type(Protocol):
-    """What ROS 1's nodes compare and pass on of a message type."""
+    """The parts of a message type that ROS 1's nodes compare and send in connection headers."""
 
     @property
     def ros1_name(self) -> str:

@@ -1,4 +1,4 @@
-"""What can go wrong in the bridge, each with a message that names the value, the place and the remedy."""
+"""The errors of the bridge; each message names the value, the place and the remedy."""
 
 from __future__ import annotations
 

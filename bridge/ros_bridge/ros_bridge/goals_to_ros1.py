@@ -1,7 +1,7 @@
-"""Goals of ROS 2 clients at an actionlib server in ROS 1: what is known of each, and what follows from each event. No ROS in here.
+"""Goals of ROS 2 clients at an actionlib server in ROS 1: the state of each, and the transitions at each event. No ROS in here.
 
-A goal is answered (accepted or rejected) when the server has said something about it: ACTIVE accepts, REJECTED rejects, and so does
-silence until its time is over. A goal that the server only lists as PENDING (SimpleActionServer queues one behind the running one)
+A goal is answered (accepted or rejected) at the server's first status of it: ACTIVE accepts, REJECTED rejects; without a status until
+its time-out it is rejected. A goal that the server only lists as PENDING (SimpleActionServer queues one behind the running one)
 is accepted after ``QUEUED_S``: a ROS 2 client can't cancel what it has no answer for.
 """
 
@@ -24,6 +24,7 @@ SEND_AGAIN_S = 1.0  # a goal that the server does not list: it was lost on the w
 RESULT_WITHIN_S = 2.0  # a terminal status without its result: the result message was lost
 KEEP_RESULT_S = 60.0
 KEEP_RESULTS = 1000
+KEEP_RESULT_BYTES = 64_000_000  # of all results that are kept; the newest is kept whatever its size
 MOST_GOALS = 1000  # open at a time; more are rejected
 ANY_GOAL = bytes(16)
 
@@ -188,12 +189,12 @@ class GoalsToRos1:
             self._move(goal, TO_ROS2[status.status])
 
     def knows(self, status: GoalStatus) -> bool:
-        """Tell whether what the server says is about a goal of ours."""
+        """Tell whether a status is about a goal of this bridge."""
         with self.lock:
             return self._find(status) is not None
 
     def on_feedback(self, status: GoalStatus, payload: bytes, now_s: float) -> None:
-        """Pass on what the server says on the way; the last of it may come after the result, over another connection."""
+        """Pass on feedback; the last one may come after the result, over another connection."""
         with self.lock:
             goal = self._find(status)
             if goal is None:
@@ -204,7 +205,7 @@ class GoalsToRos1:
                 self._clients.publish_feedback(goal.uuid, payload)
 
     def on_result(self, status: GoalStatus, payload: bytes, now_s: float) -> None:
-        """End a goal with what the server says."""
+        """End a goal with the server's result."""
         with self.lock:
             goal = self._find(status)
             if goal is None or not goal.open:
@@ -223,17 +224,23 @@ class GoalsToRos1:
         self._end(goal, final if final in ROS2_TERMINAL else Ros2Status.ABORTED, payload, reason, now_s)
 
     def tick(self, now_s: float) -> None:
-        """Do what time brings: send to a server that came, give up on one that went, forget old results."""
+        """Do what is due: send to a server that came, give up on one that went, drop old results."""
         with self.lock:
             gone = self._server.gone()
             for goal in list(self._goals.values()):
                 if goal.open:
                     self._tick_open(goal, now_s, gone=gone)
-                elif now_s - (goal.ended_s or 0.0) > KEEP_RESULT_S:
-                    del self._goals[goal.uuid]
-            ended = [goal.uuid for goal in self._goals.values() if not goal.open]
-            for goal_uuid in ended[: max(0, len(ended) - KEEP_RESULTS)]:
-                del self._goals[goal_uuid]
+            self._forget_results(now_s)
+
+    def _forget_results(self, now_s: float) -> None:
+        """Drop the results that are old, and the oldest of those that are too many or too large."""
+        ended = sorted((goal for goal in self._goals.values() if not goal.open), key=lambda goal: goal.ended_s or 0.0, reverse=True)
+        kept_bytes = 0
+        for number, goal in enumerate(ended):
+            kept_bytes += len(goal.payload_of_result or b"")
+            too_old = now_s - (goal.ended_s or 0.0) > KEEP_RESULT_S
+            if too_old or number >= KEEP_RESULTS or (number and kept_bytes > KEEP_RESULT_BYTES):
+                del self._goals[goal.uuid]
 
     def _tick_open(self, goal: GoalToRos1, now_s: float, *, gone: bool) -> None:
         unanswered = goal.status is Ros2Status.UNKNOWN

@@ -1,4 +1,4 @@
-"""Goals of actionlib clients in ROS 1 at an action server in ROS 2: what is known of each, and what follows from each event. No ROS here.
+"""Goals of actionlib clients in ROS 1 at an action server in ROS 2: the state of each, and the transitions at each event. No ROS here.
 
 Towards ROS 1 it behaves as actionlib's own server does: the status list goes out at each change and at 5 Hz, an ended goal stays in it for
 5 s, a cancel request that overtakes its goal is remembered, one with a stamp also meets goals that come later with an earlier stamp.
@@ -201,12 +201,12 @@ class GoalsToRos2:
                     goal.ended_in_ros2_s = now_s
 
     def knows(self, goal_uuid: bytes) -> bool:
-        """Tell whether what the server says is about a goal of ours."""
+        """Tell whether an id is that of a goal of this bridge."""
         with self.lock:
             return goal_uuid in self._by_uuid
 
     def on_feedback(self, goal_uuid: bytes, payload: bytes) -> None:
-        """Pass on what the server says on the way."""
+        """Pass on feedback."""
         with self.lock:
             goal = self._by_uuid.get(goal_uuid)
             if goal is not None and goal.open:
@@ -214,7 +214,7 @@ class GoalsToRos2:
                 self._clients.publish_feedback(goal.goal_status, payload)
 
     def on_result(self, goal_uuid: bytes, status: Ros2Status, payload: bytes | None, reason: str, now_s: float) -> None:
-        """End a goal with what the server says; UNKNOWN comes from a server that has not seen the goal."""
+        """End a goal with the server's result; UNKNOWN comes from a server that has not seen the goal."""
         with self.lock:
             goal = self._by_uuid.get(goal_uuid)
             if goal is None or not goal.open:
@@ -228,7 +228,7 @@ class GoalsToRos2:
             self._end(goal, final if final in ROS1_TERMINAL else Ros1Status.ABORTED, payload, reason, now_s)
 
     def tick(self, now_s: float) -> None:
-        """Do what time brings: send to a server that came, give up on one that went, publish the list, forget the ended."""
+        """Do what is due: send to a server that came, give up on one that went, publish the list, drop ended goals."""
         with self.lock:
             present, come = self._server.present(), self._server.has_come()
             for goal in list(self._goals.values()):

@@ -61,7 +61,7 @@ class Heartbeat:
         try:
             self._ros2.publish(cdr)
             self._ros1.publish(self._type.to_ros1(cdr))
-        except Exception as error:  # noqa: BLE001 - of a world that is going away; the other one still has to hear
+        except Exception as error:  # noqa: BLE001 - one world may be shutting down; the other one still gets its heartbeat
             logger.warning("a heartbeat failed: %s", error)
 
     def close(self, within_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Hold on to routes for a while after their reason has gone.
+"""Keep routes for a while after their last publisher or subscriber has gone.
 
 A publisher that sends one message and leaves must not take the route with it before the message has arrived, and a subscriber that
 restarts must not find everything torn down.

@@ -1,4 +1,4 @@
-"""The ROS 1 master: the only module that talks to it. One thread asks it; everything else it tells by itself, or is asked for once.
+"""The client of the ROS 1 master, and the only module that talks to it: one thread polls its state, other calls are made once.
 
 The master calls nodes when the publishers of a topic or parameters change (``ros1_node``), but not when it was restarted, nor when topics,
 subscribers or services come and go. So ``getSystemState`` is asked for five times a second on a kept connection. The answer is not even

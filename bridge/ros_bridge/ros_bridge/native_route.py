@@ -1,4 +1,4 @@
-"""What Python keeps of a route of the data plane, of a topic or a service: its handle, its figures, and what Python converts for it."""
+"""The Python side of a data plane's route, of a topic or a service: its handle, its figures, its converters."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class NativeRoute:
         self._converters: dict[MessageKind, BytesConverter] = {}
 
     def figures(self) -> Figures:
-        """Return what has crossed."""
+        """Return the figures so far."""
         with self._lock:
             self._read()
             counters = self._last

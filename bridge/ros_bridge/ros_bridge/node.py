@@ -85,13 +85,13 @@ class Bridge:
             self.table.start(spec)
 
     def run(self, stop: threading.Event, stats_file: Path | None) -> None:
-        """Bridge until asked to stop, also by ROS 1; figures are this thread's."""
+        """Bridge until asked to stop, also by ROS 1; this thread writes the figures."""
         self._plane.node.on_shutdown = stop.set
         self._spinner.start()
         self._heartbeat.start()
         self._monitor.start()
         self._open_configured()
-        counts = f"{len(self._config.topics)} topics and {len(self._config.services)} services"
+        counts = ", ".join(f"{len(getattr(self._config, section))} {section}" for section in SECTION_OF.values())
         logger.info("bridging %s%s", counts, " and what discovery finds" if self._discovery is not None else "")
         if self._discovery is not None:
             self._discovery.start()
@@ -126,7 +126,7 @@ class Bridge:
             logger.warning("the figures can't be written to %s: %s", stats_file, error)
 
     def _state(self) -> dict[str, object]:
-        """Return what a heartbeat says besides its number."""
+        """Return the content of a heartbeat besides its number."""
         routes = self.table.running()
         return {
             "pid": os.getpid(),

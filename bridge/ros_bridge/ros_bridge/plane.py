@@ -1,4 +1,4 @@
-"""The data plane: the native half that moves messages and calls, the ROS 1 node that finds peers for it, and what holds them together.
+"""The data plane: the native half that moves messages and calls, the ROS 1 node that finds peers for it, and the connection between them.
 
 One thread hears the native half's events and tries publishers again that were lost. Another takes the few messages that Python sees:
 those of its own endpoints, and those of types that the worlds lay out differently.

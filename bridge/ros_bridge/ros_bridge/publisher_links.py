@@ -52,7 +52,7 @@ def resolve(host: str, port: int) -> bytes:
 
 
 class PublisherLinks:
-    """All of them. Safe from several threads; ``node`` has to be set before the first subscription."""
+    """All connections to publishers. Safe from several threads; ``node`` has to be set before the first subscription."""
 
     node: Ros1Node
 
@@ -136,7 +136,7 @@ class PublisherLinks:
             link.next_try_s = time.monotonic() + pause_s
 
     def on_event(self, kind: EventKind, token: int, text: str) -> None:
-        """Take what the data plane tells of a connection."""
+        """Handle an event of a connection."""
         with self._lock:
             link = self._links.get(token)
             if link is None:

@@ -155,7 +155,7 @@ class Ros1Node:
         return f"rosrpc://{self._host}:{self._topics_port}"
 
     def subscribe_parameters(self, changed: Callable[[], None]) -> None:
-        """Have ``changed`` called now, after a restart of the master, and whenever the master tells that a parameter has changed."""
+        """Call ``changed`` now, after a restart of the master, and whenever the master tells that a parameter has changed."""
         self._on_parameters = changed
         try:
             self._master.call("subscribeParam", self.name, self.uri, "/")

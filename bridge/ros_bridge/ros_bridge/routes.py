@@ -27,7 +27,7 @@ logger = logging.getLogger("ros_bridge")
 
 
 class Route(Protocol):
-    """One thing that crosses. Made by its kind's maker, which raises BridgeError when it can't be."""
+    """A route of one topic, service or action; its kind's maker makes it, or raises BridgeError."""
 
     def start(self) -> None:
         """Open the end that messages or calls come from; the maker has opened the other, so that its peers can connect first."""
@@ -40,7 +40,7 @@ class Route(Protocol):
 
 
 class TopicBridge(Route, Protocol):
-    """What the node needs of a topic's route besides."""
+    """A topic's route, which also counts its peers."""
 
     def target_peers(self) -> int:
         """Return how many subscribers are connected to the end that messages go out of."""
@@ -51,7 +51,7 @@ class TopicBridge(Route, Protocol):
 
 @dataclass(frozen=True)
 class Context:
-    """What a maker may use."""
+    """The parts of the bridge that a maker uses."""
 
     node: Node
     types: Types
@@ -69,7 +69,7 @@ Key = tuple[str, str, str, str]
 
 
 def key_of(spec: Spec) -> Key:
-    """Return what stays the same of a route while its quality of service or type changes: kind, way and names."""
+    """Return the key of a route that outlasts changes of its quality of service and type: kind, direction and names."""
     way = spec.direction if isinstance(spec, TopicRoute) else spec.server
     return type(spec).__name__, way.value, spec.ros1_name, spec.ros2_name
 

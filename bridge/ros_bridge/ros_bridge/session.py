@@ -1,4 +1,4 @@
-"""Both nodes from their beginning to their end."""
+"""The life of the bridge's process: checks, both nodes, the bridge, and its end."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def list_session(config: BridgeConfig, master: Connection, name: str) -> str:
 
 
 def _end_for_sure() -> None:
-    """End the process in any case: a master or peer that hangs may hold up the farewell, and the figures are written by now."""
+    """End the process after ``END_WITHIN_S`` even if a master or peer that hangs holds up ``close``; the figures are written by now."""
     timer = threading.Timer(END_WITHIN_S, os._exit, (0,))
     timer.daemon = True
     timer.start()

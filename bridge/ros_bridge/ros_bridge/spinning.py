@@ -1,4 +1,4 @@
-"""Spin the executor of ROS 2 as long as the bridge lives, whatever its callbacks and its ends do."""
+"""Spin the executor of ROS 2 as long as the bridge lives, also after a callback has raised."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import struct
+import uuid
 
 import pytest
 from hypothesis import given, settings
@@ -13,7 +14,7 @@ from ros_bridge.action_types import action_type, split
 from ros_bridge.actionlib_wire import GoalId, GoalStatus
 from ros_bridge.conversion import Types, ament_prefixes
 from ros_bridge.errors import TypeUnknownError, WireError
-from ros_bridge.goals_to_ros1 import GoalsToRos1
+from ros_bridge.goals_to_ros1 import KEEP_RESULT_BYTES, KEEP_RESULT_S, KEEP_RESULTS, GoalsToRos1
 from ros_bridge.goals_to_ros2 import GoalsToRos2
 
 LAST_NS = 0xFFFFFFFF * 1_000_000_000
@@ -344,3 +345,41 @@ def test_restarted_actionlib_server_that_no_longer_lists_a_goal_aborts_it():
     table.request_cancel("cancel", goal_uuid(0), 0, 0.3)
     table.request_cancel("cancel", goal_uuid(5), 0, 0.3)
     assert clients.cancels == [(CancelCode.GOAL_TERMINATED, []), (CancelCode.UNKNOWN_GOAL_ID, [])]
+
+
+def ended_goals(count, size=0):
+    """Return a table of goals that have ended one after another, at 0.0 s, 0.01 s and so on, with results of this size."""
+    clients = Clients2()
+    table = GoalsToRos1("test", 5.0)
+    table.connect(Server(), clients)
+    for number in range(count):
+        name = uuid.UUID(int=number + 1)
+        status = GoalStatus(GoalId(str(name), 9), Ros1Status.SUCCEEDED)
+        table.request_goal(number, name.bytes, b"", 0.01 * number)
+        table.on_result(status, bytes(size), 0.01 * number)
+    return table, clients
+
+
+def kept(table, clients, now_s):
+    """Return the numbers of the goals whose results are still known."""
+    table.tick(now_s)
+    clients.results.clear()
+    for number in clients.answers:
+        table.request_result(number, uuid.UUID(int=number + 1).bytes)
+    return [number for number, status in clients.results.items() if status is Ros2Status.SUCCEEDED]
+
+
+def test_a_result_can_be_asked_for_until_a_minute_after_the_end():
+    table, clients = ended_goals(2)
+    assert kept(table, clients, KEEP_RESULT_S) == [0, 1]
+    assert kept(table, clients, KEEP_RESULT_S + 0.005) == [1]
+    assert kept(table, clients, KEEP_RESULT_S + 1.0) == []
+
+
+def test_of_too_many_or_too_large_results_the_oldest_are_dropped():
+    table, clients = ended_goals(KEEP_RESULTS + 3)
+    assert kept(table, clients, 20.0) == list(range(3, KEEP_RESULTS + 3))
+    table, clients = ended_goals(3, KEEP_RESULT_BYTES // 2)
+    assert kept(table, clients, 1.0) == [1, 2]
+    table, clients = ended_goals(2, KEEP_RESULT_BYTES + 1)
+    assert kept(table, clients, 1.0) == [1]

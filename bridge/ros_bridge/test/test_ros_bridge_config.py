@@ -1,14 +1,16 @@
 """Configuration errors name file, line, value and remedy; routes can't meet or go round in circles."""
 
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from ros_bridge.config import Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
-from ros_bridge.config_file import load_config, read_config
+from ros_bridge.config_file import SERVICE_KEYS, TOPIC_KEYS, load_config, read_config
 from ros_bridge.errors import ConfigError
 from ros_bridge.selection import Selection
+from skill_language.robot import BridgedService, BridgedTopic
 
 
 @pytest.fixture
@@ -46,6 +48,11 @@ def test_reads_all_keys_and_defaults(parsed):
         TopicRoute("/old", "/new", Direction.ROS2_TO_ROS1, "std_msgs/String", latched=True, depth=1, reliability=Reliability.BEST_EFFORT),
     )
     assert config.services == (ServiceRoute("/uav_guidance/takeoff", "/uav_guidance/takeoff", RosVersion.ROS1, "uav_msgs/Takeoff", 2.0),)
+
+
+def test_a_robots_bindings_have_the_keys_of_routes():
+    assert {field.name for field in fields(BridgedTopic)} == set(TOPIC_KEYS)
+    assert {field.name for field in fields(BridgedService)} == set(SERVICE_KEYS)
 
 
 DISCOVERED = """
