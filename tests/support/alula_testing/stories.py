@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from skill_language.errors import Diagnostic
 from skill_language.models import check_files
-from skill_language.prove import Finding, prove
+from skill_language.prove import prove
 from skill_model.model import Skillset
 
 PAGE = Path(__file__).resolve().parents[3] / "skillsets" / "PROOFS.md"
@@ -49,7 +50,7 @@ skillset uav {
 MODELS = {**EXAMPLES, "data and time": DATA, "from outside": OUTSIDE}
 
 
-def stories(path: Path, text: str) -> tuple[Skillset, list[Finding]]:
+def stories(path: Path, text: str) -> tuple[Skillset, list[Diagnostic]]:
     """Return the skillset of a model, written to ``path``, and the findings that tell a story."""
     path.write_text(text)
     (file,) = check_files([path])

@@ -90,8 +90,7 @@ def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) 
             if number and monotonic() >= end:
                 found.append(_not_begun(file.skillsets[number:], timeout_s))
                 break
-            proved = prove(skillset, closed_world=closed_world, timeout_s=max(0.0, end - monotonic()))
-            found += [finding.diagnostic() for finding in proved]
+            found += prove(skillset, closed_world=closed_world, timeout_s=max(0.0, end - monotonic()))
         file.add(found)
 
 

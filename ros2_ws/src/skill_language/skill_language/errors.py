@@ -23,6 +23,7 @@ class Diagnostic:
 
     ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about.
     ``example`` and ``story`` are a proof's counterexample: what must come together, and the run in which it does.
+    ``for_generator``: a warning about a sound model that no code can be generated of; to the generator, it is an error.
     """
 
     code: str
@@ -33,6 +34,7 @@ class Diagnostic:
     expected: tuple[str, ...] = ()
     example: tuple[str, ...] = ()
     story: Story = NO_STORY
+    for_generator: bool = False
     source_line: str = field(default="", compare=False)
 
     @property

@@ -16,9 +16,6 @@ from skill_model.model import Skillset
 from skill_model.ros_types import PRIMITIVES, RosType
 from skill_model.span import Span
 
-FOR_GENERATOR = frozenset({"ALU215", "ALU216", "ALU217", "ALU218"})
-"""What a model may have by itself, but not when interfaces and managers are made of it: these warnings are errors then."""
-
 
 def load_skillset(path: str | Path) -> Skillset:
     """Return the checked skillset of a file.
@@ -100,4 +97,4 @@ def _fit(robot: Robot, types: Mapping[str, RosType], bindings: Bindings, place: 
 
 def _generated(finding: Diagnostic) -> Diagnostic:
     """Return a finding as it counts for generated code."""
-    return replace(finding, severity=Severity.ERROR) if finding.code in FOR_GENERATOR else finding
+    return replace(finding, severity=Severity.ERROR) if finding.for_generator else finding

@@ -11,11 +11,15 @@ from skill_model.ros_types import PRIMITIVES, RosType
 
 Direction = Literal["ros1_to_ros2", "ros2_to_ros1"]
 World = Literal["ros1", "ros2"]
+Reliability = Literal["", "reliable", "best_effort"]
 
 
 @dataclass(frozen=True)
 class BridgedTopic:
-    """A topic that crosses the bridge; ``type`` is in the ROS 1 form ``package/Name``, the other names rename it on a side."""
+    """A topic that crosses the bridge, with the keys of a topic in the bridge's configuration; an empty value is not written there.
+
+    ``type`` is in the ROS 1 form ``package/Name``, ``ros1_name`` and ``ros2_name`` rename it on a side.
+    """
 
     name: str
     direction: Direction
@@ -24,11 +28,13 @@ class BridgedTopic:
     depth: int = 10
     ros1_name: str = ""
     ros2_name: str = ""
+    ros2_type: str = ""
+    reliability: Reliability = ""
 
 
 @dataclass(frozen=True)
 class BridgedService:
-    """A service that crosses the bridge; ``server`` says in which world it is answered."""
+    """A service that crosses the bridge, as ``BridgedTopic``; ``server`` says in which world it is answered."""
 
     name: str
     server: World
@@ -36,6 +42,7 @@ class BridgedService:
     timeout_s: float = 5.0
     ros1_name: str = ""
     ros2_name: str = ""
+    ros2_type: str = ""
 
 
 @dataclass(frozen=True)

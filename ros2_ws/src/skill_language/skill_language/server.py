@@ -138,7 +138,7 @@ def did_save(ls: SkillLanguageServer, params: lsp.DidSaveTextDocumentParams) -> 
     file = ls.file(uri)
     if file is None or file.damaged or has_errors(file.findings):
         return
-    found = [finding.diagnostic() for skillset in file.skillsets for finding in prove(skillset, timeout_s=PROOFS_S)]
+    found = [finding for skillset in file.skillsets for finding in prove(skillset, timeout_s=PROOFS_S)]
     if ls.file(uri) is file:
         _publish(ls, uri, found)
 

@@ -63,6 +63,8 @@ _CHECKS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
     "ros1_name": ("an absolute ROS name", lambda v: isinstance(v, str) and v.startswith("/")),
     "ros2_name": ("an absolute ROS name", lambda v: isinstance(v, str) and v.startswith("/")),
     "type": ("package/Name", lambda v: isinstance(v, str) and v.count("/") == 1 and parse_type(v) is not None),
+    "ros2_type": ("package/Name", lambda v: isinstance(v, str) and v.count("/") == 1 and parse_type(v) is not None),
+    "reliability": ("reliable or best_effort", lambda v: v in {"reliable", "best_effort"}),
     "direction": ("ros1_to_ros2 or ros2_to_ros1", lambda v: v in {"ros1_to_ros2", "ros2_to_ros1"}),
     "server": ("ros1 or ros2", lambda v: v in {"ros1", "ros2"}),
     "latched": ("true or false", lambda v: isinstance(v, bool)),

@@ -38,7 +38,7 @@ data:
   rover.height: /height
 topics:
   - {name: /clock, direction: ros1_to_ros2, type: rosgraph_msgs/Clock}
-  - {name: /out, direction: ros2_to_ros1, type: std_msgs/Header, ros1_name: /other}
+  - {name: /out, direction: ros2_to_ros1, type: std_msgs/Header, ros1_name: /other, reliability: best_effort}
 services:
   - {name: /drive, server: ros1, type: std_srvs/SetBool, timeout_s: 2}
 """

@@ -7,7 +7,7 @@ import pytest
 from skill_language.check import check
 from skill_language.codes import CODES, PROOF_CODES
 from skill_language.errors import LanguageError, Severity
-from skill_language.load import FOR_GENERATOR, check_file, load_robot
+from skill_language.load import check_file, load_robot
 from skill_language.paper import parse
 
 AXES = "resource axes { initial FREE FREE -> USED USED -> FREE }\n"
@@ -146,14 +146,14 @@ SEMANTICS = [
     ("ALU214", 'data d: string skill f { precondition { p: data = (^d < "a") } result { R } }', "doesn't compare a text", ""),
     ("ALU214", "data d: float64 " + asks("precondition { p: data = (^d == true) }"), "can't be compared with True", ""),
     ("ALU214", "data d: float64 " + asks("precondition { p: data = (^d.x > 1) }"), "has no field `x`", ""),
-    ("ALU215", "skill ^start { result { R } }", "client needs the name `start`", ""),
-    ("ALU215", "skill ^lambda { result { R } }", "client needs the name `lambda`", ""),
-    ("ALU215", "skill f { output { ^outcome: string } result { R } }", "needs the field `outcome`", ""),
+    ("ALU215", "skill f { output { ^outcome: string } result { R } }", "needs the name `outcome`", ""),
+    ("ALU215", "skill f { output { ^execution: string } result { R } }", "needs the name `execution`", ""),
     ("ALU215", "skill f { input { ^skill: string } result { R } }", "needs the name `skill`", ""),
     ("ALU216", "skill f { input { ^Height: float64 } result { R } }", "`Height` can't be the name of a ROS field", "a-z"),
     ("ALU216", "skill f { input { ^class: float64 } result { R } }", "`class` can't be", "no word of Python"),
     ("ALU216", "skill f { input { ^a__b: float64 } result { R } }", "`a__b` can't be", ""),
     ("ALU216", "skill ^_f { result { R } }", "can't be the name of a ROS action", "begins with a letter"),
+    ("ALU216", "skill ^none { result { R } }", "can't be the name of a ROS action", "is not None"),
     ("ALU216", "data ^Level: float64", "can't be the name of a ROS data", ""),
     ("ALU217", "skill go_to { result { R } } skill ^goTo { result { R } }", "`go_to` and `goTo` are both `GoTo`", ""),
     ("ALU218", "skill ^f { progress = 1 }", "skill `f` has no result", "result"),
@@ -197,7 +197,9 @@ def test_semantics(code, marked, message, hint):
         assert (finding.span.line, finding.span.column) == (place[0], column)
     assert message in finding.message
     assert hint in finding.hint
-    assert finding.severity is (Severity.WARNING if code.startswith("ALU3") or code in {"ALU212", *FOR_GENERATOR} else Severity.ERROR)
+    assert finding.for_generator == (code in {"ALU215", "ALU216", "ALU217", "ALU218"})
+    warns = code.startswith("ALU3") or code == "ALU212" or finding.for_generator
+    assert finding.severity is (Severity.WARNING if warns else Severity.ERROR)
 
 
 def test_an_effect_that_only_ever_stays_in_the_initial_state_is_a_warning():

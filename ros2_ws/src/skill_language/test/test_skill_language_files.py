@@ -104,6 +104,7 @@ def test_data_that_no_topic_can_carry(tmp_path):
         ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/msg/Header}]", "it should be package/Name"),
         ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, deph: 3}]", "unknown key `deph`"),
         ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, depth: 0}]", "`depth` is 0"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, reliability: no}]", "should be reliable or best_effort"),
         ("", "services: [{name: /a, server: ros1, type: std_srvs/SetBool, timeout_s: -1}]", "`timeout_s` is -1"),
         ("", "services: [{name: /a, type: std_srvs/SetBool}]", "services[0] has no `server`"),
         ("", "service: []", "unknown section `service`; there are `data`, `topics`, `services`"),

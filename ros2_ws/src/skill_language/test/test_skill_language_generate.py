@@ -80,6 +80,7 @@ def test_the_bridge_configuration(files):
                 "latched": False,
                 "depth": 10,
                 "ros1_name": "/other",
+                "reliability": "best_effort",
             },
             {"name": "/battery", "direction": "ros1_to_ros2", "type": "sensor_msgs/BatteryState", "latched": True, "depth": 3},
             {"name": "/height", "direction": "ros1_to_ros2", "type": "std_msgs/Float64", "latched": False, "depth": 5},

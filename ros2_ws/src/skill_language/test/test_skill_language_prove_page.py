@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from skill_language.check_cli import main
 from skill_language.codes import PROOF_CODES
 from skill_language.errors import Severity, has_errors
 from skill_language.models import check_files
@@ -71,6 +72,6 @@ def test_time_is_bounded_and_said(tmp_path):
 
 
 def test_strict_makes_errors_of_warnings(tmp_path):
-    broken = SECTIONS["ALU522"][1][0][1]
-    assert {f.severity for f in proved(tmp_path, broken)} == {Severity.WARNING}
-    assert {f.severity for f in proved(tmp_path, broken, strict=True)} == {Severity.ERROR}
+    path = tmp_path / "example.rl"
+    path.write_text(SECTIONS["ALU522"][1][0][1])
+    assert [main([str(path), *options]) for options in ((), ("--strict",))] == [0, 1]

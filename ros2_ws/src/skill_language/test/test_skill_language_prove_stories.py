@@ -56,7 +56,7 @@ def test_goto_loses_its_invariant_right_after_the_start(most, tmp_path):
         "2. event lost: authority Pilot -> None",
         "3. goto starts; `in_control` of goto is false and ends it",
     )
-    assert finding.diagnostic().as_json()["counterexample"] == list(finding.counterexample)
+    assert finding.as_json()["counterexample"] == list(finding.counterexample)
 
 
 ARM = Resource("arm", ("In", "Out"), "In", (Transition("In", "Out"), Transition("Out", "In")))

@@ -1,4 +1,4 @@
-"""The drone's models: the paper's listings in them, the resources of docs/architecture.md."""
+"""The drone's models: the listings of the paper in them, and the resources that nodes of the functional layer report."""
 
 from __future__ import annotations
 

@@ -29,6 +29,11 @@ INTEGER_RANGES: Mapping[str, tuple[int, int]] = {
 }
 """The smallest and the largest value of each integer type."""
 
+RESULT_FIELDS = ("outcome", "result", "message")
+"""Fields of the result of every skill's action; the skill's outputs follow."""
+FEEDBACK_FIELDS = ("progress", "state")
+"""Fields of the feedback of every skill's action; the skill's outputs follow."""
+
 _FIELD = re.compile(r"[a-z](?:_?[a-z0-9])*")
 _TYPE = re.compile(r"(?:(?P<package>[a-z][a-z0-9_]*)/(?:msg/)?)?(?P<name>[A-Za-z][A-Za-z0-9]*)(?P<array>\[\])?")
 

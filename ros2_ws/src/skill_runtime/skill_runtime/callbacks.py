@@ -1,4 +1,4 @@
-"""Callbacks that are called again and again, until they are forgotten."""
+"""Subscribed callbacks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
 CallbackT = TypeVar("CallbackT")
-Forget = Callable[[], None]
+Unsubscribe = Callable[[], None]
 """Ends a subscription."""
 
 
@@ -18,17 +18,17 @@ class Callbacks(Generic[CallbackT]):
         self._lock = threading.Lock()
         self._callbacks: list[CallbackT] = []
 
-    def add(self, callback: CallbackT) -> Forget:
-        """Have a callback told from now on; the return value ends that."""
+    def add(self, callback: CallbackT) -> Unsubscribe:
+        """Add a callback; the return value unsubscribes."""
         with self._lock:
             self._callbacks.append(callback)
 
-        def forget() -> None:
+        def unsubscribe() -> None:
             with self._lock:
                 if callback in self._callbacks:
                     self._callbacks.remove(callback)
 
-        return forget
+        return unsubscribe
 
     def __iter__(self) -> Iterator[CallbackT]:
         """Iterate over a copy: a callback may add others, and end any."""

@@ -25,14 +25,14 @@ from skillset_interfaces.srv import Describe, GetData, SetPaused, Transition, Tr
 from skillset_interfaces.srv import Why as WhyService
 
 from skill_model.execution_state import ExecutionState
-from skill_runtime.core.engine import PauseReply, TransitionReply
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from skill_runtime.core.records import ExecutionRecord, SkillRecord
+from skill_runtime.core.records import ExecutionRecord, ResourceStatus, SkillRecord
+from skill_runtime.core.replies import PauseReply, TransitionReply
 from skill_runtime.core.why import Unmet as UnmetPrecondition
 from skill_runtime.core.why import Why
-from skill_runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, ResourceStates, ResourceValue, SkillStates, Told, WhyReply
-from skill_runtime.plain import to_plain
-from skill_runtime.views import DataReading
+from skill_runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, PublishedEvent, ResourceStates, SkillStates, Topic, WhyReply
+from skill_runtime.plain import message_class, to_plain
+from skill_runtime.views import DataReading, Sample
 
 NANOSECONDS = 1_000_000_000
 
@@ -59,12 +59,13 @@ def stamp_ns_of(stamp: Any) -> int:
 class TopicCodec:
     """``encode(skillset, value)`` makes a message, ``decode(message)`` the value again."""
 
-    kind: type
+    kind: Any
+    """The message's class; None where only the graph knows it."""
     encode: Callable[[str, Any], Any]
     decode: Callable[[Any], Any]
 
 
-def event_message(skillset: str, told: Told) -> Any:
+def event_message(skillset: str, told: PublishedEvent) -> Any:
     """Return an event as a message; its outputs are there when it is the last of its execution."""
     event = told.event
     message = Event(skillset=skillset, sequence=event.sequence)
@@ -84,9 +85,9 @@ def event_message(skillset: str, told: Told) -> Any:
     return message
 
 
-def told_of(message: Any) -> Told:
+def published_event(message: Any) -> PublishedEvent:
     """Return an event; inputs and outputs are plain values."""
-    return Told(message.header.frame_id, event_of(message))
+    return PublishedEvent(message.header.frame_id, event_of(message))
 
 
 def event_of(message: Any) -> EngineEvent:
@@ -121,7 +122,7 @@ def states_message(skillset: str, states: ResourceStates) -> Any:
 def states_of(message: Any) -> ResourceStates:
     """Return resource states."""
     life, _, after = message.header.frame_id.partition(" ")
-    values = {one.name: ResourceValue(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
+    values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
     return ResourceStates(life, int(after or 0), stamp_ns_of(message.header.stamp), values)
 
 
@@ -140,20 +141,30 @@ def skills_of(message: Any) -> SkillStates:
 
 
 TOPICS: Mapping[str, TopicCodec] = {
-    EVENTS.name: TopicCodec(Event, event_message, told_of),
+    EVENTS.name: TopicCodec(Event, event_message, published_event),
     RESOURCE_STATES.name: TopicCodec(ResourceStatesMessage, states_message, states_of),
     SKILL_STATES.name: TopicCodec(SkillStatesMessage, skills_message, skills_of),
 }
 
 
+def codec_of(topic: Topic) -> TopicCodec:
+    """Return the codec of a topic: its own, or that of a data, whose values are ``Sample``s."""
+    if topic.name in TOPICS:
+        return TOPICS[topic.name]
+    kind: Any = message_class(topic.type_name) if topic.type_name else None
+    if topic.wrapped:
+        return TopicCodec(kind, lambda _, sample: kind(data=sample.value), lambda message: Sample(message.data, None))
+    return TopicCodec(kind, lambda _, sample: sample.value, lambda message: Sample(message, None))
+
+
 # Most of what these messages hold is what the one before has held: with many skills, to rebuild it would take most of the time.
 # Of each name the last is kept, so that nothing grows with the time that passes.
-_resources: dict[str, tuple[ResourceValue, Any]] = {}
+_resources: dict[str, tuple[ResourceStatus, Any]] = {}
 _encoded: dict[tuple[str, str], tuple[SkillRecord, Any]] = {}
 _decoded: dict[str, tuple[tuple[Any, ...], SkillRecord]] = {}
 
 
-def _resource(name: str, value: ResourceValue) -> Any:
+def _resource(name: str, value: ResourceStatus) -> Any:
     kept, message = _resources.get(name, (None, None))
     if kept != value:
         message = ResourceState(name=name, state=value.state, previous_state=value.previous, stamp_ns=value.stamp_ns)

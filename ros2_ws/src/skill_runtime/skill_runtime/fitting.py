@@ -5,20 +5,13 @@ Errors name ``place``, as in ``inputs of navigation.takeoff, height``, and ``kin
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from typing import Any
+
+from skill_model.ros_types import INTEGER_RANGES, PRIMITIVES
 
 Limits = tuple[int, int]
 """The lowest and the highest value of a whole number."""
-
-
-def _limits(bits: int, *, signed: bool) -> Limits:
-    return (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
-
-
-INTEGERS: Mapping[str, Limits] = {f"int{bits}": _limits(bits, signed=True) for bits in (8, 16, 32, 64)} | {
-    f"uint{bits}": _limits(bits, signed=False) for bits in (8, 16, 32, 64)
-}
 
 
 def check_name(name: str, names: Collection[str], place: str) -> None:
@@ -53,6 +46,19 @@ def instance(wanted: type, value: Any, kind: str, place: str) -> Any:
     if isinstance(value, wanted):
         return value
     raise ValueError(f"{place} takes a {kind}, not {value!r}")
+
+
+def primitive(kind: str, value: Any, place: str) -> bool | int | float | str:
+    """Return a value as the ROS primitive ``kind`` holds it; raise ValueError when it does not fit."""
+    match PRIMITIVES[kind]:
+        case "int":
+            return whole_number(value, kind, place, INTEGER_RANGES[kind])
+        case "float":
+            return float(number(value, kind, place))
+        case "bool":
+            return bool(instance(bool, value, kind, place))
+        case _:
+            return str(instance(str, value, kind, place))
 
 
 def elements(value: Any, kind: str, place: str, *, no_lists: tuple[type, ...] = (str, bytes)) -> Iterator[tuple[str, Any]]:

@@ -1,4 +1,4 @@
-"""One execution as its client sees it, whatever the middleware."""
+"""One execution as its client sees it, over any middleware."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Generic, Self, TypeVar, cast
 
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.waiting import Host, Moment, Pending, Waitable
+from skill_runtime.waiting import Moment, Pending, Waitable, Waiter
 
 OutputsT = TypeVar("OutputsT", bound=Mapping[str, object])
 ResultT = TypeVar("ResultT", bound=str)
@@ -70,7 +70,7 @@ class Report(Generic[OutputsT]):
 
 
 class Handle(Waitable, Generic[OutputsT, ResultT]):
-    """An execution that was asked for; all of it may be read and used from any thread, and only what says so waits.
+    """A requested execution. It may be read and used from any thread; only methods that say so wait.
 
     ``result`` names the model's result when TERMINATED, the precondition when NOT_READY, the invariant when
     RESOURCE_INVARIANT_VIOLATED. ``outcome`` is the terminal state's name, empty before.
@@ -87,9 +87,9 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         interrupt: Callable[[], None] | None = None,
         *,
         pause: Callable[[bool], Pending[str]] | None = None,
-        host: Host | None = None,
+        waiter: Waiter | None = None,
     ) -> None:
-        super().__init__(host)
+        super().__init__(waiter)
         self.skill = skill
         self.id = execution_id
         self.state = ExecutionState.REQUESTED
@@ -133,7 +133,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         if not self.done and self._pause is not None:
             self._requested("pause" if paused else "resume")
             return self._pause(paused)
-        refused: Pending[str] = Pending(self._host)
+        refused: Pending[str] = Pending(self._waiter)
         refused.resolve(f"{self.skill} has ended" if self.done else f"{self.skill} can't be paused")
         return refused
 
@@ -144,22 +144,22 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         raise StillRunningError(f"{self.skill} is {self.state.value} and has not ended within {timeout_s:g} s")
 
     def add_done_callback(self, callback: Callable[[Self], None]) -> None:
-        """Have ``callback(handle)`` called once at the end, on the thread that brings it; at once when it has ended."""
+        """Call ``callback(handle)`` once at the end, on the thread that brings it; at once when it has ended."""
         self.call_at_end(lambda: callback(self))
 
     def on_report(self, callback: Callable[[Report[OutputsT]], None]) -> None:
-        """Have ``callback(report)`` called at each change of state, progress or outputs, on the thread that brings it."""
+        """Call ``callback(report)`` at each change of state, progress or outputs, on the thread that brings it."""
         with self._lock:
             self._listeners.append(callback)
 
     def on_request(self, callback: Callable[[str], None]) -> None:
-        """Have ``callback(kind)`` called when something is asked of the execution: ``interrupt``, ``pause`` or ``resume``."""
+        """Call ``callback(kind)`` when something is asked of the execution: ``interrupt``, ``pause`` or ``resume``."""
         with self._lock:
             self._request_listeners.append(callback)
 
     def reports(self) -> Reports[OutputsT]:
         """Follow the execution from now to its end, in a ``for`` or an ``async for``."""
-        return Reports(self, self._host)
+        return Reports(self, self._waiter)
 
     def __iter__(self) -> Reports[OutputsT]:
         return self.reports()
@@ -246,11 +246,11 @@ SkillHandle = Handle[dict[str, Any], str]
 class Reports(Generic[OutputsT]):
     """The reports of one execution, from where it was when they were asked for to its end; for one reader."""
 
-    def __init__(self, handle: Handle[OutputsT, Any], host: Host) -> None:
+    def __init__(self, handle: Handle[OutputsT, Any], waiter: Waiter) -> None:
         self._handle = handle
-        self._host = host
+        self._waiter = waiter
         self._waiting: deque[Report[OutputsT]] = deque(maxlen=REPORTS_KEPT)
-        self._news = Moment(host)
+        self._news = Moment(waiter)
         self._over = False
         handle.on_report(self._take)
         if not self._waiting:
@@ -258,7 +258,7 @@ class Reports(Generic[OutputsT]):
 
     def _take(self, report: Report[OutputsT]) -> None:
         self._waiting.append(report)
-        news, self._news = self._news, Moment(self._host)
+        news, self._news = self._news, Moment(self._waiter)
         news.come()
 
     def _next(self) -> Report[OutputsT] | None:

@@ -19,6 +19,11 @@ def unwritten(hook: HookT) -> HookT:
     return hook
 
 
+def is_written(hooks: SkillHooks, name: str) -> bool:
+    """Tell whether a hook does anything: whether it was overridden, or is not marked as ``unwritten``."""
+    return not getattr(getattr(hooks, name), "unwritten", False)
+
+
 class SkillHooks:
     """Base of all hooks; every method may be overridden, ``on_dispatch`` should be.
 
@@ -78,3 +83,8 @@ class SkillHooks:
     def on_failure(self, execution: Execution) -> None:
         """Stop the function. Called after the execution has ended as FAILED, ``execution.message`` says why."""
         self.on_interrupt(execution)
+
+
+NOT_HOOKS = {"make_inputs"}
+HOOKS = tuple(name for name, member in vars(SkillHooks).items() if callable(member) and not name.startswith("_") and name not in NOT_HOOKS)
+"""The names of all hooks."""

@@ -24,7 +24,7 @@ from skill_runtime.story_play import PlayedStep, play
 from skill_runtime.story_world import Hooks, MakeWorld
 
 SETTLE_S = 10.0
-"""What has not happened after so long (wall clock) is not expected any more."""
+"""How long (wall clock) a condition is waited for."""
 CLOCK_S = 30.0
 LOOK_S = 0.005
 NANOSECONDS = 1_000_000_000

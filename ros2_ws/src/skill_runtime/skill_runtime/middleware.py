@@ -1,11 +1,11 @@
-"""What managers and clients need of a middleware: about a dozen verbs. rclpy, rospy and virtual time are adapters of it.
+"""The middleware port: the verbs that managers and clients need. rclpy, rospy and virtual time are its adapters.
 
 One instance serves one skillset, on one side of its interface; names of topics, services and skills are relative to the skillset.
 Values cross as Python has them (``EngineEvent``, mappings of inputs, ``TransitionReply``); adapters make messages of them with the
 codecs of ``skill_runtime.codecs``. Callbacks come one at a time, on the middleware's loop: the executor of an rclpy node, a thread
 of the rospy adapter, the virtual clock. They must not wait.
 
-Whatever a middleware may lose (a late discovery, a lost answer) is asked for again inside its adapter.
+An adapter asks again for what its middleware may lose (the answer of a service that was discovered late).
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from skill_model.execution_state import ExecutionState
 from skill_model.model import Data
 from skill_model.ros_types import PRIMITIVES
 from skill_runtime.core.events import EngineEvent, ExecutionEvent
-from skill_runtime.core.records import SkillRecord
+from skill_runtime.core.records import ResourceStatus, SkillRecord
 from skill_runtime.core.why import Why
-from skill_runtime.waiting import Host
+from skill_runtime.timers import Job, Timer
+from skill_runtime.waiting import Waiter
 
-Job = Callable[[], object]
 OnValue = Callable[[Any], None]
 OnSign = Callable[[str, int], None]
-"""Gets the life of the managers, and when they gave the sign (mission clock, ns); 0 where the middleware does not tell."""
+"""Gets the id of the managers' life, and the stamp of the sign (mission clock, ns); 0 where the middleware has none."""
 OnReply = Callable[[Any, int], None]
-"""Gets the answer, and how often it was asked for: an answer to the first request may have got lost."""
+"""Gets the response, and how many requests were sent for it: the response to an earlier one may have got lost."""
 OnError = Callable[[str], None]
 Reply = Callable[[Any], None]
 Serve = Callable[[Mapping[str, Any], Reply], None]
 """Answers a request, given its fields by name: calls ``reply(value)`` once, now or later, from any thread."""
 
 CALL_S = 5.0
-"""How long a call may take by default."""
+"""Default time limit of a call."""
 
 
 @dataclass(frozen=True)
@@ -43,20 +43,20 @@ class Topic:
 
     Args:
         name: relative to the skillset; of the functional layer, as it is bound.
-        keep: so many of the last values are given to a late subscriber.
+        depth: so many of the last values are given to a late subscriber.
         type_name: of a data, ``package/Name``; empty: the codec of this name has it, or the graph tells.
         wrapped: the values are primitives, which come as std_msgs/Float64 and the like.
-        outside: of the functional layer.
+        outside: a topic of the functional layer, not of the skillset interface.
     """
 
     name: str
-    keep: int = 1
+    depth: int = 1
     type_name: str = ""
     wrapped: bool = False
     outside: bool = False
 
 
-EVENTS = Topic("events", keep=1000)
+EVENTS = Topic("events", depth=1000)
 RESOURCE_STATES = Topic("resource_states")
 SKILL_STATES = Topic("skill_states")
 
@@ -67,27 +67,18 @@ def data_topic(data: Data, type_name: str = "") -> Topic:
 
 
 @dataclass(frozen=True)
-class ResourceValue:
-    """A resource at one moment; ``previous`` is empty before the first transition."""
-
-    state: str
-    previous: str
-    stamp_ns: int
-
-
-@dataclass(frozen=True)
 class ResourceStates:
-    """All resources after a step; ``after`` is the number of the last event that they include, ``life`` names the managers."""
+    """All resources after a step; ``after``: the last event that they include; ``life``: an id, new at each start of the managers."""
 
     life: str
     after: int
     stamp_ns: int
-    resources: Mapping[str, ResourceValue]
+    resources: Mapping[str, ResourceStatus]
 
 
 @dataclass(frozen=True)
-class Told:
-    """An event, and which managers tell it."""
+class PublishedEvent:
+    """An event, with the ``life`` of the managers that published it."""
 
     life: str
     event: EngineEvent
@@ -103,8 +94,8 @@ class SkillStates:
 
 
 @dataclass(frozen=True)
-class Ending:
-    """How a goal ended, as its action tells it."""
+class GoalResult:
+    """The result of a goal, as its action carries it."""
 
     state: ExecutionState
     result: str
@@ -114,30 +105,22 @@ class Ending:
 
 @dataclass(frozen=True)
 class WhyReply:
-    """The answer to ``why``: what was found and the resources, or what is wrong with the question."""
+    """The response of ``why``: the answer and the resources, or the ``error`` of the request."""
 
     error: str
     why: Why | None = None
-    resources: Mapping[str, ResourceValue] = field(default_factory=dict)
-
-
-class Timer(Protocol):
-    """A job that waits for its moment."""
-
-    def cancel(self) -> None:
-        """Let the job not happen; without effect when it has."""
-        ...
+    resources: Mapping[str, ResourceStatus] = field(default_factory=dict)
 
 
 class Publisher(Protocol):
     """A topic's writing end; it may be used from any thread."""
 
     def publish(self, value: Any) -> None:
-        """Send a value to all subscribers, and keep it for those to come."""
+        """Send a value to all subscribers, and keep it for later ones."""
         ...
 
     def flush(self, timeout_s: float) -> None:
-        """Wait (wall clock) until the subscribers have what was sent: that of a process that ends would be lost."""
+        """Wait (wall clock) until the subscribers have received everything: what a process has sent just before its end may be lost."""
         ...
 
 
@@ -169,7 +152,7 @@ class ActionLink(Protocol):
 
     @property
     def connected(self) -> bool:
-        """Tell whether nothing that is sent now would be lost on its way to or from the managers."""
+        """Tell whether both directions are connected, so that no message is lost."""
         ...
 
     @property
@@ -186,7 +169,7 @@ class ActionLink(Protocol):
         ...
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:
-        """Send a goal and follow it; ``on_answer`` tells whether it was taken, where the middleware tells it."""
+        """Send a goal and follow it; ``on_answer`` gets whether it was accepted, where the middleware has such an answer."""
         ...
 
     def cancel(self, goal_id: str) -> None:
@@ -194,62 +177,62 @@ class ActionLink(Protocol):
         ...
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:
-        """Cancel the goals of all clients; ``on_count`` gets how many there were, None where the middleware does not tell."""
+        """Cancel the goals of all clients; ``on_count`` gets their number, None where the middleware does not know it."""
         ...
 
-    def ask_ending(self, goal_id: str) -> None:
-        """Have a goal's ending told again, if the server knows it."""
+    def request_result(self, goal_id: str) -> None:
+        """Ask the server for the result of a goal; the listener gets it."""
         ...
 
     def release(self, goal_id: str) -> None:
-        """Follow a goal no more."""
+        """Stop following a goal."""
         ...
 
 
 class GoalListener(Protocol):
-    """What a client hears of its goals by their action."""
+    """Receives what the actions of a client send about its goals."""
 
     def on_feedback(self, goal_id: str, progress: float, outputs: Mapping[str, object]) -> None:
-        """Take a report of a goal that runs."""
+        """Take the feedback of a goal."""
         ...
 
-    def on_ending(self, goal_id: str, ending: Ending | None) -> None:
-        """Take the ending of a goal; None: the server does not know the goal."""
+    def on_result(self, goal_id: str, ending: GoalResult | None) -> None:
+        """Take the result of a goal; None: the server does not know the goal."""
         ...
 
 
 class Middleware(Protocol):
-    """The verbs."""
+    """The verbs; one instance serves one skillset, on one side of its interface."""
 
-    host: Host
-    """How a thread waits for what the loop brings."""
+    waiter: Waiter
+    """Blocks a thread until an event of the loop."""
 
     def now_ns(self) -> int:
         """Return the mission clock."""
         ...
 
     def at(self, when_ns: int, job: Job) -> Timer:
-        """Have a job done on the loop at a moment of the mission clock."""
+        """Run a job on the loop at a moment of the mission clock."""
         ...
 
     def later(self, delay_s: float, job: Job) -> Timer:
-        """Have a job done on the loop after a delay of wall clock (of mission clock where time is virtual)."""
+        """Run a job on the loop after a delay of wall clock (of mission clock where time is virtual)."""
         ...
 
     def submit(self, job: Job) -> None:
-        """Have a job done on the loop, soon; from any thread."""
+        """Run a job on the loop, soon; from any thread."""
         ...
 
     def defer(self, job: Job) -> None:
-        """Have a job done that may wait, on a thread of its own (where time is virtual: soon)."""
+        """Run a job that may wait, on a thread of its own (where time is virtual: soon)."""
         ...
 
     def when(self, condition: Callable[[], bool], job: Job) -> None:
-        """Have a job done on the loop once a condition holds that only the graph brings about; looked at now and then."""
+        """Run a job on the loop once a condition holds ; it is polled, for conditions of the graph that cause no event."""
         ...
 
     def log(self, error: str) -> None:
-        """Tell the operator of an error that no caller can be told of."""
+        """Log an error that no caller gets."""
         ...
 
     def new_id(self) -> str:
@@ -261,7 +244,7 @@ class Middleware(Protocol):
         ...
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
-        """Have ``callback(value)`` called for each value; the returned function tells whether the topic has a publisher."""
+        """Call ``callback(value)`` for each value; the returned function tells whether the topic has a publisher."""
         ...
 
     def serve(self, service: str, handler: Serve) -> None:
@@ -280,12 +263,12 @@ class Middleware(Protocol):
     ) -> None:
         """Call a service as soon as it is there; either ``on_reply`` or ``on_error`` is called, within the time.
 
-        ``once``: what the request asks for must not be done twice.
+        ``once``: send the request once only, because its effect must not happen twice.
         """
         ...
 
     def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> ActionServer:
-        """Serve a skill's action; ``on_cancel`` gets the id of a goal that was taken before."""
+        """Serve a skill's action; ``on_cancel`` gets the id of a goal that ``on_goal`` has got."""
         ...
 
     def action(self, skill: str, listener: GoalListener) -> ActionLink:
@@ -293,14 +276,14 @@ class Middleware(Protocol):
         ...
 
     def announce(self, life: str, on_rival: OnError) -> None:
-        """Give signs of life from now on, under the name of this life of the managers.
+        """Give signs of life from now on; ``life`` is the id of this start of the managers.
 
-        ``on_rival`` is called with the reason when managers of this skillset are there already.
+        ``on_rival`` is called with the reason when other managers of this skillset run already.
         """
         ...
 
     def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Have ``on_sign`` called when managers are heard of, and ``on_doubt()`` when their signs of life stay away."""
+        """Call ``on_sign`` at each sign of life of the managers, and ``on_doubt()`` when the signs stay away."""
         ...
 
     def close_hooks(self, timeout_s: float) -> bool:
@@ -308,5 +291,5 @@ class Middleware(Protocol):
         ...
 
     def close(self) -> None:
-        """Take everything away that was opened here."""
+        """Close everything that was opened here."""
         ...

@@ -9,8 +9,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from skill_model.model import Data
-from skill_model.ros_types import PRIMITIVES
 from skill_runtime import fitting
 
 _VECTOR_FIELDS = ["x", "y", "z"]
@@ -62,11 +60,6 @@ def message_class(type_name: str) -> Any:
     """Return the class of ``geometry_msgs/Point`` or ``geometry_msgs/msg/Point``; raise ImportError or AttributeError."""
     package, name = type_name.split("/", maxsplit=1)[0], type_name.rsplit("/", maxsplit=1)[-1]
     return getattr(importlib.import_module(f"{package}.msg"), name)
-
-
-def carried(data: Data, message: Any) -> Any:
-    """Return the message, or what it carries where the model's type is a primitive: that comes as std_msgs/Float64 and the like."""
-    return message.data if data.type in PRIMITIVES else message
 
 
 @dataclasses.dataclass(frozen=True)

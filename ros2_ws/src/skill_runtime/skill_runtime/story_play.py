@@ -17,10 +17,10 @@ from skill_language.stories import Execution, Story, StoryStep, messages
 from skill_language.stories import StepKind as Kind
 from skill_model.model import Skillset
 from skill_runtime.core.execution import Execution as Running
+from skill_runtime.core.replies import TransitionReply
 from skill_runtime.handle import SkillHandle
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.story_world import MakeWorld, StoryWorld, virtual_world
-from skill_runtime.views import TransitionAnswer
 from skill_runtime.waiting import Pending
 
 READY_S = 60.0
@@ -152,7 +152,7 @@ class _Player:
                 return "no values of data are known that break the invariant"
         return ""
 
-    def _refusal(self, answer: Pending[TransitionAnswer]) -> str:
+    def _refusal(self, answer: Pending[TransitionReply]) -> str:
         self._world.settle(lambda: answer.done)
         if not answer.done:
             return "the managers do not answer"

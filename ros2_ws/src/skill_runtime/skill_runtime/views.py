@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from skill_model.model import Skillset
-from skill_runtime.callbacks import Forget
+from skill_runtime.callbacks import Unsubscribe
+from skill_runtime.core.replies import TransitionReply
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, Handle, OutputsT, ResultT
 from skill_runtime.waiting import Pending
@@ -19,15 +20,6 @@ from skill_runtime.waiting import Pending
 StateT = TypeVar("StateT", bound=str)
 ValueT = TypeVar("ValueT")
 NANOSECONDS = 1e9
-
-
-@dataclass(frozen=True)
-class TransitionAnswer:
-    """What became of an extern transition that was asked for; ``reason`` is empty when it was taken, ``state`` is afterwards."""
-
-    accepted: bool
-    reason: str
-    state: str
 
 
 @dataclass(frozen=True)
@@ -67,8 +59,8 @@ class DataFeed(Protocol):
         """Tell whether there is no value, or it is older than the model's period allows."""
         ...
 
-    def on_sample(self, callback: Callable[[Sample], None]) -> Forget:
-        """Have ``callback(sample)`` called for each value from now on."""
+    def on_sample(self, callback: Callable[[Sample], None]) -> Unsubscribe:
+        """Call ``callback(sample)`` for each value from now on."""
         ...
 
 
@@ -90,8 +82,8 @@ class Access(Protocol):
         """State of each resource."""
         ...
 
-    def on_change(self, callback: Callable[[dict[str, str]], None]) -> Forget:
-        """Have ``callback(resources)`` called after each step that changed a resource."""
+    def on_change(self, callback: Callable[[dict[str, str]], None]) -> Unsubscribe:
+        """Call ``callback(resources)`` after each step that changed a resource."""
         ...
 
     def start(self, skill: str, **inputs: object) -> Handle[Any, Any]:
@@ -106,7 +98,7 @@ class Access(Protocol):
         """Ask whether the skill could start now."""
         ...
 
-    def transition(self, resource: str, to: str) -> Pending[TransitionAnswer]:
+    def transition(self, resource: str, to: str) -> Pending[TransitionReply]:
         """Ask for an extern transition."""
         ...
 
@@ -167,8 +159,8 @@ class ResourceView(Generic[StateT]):
             raise RuntimeError(f"nothing was heard of {self._client.skillset}.{self.name} yet; call wait_ready first")
         return cast("StateT", state)
 
-    def on_change(self, callback: Callable[[StateT], None]) -> Forget:
-        """Have ``callback(state)`` called after each change, on the thread that brings it; the return value ends that."""
+    def on_change(self, callback: Callable[[StateT], None]) -> Unsubscribe:
+        """Call ``callback(state)`` after each change, on the thread that brings it; the return value unsubscribes."""
         known = [self._client.resources.get(self.name)]
 
         def look(states: dict[str, str]) -> None:
@@ -193,7 +185,7 @@ class ResourceView(Generic[StateT]):
         look(self._client.resources)
         return reached
 
-    def transition(self, to: StateT) -> Pending[TransitionAnswer]:
+    def transition(self, to: StateT) -> Pending[TransitionReply]:
         """Take an extern transition, as the functional layer does; refused with a reason when the model has no such arrow."""
         return self._client.transition(self.name, to)
 
@@ -222,8 +214,8 @@ class DataView(Generic[ValueT]):
         """Tell whether there is no value, or it is older than the model's period allows."""
         return self._client.data_feed(self.name).stale
 
-    def on_change(self, callback: Callable[[ValueT], None]) -> Forget:
-        """Have ``callback(value)`` called for each value, on the thread that brings it; the return value ends that."""
+    def on_change(self, callback: Callable[[ValueT], None]) -> Unsubscribe:
+        """Call ``callback(value)`` for each value, on the thread that brings it; the return value unsubscribes."""
         return self._client.data_feed(self.name).on_sample(lambda sample: callback(cast("ValueT", sample.value)))
 
     def next(self) -> Pending[ValueT]:

@@ -1,4 +1,4 @@
-"""What ends once and can be waited for: by blocking, by ``await`` (asyncio or rclpy), or by a callback."""
+"""Things that end once, such as answers; a caller waits by blocking, by ``await`` (asyncio or rclpy), or by a callback."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class NoAnswerError(SkillRuntimeError):
 
 
 class CannotWaitError(SkillRuntimeError):
-    """A wait that could never end where it is asked for; the message says what to do instead."""
+    """A wait that could never end on this thread; the message says what to do instead."""
 
 
-class Host(Protocol):
-    """How a thread waits where the answers come from: the client's middleware has it."""
+class Waiter(Protocol):
+    """Blocks a thread until an event that the client's middleware brings."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
         """Wait for the event; None: until it comes or can't come any more.
@@ -32,8 +32,8 @@ class Host(Protocol):
         ...
 
 
-class PlainHost:
-    """Waits, and trusts in another thread to bring the event."""
+class ThreadWaiter:
+    """Blocks until another thread sets the event."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
         """Wait for the event."""
@@ -43,8 +43,8 @@ class PlainHost:
 class Waitable:
     """Ends once. All of it may be used from any thread."""
 
-    def __init__(self, host: Host | None = None) -> None:
-        self._host: Host = PlainHost() if host is None else host
+    def __init__(self, waiter: Waiter | None = None) -> None:
+        self._waiter: Waiter = ThreadWaiter() if waiter is None else waiter
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._after: list[Callable[[], None]] = []
@@ -57,10 +57,10 @@ class Waitable:
         Raises:
             CannotWaitError: this thread is the one that would bring the end: ``await`` it there, or give it a callback.
         """
-        return self._ended.is_set() or self._host.wait(self._ended, timeout_s)
+        return self._ended.is_set() or self._waiter.wait(self._ended, timeout_s)
 
     def call_at_end(self, action: Callable[[], None]) -> None:
-        """Have ``action()`` called once at the end, on the thread that brings it; at once when it is there."""
+        """Call ``action()`` once at the end, on the thread that brings it; at once when it is there."""
         with self._lock:
             if not self._ended.is_set():
                 self._after.append(action)
@@ -113,7 +113,7 @@ class Moment(Waitable):
     def wait_for_it(self) -> None:
         """Wait until it comes; raise CannotWaitError when it can't come (any more)."""
         if not self._ended.is_set():
-            self._host.wait(self._ended, None)
+            self._waiter.wait(self._ended, None)
 
     def __await__(self) -> Generator[object, None, None]:
         yield from self.ending()
@@ -122,8 +122,8 @@ class Moment(Waitable):
 class Pending(Waitable, Generic[T]):
     """An answer that is under way. It comes, or fails within the time that its question was given."""
 
-    def __init__(self, host: Host | None = None) -> None:
-        super().__init__(host)
+    def __init__(self, waiter: Waiter | None = None) -> None:
+        super().__init__(waiter)
         self._value: T | None = None
         self._failure = ""
 
@@ -154,7 +154,7 @@ class Pending(Waitable, Generic[T]):
         return self.value
 
     def add_done_callback(self, callback: Callable[[Self], None]) -> None:
-        """Have ``callback(pending)`` called once at the end, on the thread that brings it; at once when it is there."""
+        """Call ``callback(pending)`` once at the end, on the thread that brings it; at once when it is there."""
         self.call_at_end(lambda: callback(self))
 
     def resolve(self, value: T) -> None:

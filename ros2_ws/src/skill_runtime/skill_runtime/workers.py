@@ -1,4 +1,4 @@
-"""Threads for hooks: no hook ever waits for another one to return, and none that never returns keeps the process alive."""
+"""Threads for hooks: no hook waits for another one to return, and a hook that never returns does not keep the process alive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import time
 import traceback
 from collections.abc import Callable
 
-Job = Callable[[], object]
+from skill_runtime.timers import Job
+
 IDLE_S = 10.0
 """A thread without work for so long ends."""
 

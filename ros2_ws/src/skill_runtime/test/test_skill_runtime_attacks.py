@@ -19,8 +19,8 @@ from skill_model.model import Interrupt, Invariant, Parameter, Result, Skill
 from skill_runtime.core.events import ExecutionEvent, event_record, read_event
 from skill_runtime.core.execution import Execution
 from skill_runtime.core.hook_calls import call_hook
+from skill_runtime.core.sanitize import TEXT_LIMIT, as_text
 from skill_runtime.core.watchdog import TICK_S, Watchdog
-from skill_runtime.core.wire import TEXT_LIMIT, as_text
 from skill_runtime.workers import Workers
 
 S = ExecutionState

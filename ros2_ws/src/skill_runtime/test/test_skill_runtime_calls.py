@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip("rclpy")
 
 from skill_runtime.ros2 import calls as calls_module
-from skill_runtime.ros2.alarms import Alarms
 from skill_runtime.ros2.calls import AGAIN_S, LOOK_S, QUEUE, UNSEEN_S, WINDOW, Calls, Discovery
+from skill_runtime.ros2.timers import RclpyTimers
 
 
 class Future:
@@ -217,11 +217,11 @@ class Node:
 
 def test_jobs_ring_in_order_and_only_the_first_wakes_the_executor():
     node, done = Node(), []
-    alarms = Alarms(node, node, None, lambda: False)
-    alarms.at(1070, lambda: done.append("late"))
-    alarms.at(1080, lambda: done.append("never")).cancel()
-    alarms.at(1090, lambda: done.append("last"))
-    alarms.at(1050, lambda: done.append("early"))
+    timers = RclpyTimers(node, node, None, lambda: False)
+    timers.at(1070, lambda: done.append("late"))
+    timers.at(1080, lambda: done.append("never")).cancel()
+    timers.at(1090, lambda: done.append("last"))
+    timers.at(1050, lambda: done.append("early"))
     assert node.wakes == 2
     node.wake()
     assert (node.runs, node.timer_period_ns) == (True, 50)
@@ -235,9 +235,9 @@ def test_jobs_ring_in_order_and_only_the_first_wakes_the_executor():
 
 def test_a_job_that_raises_leaves_the_timer_set_for_the_others():
     node, done = Node(), []
-    alarms = Alarms(node, node, None, lambda: True)
-    alarms.at(1010, lambda: 1 / 0)
-    alarms.at(1020, lambda: done.append("next"))
+    timers = RclpyTimers(node, node, None, lambda: True)
+    timers.at(1010, lambda: 1 / 0)
+    timers.at(1020, lambda: done.append("next"))
     node.nanoseconds = 1010
     with pytest.raises(ZeroDivisionError):
         node.ring()

@@ -12,6 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Header, Int8, UInt8MultiArray, UInt64
 
 from skill_model.model import Parameter
+from skill_model.ros_types import INTEGER_RANGES
 from skill_runtime import fitting
 from skill_runtime.local.values import fit
 from skill_runtime.plain import message_class, to_plain
@@ -58,9 +59,9 @@ def test_what_does_not_fit_is_told_with_its_place(message, values, error):
         fill(message, values, "a goal")
 
 
-@pytest.mark.parametrize("kind", fitting.INTEGERS)
+@pytest.mark.parametrize("kind", INTEGER_RANGES)
 def test_whole_numbers_reach_to_their_limits_and_no_further(kind):
-    low, high = fitting.INTEGERS[kind]
+    low, high = INTEGER_RANGES[kind]
     declared = [Parameter("n", kind)]
     for value in (low, high):
         assert fitting.whole_number(value, kind, "it", (low, high)) == value

@@ -6,17 +6,20 @@ from std_msgs.msg import Float64
 
 from skill_model.conditions import holds
 from skill_model.expressions import Comparison, DataIs
-from skill_model.model import Data
-from skill_runtime.plain import carried
+from skill_runtime.codecs import codec_of
+from skill_runtime.middleware import Topic
+from skill_runtime.views import Sample
 
 
 def test_a_primitive_is_compared_by_what_its_message_carries():
     charged = DataIs("battery", (), Comparison.GT, 20.0, "%")
-    data = Data("battery", "float64", 1.0)
-    assert holds(charged, {}, {"battery": carried(data, Float64(data=0.3))})
-    assert not holds(charged, {}, {"battery": carried(data, Float64(data=0.1))})
+    codec = codec_of(Topic("/battery", type_name="std_msgs/Float64", wrapped=True, outside=True))
+    assert holds(charged, {}, {"battery": codec.decode(Float64(data=0.3)).value})
+    assert not holds(charged, {}, {"battery": codec.decode(Float64(data=0.1)).value})
 
 
 def test_a_message_is_given_as_it_is():
     message = Float64(data=0.3)
-    assert carried(Data("battery", "BatteryState", 1.0), message) is message
+    codec = codec_of(Topic("/battery", type_name="std_msgs/Float64", outside=True))
+    assert codec.decode(message).value is message
+    assert codec.encode("skillset", Sample(message, None)) is message

@@ -12,8 +12,8 @@ from skill_runtime.client.connection import DESCRIBE_S, DOUBT_S, RIVALS_NS
 from skill_runtime.client.goal import ACKNOWLEDGE_LIMIT, ACKNOWLEDGE_S, GRACE_S, SILENCE_S
 from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 from skill_runtime.local import VirtualClock
-from skill_runtime.middleware import EVENTS, RESOURCE_STATES, Ending, ResourceStates, ResourceValue, Told
-from skill_runtime.waiting import PlainHost
+from skill_runtime.middleware import EVENTS, RESOURCE_STATES, GoalResult, PublishedEvent, ResourceStates, ResourceStatus
+from skill_runtime.waiting import ThreadWaiter
 
 S = ExecutionState
 MODEL = flying_skillset()
@@ -41,7 +41,7 @@ class Link:
     def cancel(self, goal_id):
         self.cancelled.append(goal_id)
 
-    def ask_ending(self, goal_id):
+    def request_result(self, goal_id):
         self.asked.append(goal_id)
 
     def release(self, goal_id):
@@ -51,7 +51,7 @@ class Link:
 class Graph:
     """A middleware of a client; the test is the managers."""
 
-    host = PlainHost()
+    waiter = ThreadWaiter()
 
     def __init__(self) -> None:
         self.clock = VirtualClock()
@@ -88,13 +88,13 @@ class Graph:
             pass
 
     def states(self, life: str, after: int = 0, **resources: str) -> None:
-        values = {name: ResourceValue(state, "", 0) for name, state in resources.items()}
+        values = {name: ResourceStatus(state, "", 0) for name, state in resources.items()}
         self.heard[RESOURCE_STATES.name](ResourceStates(life, after, self.clock.now_ns, values))
 
     def tell(self, life: str, handle, state: ExecutionState, sequence: int = 0) -> None:
         self.sequence = sequence or self.sequence + 1
         event = ExecutionEvent(self.sequence, self.clock.now_ns, "takeoff", handle.id, state, "", "", {}, {})
-        self.heard[EVENTS.name](Told(life, event))
+        self.heard[EVENTS.name](PublishedEvent(life, event))
 
 
 @pytest.fixture
@@ -152,15 +152,15 @@ def test_a_goal_that_was_taken_and_is_not_told_of_is_asked_for(graph, client):
     graph.link.sent[handle.id](True)
     graph.run_for(SILENCE_S + 0.1)
     assert (handle.done, graph.link.asked) == (False, [handle.id])
-    client._news.on_ending(handle.id, None)
+    client._news.on_result(handle.id, None)
     assert (handle.state, "do not know this execution" in handle.message) == (S.FAILED, True)
 
 
 def test_a_gap_in_the_events_has_the_endings_asked_for(graph, client):
     handle = running(graph, client)
-    graph.heard[EVENTS.name](Told("one", TransitionEvent(9, 0, "sdk", "A", "B", "extern")))
+    graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(9, 0, "sdk", "A", "B", "extern")))
     assert graph.link.asked == [handle.id]
-    client._news.on_ending(handle.id, Ending(S.TERMINATED, "DONE", "there", {}))
+    client._news.on_result(handle.id, GoalResult(S.TERMINATED, "DONE", "there", {}))
     assert not handle.done  # its event may still come, and say when it was
     graph.run_for(GRACE_S)
     assert (handle.state, handle.result) == (S.TERMINATED, "DONE")
@@ -168,7 +168,7 @@ def test_a_gap_in_the_events_has_the_endings_asked_for(graph, client):
 
 def test_an_end_is_told_when_the_resources_after_it_are_known(graph, client):
     handle = running(graph, client)
-    graph.heard[EVENTS.name](Told("one", TransitionEvent(3, 0, "axes", "USED", "AVAILABLE", "takeoff")))
+    graph.heard[EVENTS.name](PublishedEvent("one", TransitionEvent(3, 0, "axes", "USED", "AVAILABLE", "takeoff")))
     graph.tell("one", handle, S.TERMINATED, sequence=4)
     assert not handle.done
     seen = []

@@ -34,7 +34,6 @@ from skill_runtime_rig import (  # noqa: E402
     until,
 )
 from skillset_interfaces.srv import Describe, GetData  # noqa: E402
-from std_srvs.srv import Trigger  # noqa: E402
 from uav_msgs.msg import GuidanceState  # noqa: E402
 
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals  # noqa: E402
@@ -43,8 +42,7 @@ from skill_model.execution_state import ExecutionState  # noqa: E402
 from skill_model.json_form import from_json  # noqa: E402
 from skill_runtime.client.connection import DOUBT_S  # noqa: E402
 from skill_runtime.core.errors import SkillRuntimeError  # noqa: E402
-from skill_runtime.ros2 import RosHooks, SkillsetClient, SkillsetNode  # noqa: E402
-from skill_runtime.ros2.hooks_ros import ServiceCaller, ServiceCallError  # noqa: E402
+from skill_runtime.ros2 import SkillsetClient, SkillsetNode  # noqa: E402
 from skill_runtime.ros2.names import EVENTS, LIVELINESS_LEASE_S  # noqa: E402
 from skill_runtime.ros2.spin import spin_until  # noqa: E402
 
@@ -190,56 +188,6 @@ def test_time_is_the_mission_clock_and_names_follow_the_namespace(spinning):
 
     until(progress_as_time_goes_on, "progress follows the mission clock")
     until(lambda: handle.progress == 0.5, "and is reported")
-
-
-class Asking(RosHooks, Recorder):
-    """Hooks that ask a service of the functional layer."""
-
-    def __init__(self, node, name: str, timeout_s: float) -> None:
-        Recorder.__init__(self)
-        self.caller, self.timeout_s = ServiceCaller(node), timeout_s
-        self.service = node.create_client(Trigger, name)
-
-    def on_dispatch(self, execution) -> None:
-        self.call(
-            self.service,
-            Trigger.Request(),
-            lambda reply: execution.terminate("DONE", reply.message),
-            execution.fail,
-            timeout_s=self.timeout_s,
-        )
-
-
-def test_service_calls_of_hooks_neither_block_nor_last(spinning):
-    behaviour: dict = {"answer": lambda reply: reply}
-    server = Node("skill_runtime_functional")
-
-    def answer(_, reply):
-        reply.message = "done"
-        return behaviour["answer"](reply)
-
-    server.create_service(Trigger, "skill_runtime/ask", answer)
-    spinning.spin(server)
-    hooks: dict = {}
-
-    def factory(node):
-        plain = {skill.name: Recorder() for skill in SKILLSET.skills}
-        hooks.update(plain, hover=Asking(node, "skill_runtime/ask", SOON_S), land=Asking(node, "skill_runtime/nosuch", 0.2))
-        return hooks
-
-    managers = spinning.spin(SkillsetNode(SKILLSET, navigation_actions, factory))
-    for resource, state in FLYING.items():
-        managers.engine.transition(resource, state)
-    execution = managers.engine.request("hover", None)
-    until(lambda: execution.done, "the answer ended it")
-    assert (execution.state, execution.message) == (S.TERMINATED, "done")
-    execution = managers.engine.request("land", None)
-    until(lambda: execution.done, "the time-out ended it")
-    assert execution.state is S.FAILED
-    assert execution.message == "service skill_runtime/nosuch is not there within 0.2 s"
-    assert hooks["hover"].call_and_wait(hooks["hover"].service, Trigger.Request()).message == "done"
-    with pytest.raises(ServiceCallError, match="nosuch"):
-        hooks["land"].call_and_wait(hooks["land"].service, Trigger.Request(), timeout_s=0.1)
 
 
 def test_a_callback_that_raises_fails_what_runs_and_the_managers_live_on(ros2_domain):

@@ -15,6 +15,10 @@ pytest.importorskip("uav_client")
 
 from skill_runtime_client_rig import READY_S, Managers, until
 
+from skill_language import reserved_names
+from skill_runtime.ros2.robot import RobotClient
+from skill_runtime.views import TypedSkillset
+
 SCRIPT = Path(__file__).with_name("skill_runtime_user_script.py")
 SETTINGS = """[mypy]
 strict = true
@@ -83,3 +87,8 @@ def test_a_users_script_runs(ros2_domain):
     assert first.split()[0] in {"REQUESTED", "RUNNING"}
     assert climbed[-1] == "AT_ALTITUDE\n"
     assert ended == ["INTERRUPTED", "in_air: flight_status is ON_GROUND"]
+
+
+def test_the_generator_knows_the_attributes_of_the_classes_that_it_derives_from():
+    assert {name for name in dir(RobotClient(None, [])) if not name.startswith("_")} | {"connect"} == reserved_names.ROBOT
+    assert {name for name in dir(TypedSkillset(None)) if not name.startswith("_")} | {"data"} == reserved_names.CLIENT

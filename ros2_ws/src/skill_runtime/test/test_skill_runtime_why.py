@@ -10,7 +10,7 @@ from skill_runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, f
 from skill_model.execution_state import ExecutionState
 from skill_model.expressions import And, Comparison, DataIs, Not
 from skill_model.model import Assignment, Data, Effect, Invariant, Precondition
-from skill_runtime.managers import questions
+from skill_runtime.managers import services
 
 S = ExecutionState
 FORBIDDEN = Effect("give_up", (Assignment("sdk", "UNAVAILABLE"),))
@@ -110,12 +110,12 @@ def test_each_skill_keeps_its_last_result_and_what_is_open():
 
 
 def test_a_hook_that_stays_silent_is_answered_for_and_its_late_answer_is_dropped(monkeypatch):
-    monkeypatch.setattr(questions, "HOOK_ANSWERS_S", 0.1)
+    monkeypatch.setattr(services, "HOOK_ANSWERS_S", 0.1)
     told: queue.SimpleQueue[str] = queue.SimpleQueue()
-    late = questions._in_time(told.put, "silent")
+    late = services._in_time(told.put, "silent")
     assert told.get(timeout=10.0) == "silent"
     late("after all")
-    quick = questions._in_time(told.put, "silent")
+    quick = services._in_time(told.put, "silent")
     quick("at once")
     quick("and again")
     assert told.get(timeout=10.0) == "at once"

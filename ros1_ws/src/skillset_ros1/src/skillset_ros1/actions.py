@@ -16,10 +16,11 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 from std_msgs.msg import Header
 
 from skill_model.execution_state import ExecutionState
+from skill_runtime.action_messages import ActionMessages
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.middleware import Ending, Goal, GoalListener, OnError, OnValue
+from skill_runtime.middleware import Goal, GoalListener, OnError, OnValue
 from skillset_ros1.base import RospyBase
-from skillset_ros1.convert import fields_of, fill, values_of
+from skillset_ros1.convert import TYPES, fields_of
 from skillset_ros1.names import QUEUE, ActionTypes
 
 OnGoal = Callable[[ServerGoalHandle], None]
@@ -27,8 +28,11 @@ RECALLED_EARLY = "interrupted before it arrived"
 RESULTS_KEPT = 10
 """So many of a skill, until others take their place, however long ago they came."""
 _WAITING = {GoalStatus.PENDING, GoalStatus.RECALLING}
-_FEEDBACK_FIELDS = ("progress", "state")
-_RESULT_FIELDS = ("outcome", "result", "message")
+
+
+def action_messages(base: RospyBase, types: ActionTypes, skill: str) -> ActionMessages:
+    """Return what makes and reads the messages of an action."""
+    return ActionMessages(skill, TYPES, goal=types.goal, feedback=types.feedback, result=types.result, on_error=base.log)
 
 
 class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # neither actionlib nor rospy has types
@@ -68,7 +72,7 @@ class RospyGoal:
 
     def __init__(self, server: RospyServer, handle: ServerGoalHandle) -> None:
         self.id: str = handle.get_goal_id().id
-        self.inputs: Mapping[str, object] = values_of(handle.get_goal())
+        self.inputs: Mapping[str, object] = server.messages.read_goal(handle.get_goal())
         self._server = server
         self._handle = handle
 
@@ -76,16 +80,11 @@ class RospyGoal:
         """Send feedback; the goal is active from the first on."""
         if self._handle.get_goal_status().status in _WAITING:
             self._handle.set_accepted()
-        feedback = self._server.types.feedback(progress=progress, state=state.value)
-        self._server.fill_outputs(feedback, outputs)
-        self._handle.publish_feedback(feedback)
+        self._handle.publish_feedback(self._server.messages.make_feedback(progress, state, outputs))
 
     def finish(self, event: ExecutionEvent) -> None:
         """Set the goal's terminal state and send its result."""
-        result = self._server.types.result(outcome=event.state.value, result=event.result, message=event.message)
-        wrong = self._server.fill_outputs(result, event.outputs)
-        if wrong:
-            result.message = f"{result.message} ({wrong})".strip()
+        result = self._server.messages.make_result(event)
         waiting = self._handle.get_goal_status().status in _WAITING
         if event.state is ExecutionState.TERMINATED:
             self._handle.set_succeeded(result, event.message)
@@ -103,27 +102,13 @@ class RospyServer:
     def __init__(
         self, base: RospyBase, types: ActionTypes, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]
     ) -> None:
-        self.types = types
-        self._base = base
-        self._skill = skill
+        self.messages = action_messages(base, types, skill)
+        self.inputs_of = self.messages.inputs_of
         # On the loop: actionlib's threads hold its lock, and a cancellation comes after its goal.
         took: OnGoal = lambda handle: base.submit(lambda: on_goal(RospyGoal(self, handle)))  # noqa: E731
         cancelled: OnGoal = lambda handle: base.submit(lambda: on_cancel(handle.get_goal_id().id))  # noqa: E731
         self.server = _Server(base.name(f"skill/{skill}"), types.spec, took, cancelled)
         self.server.start()
-
-    def inputs_of(self, plain: Mapping[str, object]) -> dict[str, object]:
-        """Return inputs as a goal carries them."""
-        return values_of(fill(self.types.goal(), plain, f"inputs of {self._skill}"))
-
-    def fill_outputs(self, message: Any, outputs: Mapping[str, object]) -> str:
-        """Set the outputs of a message; return what is wrong with them, or ""."""
-        try:
-            fill(message, outputs, f"outputs of {self._skill}")
-        except ValueError as error:
-            self._base.log(str(error))
-            return str(error)
-        return ""
 
     def unregister(self) -> None:
         """Take no more goals, and take the topics away."""
@@ -139,7 +124,8 @@ class RospyLink:
     def __init__(self, base: RospyBase, types: ActionTypes, skill: str, listener: GoalListener) -> None:
         self._types = types
         self._base = base
-        self._skill = skill
+        self._messages = action_messages(base, types, skill)
+        self.fit, self.outputs_of = self._messages.fit, self._messages.outputs_of
         self._listener = listener
         place = base.name(f"skill/{skill}")
         self._goals = rospy.Publisher(f"{place}/goal", types.action_goal, queue_size=QUEUE)
@@ -161,14 +147,6 @@ class RospyLink:
         """The inputs with their types."""
         return fields_of(self._types.goal)
 
-    def fit(self, inputs: Mapping[str, object], place: str) -> Any:
-        """Return the goal's message."""
-        return fill(self._types.goal(), inputs, place)
-
-    def outputs_of(self, plain: Mapping[str, object]) -> dict[str, Any]:
-        """Return outputs as a result carries them."""
-        return _outputs(fill(self._types.result(), plain, f"outputs of {self._skill}"), _RESULT_FIELDS)
-
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:  # noqa: ARG002 - events answer it
         """Send a goal."""
         message = self._types.action_goal(goal=goal, goal_id=GoalID(id=goal_id, stamp=rospy.get_rostime()))
@@ -184,7 +162,7 @@ class RospyLink:
         self._cancels.publish(GoalID())
         self._base.submit(lambda: on_count(None))
 
-    def ask_ending(self, goal_id: str) -> None:
+    def request_result(self, goal_id: str) -> None:
         """Ask nothing: results are sent to every subscriber, and arrive over their connections."""
 
     def release(self, goal_id: str) -> None:
@@ -196,13 +174,10 @@ class RospyLink:
             topic.unregister()
 
     def _on_feedback(self, message: Any) -> None:
-        feedback = message.feedback
-        self._listener.on_feedback(message.status.goal_id.id, feedback.progress, _outputs(feedback, _FEEDBACK_FIELDS))
+        self._listener.on_feedback(message.status.goal_id.id, *self._messages.read_feedback(message.feedback))
 
     def _on_result(self, message: Any) -> None:
-        result = message.result
-        ending = Ending(ExecutionState(result.outcome), result.result, result.message, _outputs(result, _RESULT_FIELDS))
-        self._listener.on_ending(message.status.goal_id.id, ending)
+        self._listener.on_result(message.status.goal_id.id, self._messages.read_result(message.result))
 
 
 def is_connected(subscriber: Any, server: str = "") -> bool:
@@ -211,7 +186,3 @@ def is_connected(subscriber: Any, server: str = "") -> bool:
         return False
     connections = list(subscriber.impl.connections)
     return any(c.socket is not None and server in {"", c.callerid_pub} for c in connections)
-
-
-def _outputs(message: Any, others: tuple[str, ...]) -> dict[str, Any]:
-    return {name: getattr(message, name) for name in fields_of(message) if name not in others}

@@ -9,10 +9,11 @@ from typing import Any
 
 import rospy
 
-from skill_runtime.middleware import Job, OnValue
-from skill_runtime.waiting import Host
+from skill_runtime.middleware import OnValue
+from skill_runtime.timers import Job, Timer
+from skill_runtime.waiting import Waiter
 from skill_runtime.workers import Workers
-from skillset_ros1.loop import Alarm, Loop
+from skillset_ros1.loop import Loop
 from skillset_ros1.names import now_ns
 
 LOOK_S = 0.02
@@ -31,7 +32,7 @@ class RospyBase:
 
     def __init__(self, skillset: str, place: str, what: str) -> None:
         self.loop = Loop(what, self._raised)
-        self.host: Host = self.loop
+        self.waiter: Waiter = self.loop
         self.server = ""
         """The node of the managers, as a client has heard of it."""
         self._skillset = skillset
@@ -44,24 +45,24 @@ class RospyBase:
         """Return the mission clock."""
         return now_ns()
 
-    def at(self, when_ns: int, job: Job) -> Alarm:
-        """Have a job done at a moment of the mission clock."""
+    def at(self, when_ns: int, job: Job) -> Timer:
+        """Run a job at a moment of the mission clock."""
         return self.loop.at(when_ns, job)
 
-    def later(self, delay_s: float, job: Job) -> Alarm:
-        """Have a job done after a delay of wall clock."""
+    def later(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay of wall clock."""
         return self.loop.after(delay_s, job)
 
     def submit(self, job: Job) -> None:
-        """Have a job done on the loop."""
+        """Run a job on the loop."""
         self.loop.submit(job)
 
     def defer(self, job: Job) -> None:
-        """Have a job done on a thread of its own."""
+        """Run a job on a thread of its own."""
         self._workers.submit(job)
 
     def when(self, condition: Callable[[], bool], job: Job) -> None:
-        """Have a job done once a condition holds."""
+        """Run a job once a condition holds."""
         if condition():
             self.submit(job)
         else:

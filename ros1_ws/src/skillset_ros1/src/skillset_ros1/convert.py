@@ -7,7 +7,7 @@ from typing import Any
 
 import genpy
 
-from skill_runtime.fitting import INTEGERS
+from skill_model.ros_types import INTEGER_RANGES
 from skill_runtime.plain import FieldTypes
 
 _ARRAY = re.compile(r"\[\d*\]$")
@@ -22,14 +22,14 @@ def _element_of(kind: str) -> str:
     return _ARRAY.sub("", kind) if _ARRAY.search(kind) else ""
 
 
-_TYPES = FieldTypes(
+TYPES = FieldTypes(
     fields_of,
     _element_of,
     floats={"float32", "float64"},
-    integers={**INTEGERS, "byte": INTEGERS["uint8"], "char": INTEGERS["uint8"]},
+    integers={**INTEGER_RANGES, "byte": INTEGER_RANGES["uint8"], "char": INTEGER_RANGES["uint8"]},
     classes={"bool": bool, "string": str},
     times={"time": genpy.Time, "duration": genpy.Duration},
     no_lists=(str,),  # genpy gives uint8[] as bytes
 )
-fill = _TYPES.fill
-values_of = _TYPES.values_of
+fill = TYPES.fill
+values_of = TYPES.values_of

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import threading
 import time
 from collections import deque
@@ -12,24 +10,13 @@ from collections.abc import Callable
 import rospy
 from rospy.rostime import get_rostime_cond
 
-from skill_runtime.middleware import Job
+from skill_runtime.timers import Job, Timer, TimerQueue
 from skill_runtime.waiting import CannotWaitError
 from skillset_ros1.names import now_ns
 
 LONGEST_WAIT_S = 0.25
 """So soon a loop sees that the node was shut down."""
 END_S = 1.0
-
-
-class Alarm:
-    """A job that waits for its moment."""
-
-    def __init__(self, job: Job) -> None:
-        self.job: Job | None = job
-
-    def cancel(self) -> None:
-        """Let the job not happen; without effect when it has."""
-        self.job = None
 
 
 class Loop:
@@ -43,10 +30,9 @@ class Loop:
         """Called on the thread when it ends."""
         self._name = name
         self._on_error = on_error
-        self._numbers = itertools.count()
         self._jobs: deque[Job] = deque()
-        self._alarms: list[tuple[int, int, Alarm]] = []
-        self._delays: list[tuple[int, int, Alarm]] = []
+        self._timers = TimerQueue()
+        self._delays = TimerQueue()
         # rospy notifies this one whenever simulated time goes on.
         self._changed = get_rostime_cond()
         self._over = False
@@ -61,11 +47,11 @@ class Loop:
                 self._changed.notify_all()
             return not self._over
 
-    def at(self, when_ns: int, job: Job) -> Alarm:
+    def at(self, when_ns: int, job: Job) -> Timer:
         """Run a job at a moment of the mission clock; soon, when that has passed."""
-        return self._put(self._alarms, when_ns, job)
+        return self._put(self._timers, when_ns, job)
 
-    def after(self, delay_s: float, job: Job) -> Alarm:
+    def after(self, delay_s: float, job: Job) -> Timer:
         """Run a job after a delay of wall clock."""
         return self._put(self._delays, time.monotonic_ns() + round(delay_s * 1e9), job)
 
@@ -95,13 +81,12 @@ class Loop:
 
     # --- inside ------------------------------------------------------------------------------------------------------
 
-    def _put(self, waiting: list[tuple[int, int, Alarm]], when_ns: int, job: Job) -> Alarm:
-        alarm = Alarm(job)
+    def _put(self, timers: TimerQueue, when_ns: int, job: Job) -> Timer:
         with self._changed:
-            heapq.heappush(waiting, (when_ns, next(self._numbers), alarm))
-            if waiting[0][2] is alarm:
+            timer = timers.put(when_ns, job)
+            if timers.is_next(timer):
                 self._changed.notify_all()
-        return alarm
+        return timer
 
     def _run(self) -> None:
         while (job := self._next()) is not None:
@@ -119,26 +104,21 @@ class Loop:
                     return self._jobs.popleft()
                 if self._over:
                     return None
-                alarm = _due(self._delays, time.monotonic_ns()) or _due(self._alarms, now_ns())
-                if alarm is None:
-                    self._changed.wait(self._pause_s())
-                elif alarm.job is not None:
-                    return alarm.job
+                due = self._delays.pop_due(time.monotonic_ns()) or self._timers.pop_due(now_ns())
+                if due is not None:
+                    return due[1]
+                self._changed.wait(self._pause_s())
             self._over = True
             return None
 
     def _pause_s(self) -> float:
         """Return until when nothing is to do by time alone; a simulated clock tells of its steps itself."""
         pauses = [LONGEST_WAIT_S]
-        if self._delays:
-            pauses.append((self._delays[0][0] - time.monotonic_ns()) * 1e-9)
-        if self._alarms and rospy.rostime.is_wallclock():
-            pauses.append((self._alarms[0][0] - now_ns()) * 1e-9)
+        if self._delays.due_ns is not None:
+            pauses.append((self._delays.due_ns - time.monotonic_ns()) * 1e-9)
+        if self._timers.due_ns is not None and rospy.rostime.is_wallclock():
+            pauses.append((self._timers.due_ns - now_ns()) * 1e-9)
         return max(0.0, min(pauses))
-
-
-def _due(waiting: list[tuple[int, int, Alarm]], now: int) -> Alarm | None:
-    return heapq.heappop(waiting)[2] if waiting and waiting[0][0] <= now else None
 
 
 def _nothing() -> None:

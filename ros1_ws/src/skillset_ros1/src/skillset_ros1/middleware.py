@@ -16,10 +16,9 @@ import rospy
 from roslib.message import get_message_class
 from std_msgs.msg import Header
 
-from skill_runtime.codecs import SERVICES, TOPICS, set_stamp, stamp_ns_of
-from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnSign, OnValue, Serve, Topic
-from skill_runtime.plain import message_class
-from skill_runtime.views import Sample
+from skill_runtime.codecs import SERVICES, codec_of, set_stamp, stamp_ns_of
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from skill_runtime.timers import Job
 from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
 from skillset_ros1.calls import call
@@ -56,37 +55,31 @@ class RospyMiddleware(RospyBase):
 
     def advertise(self, topic: Topic) -> RospyPublisher:
         """Open a topic for publishing."""
-        if topic.name in TOPICS:
-            codec = TOPICS[topic.name]
-            kind, encode = codec.kind, functools.partial(codec.encode, self._skillset)
-        else:
-            kind = message_class(topic.type_name)
-            encode = functools.partial(_wrap if topic.wrapped else _value, kind)
-        publisher = RospyPublisher(self.name(topic.name), kind, encode, topic.keep)
+        codec = codec_of(topic)
+        publisher = RospyPublisher(self.name(topic.name), codec.kind, functools.partial(codec.encode, self._skillset), topic.depth)
         self._parts.append(publisher.unregister)
         return publisher
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; the type of a data comes with each message."""
-        if topic.name in TOPICS:
-            codec = TOPICS[topic.name]
-            subscriber = self.listen(self.name(topic.name), codec.kind, lambda message: callback(codec.decode(message)))
-            return lambda: is_connected(subscriber, self.server)
+        codec = codec_of(topic)
+        take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
         if topic.outside:
-            take: OnValue = lambda message: callback(Sample(message.data if topic.wrapped else message, None))  # noqa: E731
-            self.listen(topic.name, message_class(topic.type_name), take, queue_size=SOURCE_QUEUE)
-        else:
-            self.listen(self.name(topic.name), rospy.AnyMsg, lambda raw: self._take_raw(topic, raw, callback))
-        return lambda: True
+            self.listen(topic.name, codec.kind, take, queue_size=SOURCE_QUEUE)
+            return lambda: True
+        if codec.kind is None:
+            self.listen(self.name(topic.name), rospy.AnyMsg, lambda raw: self._take_raw(topic, raw, take))
+            return lambda: True
+        subscriber = self.listen(self.name(topic.name), codec.kind, take)
+        return lambda: is_connected(subscriber, self.server)
 
-    def _take_raw(self, topic: Topic, raw: Any, callback: OnValue) -> None:
+    def _take_raw(self, topic: Topic, raw: Any, take: OnValue) -> None:
         type_name = raw._connection_header["type"]  # noqa: SLF001 - rospy's way to tell
         kind = get_message_class(type_name)
         if kind is None:
             rospy.logwarn_once(f"{topic.name}: no Python package has the type {type_name}; its values can't be followed here")
             return
-        message = kind().deserialize(raw._buff)  # noqa: SLF001 - the bytes of an AnyMsg
-        callback(Sample(message.data if topic.wrapped else message, None))
+        take(kind().deserialize(raw._buff))  # noqa: SLF001 - the bytes of an AnyMsg
 
     # --- services ----------------------------------------------------------------------------------------------------
 
@@ -162,7 +155,7 @@ class RospyMiddleware(RospyBase):
         threading.Thread(target=beat, name=f"{self._place}_alive", daemon=True).start()
 
     def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Be told of the life of managers, and of their silence, once in a lease."""
+        """Follow the signs of life of the managers, and of their silence, once in a lease."""
         heard_s: list[float] = []
 
         def hear(sign: Any) -> None:
@@ -189,12 +182,12 @@ class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
     a transient local topic of ROS 2 would; a message that is published in that very moment may come before, and once more within it.
     """
 
-    def __init__(self, name: str, kind: Any, encode: Callable[[Any], Any], keep: int) -> None:
+    def __init__(self, name: str, kind: Any, encode: Callable[[Any], Any], depth: int) -> None:
         super().__init__()
         self._encode = encode
         self._lock = threading.Lock()
-        self._history: deque[Any] = deque(maxlen=keep)
-        options = {"latch": True} if keep == 1 else {"subscriber_listener": self}
+        self._history: deque[Any] = deque(maxlen=depth)
+        options = {"latch": True} if depth == 1 else {"subscriber_listener": self}
         self._publisher: Any = rospy.Publisher(name, kind, queue_size=QUEUE, **options)
 
     def publish(self, value: Any) -> None:
@@ -225,11 +218,3 @@ class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
     def unregister(self) -> None:
         """Take the topic away."""
         self._publisher.unregister()
-
-
-def _value(kind: Any, sample: Sample) -> Any:  # noqa: ARG001 - as where it is wrapped
-    return sample.value
-
-
-def _wrap(kind: Any, sample: Sample) -> Any:
-    return kind(data=sample.value)

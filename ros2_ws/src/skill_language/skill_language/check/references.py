@@ -192,8 +192,8 @@ def error(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
 
 
 def for_generator(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
-    """Return a warning that is an error to the generator (``FOR_GENERATOR`` in ``load``): the model itself is sound."""
-    return Diagnostic(code, message, span, Severity.WARNING, hint)
+    """Return a warning that is an error when code is to be generated (see ``load.load_robot``): the model itself is sound."""
+    return Diagnostic(code, message, span, Severity.WARNING, hint, for_generator=True)
 
 
 def warning(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:

@@ -6,6 +6,7 @@ import keyword
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from skill_language import reserved_names
 from skill_language.check.references import (
     Named,
     condition_findings,
@@ -22,6 +23,7 @@ from skill_language.check.references import (
 from skill_language.errors import Diagnostic
 from skill_model.expressions import Comparison, DataIs, atoms
 from skill_model.model import NO_EFFECT, Effect, Hold, Invariant, Skill, Skillset
+from skill_model.ros_types import camel
 from skill_model.units import UNIT_IN_SI
 
 
@@ -43,21 +45,17 @@ def _skill_names(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
 
 
 def _interface_names(_skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
-    if skill.name in CLIENT_NAMES or keyword.iskeyword(skill.name):
-        yield for_generator(
-            "ALU215", f"the generated client needs the name `{skill.name}` for itself; name the skill otherwise", skill.span
-        )
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", skill.name):
-        hint = "a skill's name begins with a letter, and has single _ between letters and digits"
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*", skill.name) or keyword.iskeyword(camel(skill.name)):
+        hint = "a skill's name begins with a letter, has single _ between letters and digits, and is not None, True or False"
         yield for_generator("ALU216", f"skill `{skill.name}` can't be the name of a ROS action", skill.span, hint=hint)
     for parameter in (*skill.inputs, *skill.outputs):
         yield from ros_name("field", parameter)
     for output in skill.outputs:
-        if output.name in RESULT_FIELDS:
-            message = f"the generated action needs the field `{output.name}` for itself; name the output otherwise"
+        if output.name in reserved_names.OUTPUTS:
+            message = f"generated code needs the name `{output.name}` for itself; name the output otherwise"
             yield for_generator("ALU215", message, output.span)
     for given in skill.inputs:
-        if given.name in INPUT_NAMES:
+        if given.name in reserved_names.INPUTS:
             yield for_generator("ALU215", f"generated code needs the name `{given.name}` for itself; name the input otherwise", given.span)
 
 
@@ -139,15 +137,6 @@ SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _ends,
     _stops,
 )
-
-RESULT_FIELDS = frozenset({"outcome", "result", "message", "progress", "state"})
-"""Fields of the generated action's result and feedback that every skill has."""
-
-INPUT_NAMES = frozenset({"self", "skill"})
-"""Names that the client's methods have already."""
-
-CLIENT_NAMES = frozenset({"start", "resources", "wait_ready", "ready", "on_change", "model", "skillset"})
-"""Attributes of the generic client that a method named like a skill would hide."""
 
 
 def _used_effects(skill: Skill) -> list[Effect]:

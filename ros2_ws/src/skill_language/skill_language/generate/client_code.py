@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import keyword
 from collections.abc import Iterable, Iterator
 
 from skill_language.generate.client_templates import CLIENT, SKILL
 from skill_language.generate.python_code import WIDTH, annotation, keyword_only, message_imports, tidy, wrapped
 from skill_language.generate.text import comment, fill, header, lines, packages
+from skill_language.reserved_names import CLIENT as CLIENT_ATTRIBUTES
+from skill_language.reserved_names import Attributes
 from skill_language.robot import Robot
 from skill_model.model import Data, Parameter, Resource, Skill, Skillset
 from skill_model.ros_types import PRIMITIVES, RosType, camel
 
-TAKEN = ("client", "data")
-"""Attributes that every skillset has; a skill or resource of that name gets an underscore behind it."""
 VECTORS = (RosType("geometry_msgs", "Point"), RosType("geometry_msgs", "Vector3"), RosType("geometry_msgs", "Point32"))
 """Messages that may also be given as three numbers."""
 
@@ -37,17 +36,10 @@ def client_module(robot: Robot, skillset: Skillset) -> str:
 
 
 def attribute_names(skillset: Skillset) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the attribute of each skill and of each resource: its name, with underscores where that is taken or no name in Python."""
-    taken = {*TAKEN, *keyword.kwlist}
-
-    def free(name: str) -> str:
-        while name in taken:
-            name += "_"
-        taken.add(name)
-        return name
-
-    skills = {skill.name: free(skill.name) for skill in skillset.skills}
-    return skills, {resource.name: free(resource.name) for resource in skillset.resources}
+    """Return the attribute of each skill and of each resource by its name."""
+    attributes = Attributes(CLIENT_ATTRIBUTES)
+    skills = {skill.name: attributes.add(skill.name) for skill in skillset.skills}
+    return skills, {resource.name: attributes.add(resource.name) for resource in skillset.resources}
 
 
 def _imports(robot: Robot, skillset: Skillset) -> list[str]:

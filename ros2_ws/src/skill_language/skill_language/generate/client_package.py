@@ -8,6 +8,8 @@ from skill_language.generate.client_templates import INIT, ROBOT
 from skill_language.generate.python_code import tidy
 from skill_language.generate.python_package import package_files
 from skill_language.generate.text import fill, lines
+from skill_language.reserved_names import ROBOT as ROBOT_ATTRIBUTES
+from skill_language.reserved_names import Attributes
 from skill_language.robot import Robot
 from skill_model.ros_types import camel
 
@@ -44,12 +46,13 @@ def package_name(robot: str) -> str:
 
 def _robot_module(robot: Robot, common: dict[str, str]) -> str:
     names = [skillset.name for skillset in robot.skillsets]
+    attributes = Attributes(ROBOT_ATTRIBUTES)
     return tidy(
         fill(
             ROBOT,
             **common,
             imports=lines(f"from {name}_managers.client import {camel(name)}Client" for name in names),
             names=", ".join(f'"{name}"' for name in names) + ("," if len(names) == 1 else ""),
-            members=lines((f'self.{name} = {camel(name)}Client(self.clients["{name}"])' for name in names), 8),
+            members=lines((f'self.{attributes.add(name)} = {camel(name)}Client(self.clients["{name}"])' for name in names), 8),
         )
     )

@@ -70,8 +70,8 @@ class Abstract${camel}Skill(SkillHooks, ABC):
         return super().progress(execution)
 
     @abstractmethod
-    def on_interrupt(self, execution: Execution) -> None:
-        """Stop the function."""
+    def on_interrupt(self, execution: Execution) -> bool | None:
+        """Stop the function; return False when that is only under way, and call ``execution.interrupted()`` when it is done."""
 $results'''
 
 TERMINATED = '''

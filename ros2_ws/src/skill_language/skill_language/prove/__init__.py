@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from skill_language.prove.finding import Finding
 from skill_language.prove.prover import prove
 
-__all__ = ["Finding", "prove"]
+__all__ = ["prove"]

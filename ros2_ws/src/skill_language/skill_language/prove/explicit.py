@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from skill_language.errors import Diagnostic
 from skill_language.prove.abstract import Abstraction
 from skill_language.prove.explore import explore
-from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.local import Suspect
 from skill_language.prove.properties import check_property
@@ -15,7 +15,7 @@ from skill_model.model import Skillset
 
 def search(
     skillset: Skillset, abstraction: Abstraction, suspects: list[Suspect], deadline: Deadline, *, most: int, copies: int
-) -> list[Finding] | None:
+) -> list[Diagnostic] | None:
     """Return all global findings, or None when there are more than ``most`` situations."""
     graph = explore(World(abstraction, copies=copies), deadline, most=most)
     if not graph.complete:

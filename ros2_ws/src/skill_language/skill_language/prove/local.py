@@ -12,8 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from skill_language.errors import Severity
-from skill_language.prove.finding import Finding
+from skill_language.errors import Diagnostic, Severity
 from skill_language.prove.limits import Deadline
 from skill_language.prove.solver import Solver
 from skill_model.conditions import whatever_the_data
@@ -28,11 +27,11 @@ EFFECT_HINT = "a change must be an arrow from the state that the resource is in,
 class Suspect:
     """A local finding whose counterexample may be out of reach; ``key`` names what fails as the search names it."""
 
-    finding: Finding
+    finding: Diagnostic
     key: tuple[str, ...]
 
 
-def local_checks(skillset: Skillset, deadline: Deadline) -> tuple[list[Finding], list[Suspect]]:
+def local_checks(skillset: Skillset, deadline: Deadline) -> tuple[list[Diagnostic], list[Suspect]]:
     """Return what is wrong in every state, and what is wrong in some state that may be out of reach."""
     checks = _Checks(skillset, deadline)
     for event in skillset.events:
@@ -48,7 +47,7 @@ def local_checks(skillset: Skillset, deadline: Deadline) -> tuple[list[Finding],
 class _Checks:
     def __init__(self, skillset: Skillset, deadline: Deadline) -> None:
         self.skillset = skillset
-        self.certain: list[Finding] = []
+        self.certain: list[Diagnostic] = []
         self.suspects: list[Suspect] = []
         self._solver = Solver(skillset, deadline)
 
@@ -141,7 +140,7 @@ class _Checks:
             return
         conditions = [invariant.condition, *(p.condition for p in skill.preconditions)]
         resources = self._resources_of(conditions, skill.start)
-        finding = Finding(
+        finding = Diagnostic(
             "ALU510",
             f"{where} can be false right after the start",
             invariant.span,
@@ -170,7 +169,7 @@ class _Checks:
             following = f"ALU{int(code[3:]) + 1}"
             told = solver.told(model, resources, _data_of([post, *asked]))
             hint = "it is tested after the effect; an execution that does not fulfil it has FAILED"
-            finding = Finding(following, f"the postcondition of {where} can fail", span, hint=hint, example=told)
+            finding = Diagnostic(following, f"the postcondition of {where} can fail", span, hint=hint, example=told)
             self.suspects.append(Suspect(finding, ("post", *key)))
 
     def _suspect(
@@ -189,14 +188,14 @@ class _Checks:
         if model is not None:
             told = self._solver.told(model, self._resources_of(asked, effect), _data_of(asked))
             place = effect.span if effect.span.line else span
-            self.suspects.append(Suspect(Finding(code, message, place, hint=EFFECT_HINT, example=told), ("effect", *key)))
+            self.suspects.append(Suspect(Diagnostic(code, message, place, hint=EFFECT_HINT, example=told), ("effect", *key)))
 
     def _say(self, code: str, message: str, span: Span, hint: str) -> None:
-        self.certain.append(Finding(code, message, span, hint=hint))
+        self.certain.append(Diagnostic(code, message, span, hint=hint))
 
     def _warn(self, code: str, message: str, span: Span) -> None:
         hint = "compare with a value that the data can have, or say so with a comparison that is meant to be always true"
-        self.certain.append(Finding(code, message, span, Severity.WARNING, hint=hint))
+        self.certain.append(Diagnostic(code, message, span, Severity.WARNING, hint=hint))
 
     def _resources_of(self, conditions: Sequence[Expression], effect: Effect) -> list[str]:
         """Return the resources that conditions and effect are about, in the model's order."""

@@ -13,17 +13,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from skill_language.errors import Severity
+from skill_language.errors import Diagnostic, Severity
 from skill_language.prove import story
 from skill_language.prove.explore import Edge, Graph
-from skill_language.prove.finding import Finding
 from skill_language.prove.steps import State, World
 from skill_language.stories import Story
 from skill_model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
 from skill_model.model import Property, PropertyKind
 
 
-def check_property(graph: Graph, wanted: Property) -> Finding | None:
+def check_property(graph: Graph, wanted: Property) -> Diagnostic | None:
     """Return why a property does not hold, or None when it does."""
     graph.deadline.check()
     holds = [true_in(graph.world, wanted.condition, state) for state in graph.states]
@@ -61,13 +60,13 @@ def true_in(world: World, condition: Expression, state: State) -> bool:
             raise ValueError(f"a property can't ask data: {condition}")
 
 
-def failed(wanted: Property, what: str, run: Story) -> Finding:
+def failed(wanted: Property, what: str, run: Story) -> Diagnostic:
     """Return ALU531."""
     message = f"property `{wanted.name}` ({wanted.kind.value}{', assuming termination' if wanted.fair else ''}) does not hold: {what}"
-    return Finding("ALU531", message, wanted.span, Severity.ERROR, story=run)
+    return Diagnostic("ALU531", message, wanted.span, Severity.ERROR, story=run)
 
 
-def _found(graph: Graph, wanted: Property, number: int | None) -> Finding | None:
+def _found(graph: Graph, wanted: Property, number: int | None) -> Diagnostic | None:
     if number is None:
         return None
     return failed(wanted, story.situation(graph.world, graph.states[number]), story.to(graph, number))
@@ -76,7 +75,7 @@ def _found(graph: Graph, wanted: Property, number: int | None) -> Finding | None
 # --- runs that never get there ----------------------------------------------------------------------------------------
 
 
-def lasso(graph: Graph, wanted: Property, begins: list[int], goal: list[bool]) -> Finding | None:
+def lasso(graph: Graph, wanted: Property, begins: list[int], goal: list[bool]) -> Diagnostic | None:
     """Search from each beginning, within the situations that are not the goal, for a loop or an end."""
     begins = [number for number in begins if not goal[number]]
     ways = _ways(graph, begins, goal)

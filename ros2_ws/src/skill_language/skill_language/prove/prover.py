@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from skill_language.errors import Severity
+from skill_language.errors import Diagnostic, Severity
 from skill_language.outside import Arrow, opened, untaken
 from skill_language.prove import explicit, symbolic
 from skill_language.prove.abstract import without_data
-from skill_language.prove.finding import Finding, strictly
 from skill_language.prove.limits import Deadline, OutOfTimeError
 from skill_language.prove.local import Suspect, local_checks
 from skill_model.model import Skillset
@@ -23,22 +22,20 @@ COPIES = 2
 def prove(
     skillset: Skillset,
     *,
-    strict: bool = False,
     closed_world: bool = False,
     timeout_s: float = 30.0,
     most: int = MOST_SITUATIONS,
     copies: int = COPIES,
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """Return what is wrong with a skillset that the checker finds no error in, in the order of the source.
 
     An arrow that nothing in the model takes may be taken from outside (see ``outside``), unless ``closed_world``. What could not
-    be decided within ``timeout_s`` seconds is a finding as well (ALU540). ``strict`` makes errors of
-    warnings. The skillset must be free of errors of ``skill_language.check``: every name in it leads somewhere. ``most``
-    is how many situations are looked at one by one before they are taken as sets, ``copies`` how many executions of one
-    skill at once.
+    be decided within ``timeout_s`` seconds is a finding as well (ALU540). The skillset must be free of errors of
+    ``skill_language.check``: every name in it leads somewhere. ``most`` is how many situations are looked at one by one before they
+    are taken as sets, ``copies`` how many executions of one skill at once.
     """
     deadline = Deadline.after(timeout_s)
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     suspects: list[Suspect] = []
     try:
         findings, suspects = local_checks(skillset, deadline)
@@ -49,7 +46,7 @@ def prove(
         findings.append(_undecided(skillset, deadline))
     findings = list(dict.fromkeys(findings))
     findings.sort(key=lambda finding: (finding.span.line, finding.span.column, finding.code))
-    return strictly(findings) if strict else findings
+    return findings
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,7 @@ class _Search:
     most: int
     copies: int
 
-    def findings(self, outside: frozenset[Arrow] = frozenset()) -> list[Finding]:
+    def findings(self, outside: frozenset[Arrow] = frozenset()) -> list[Diagnostic]:
         """Return all global findings, where these arrows are taken from outside as well."""
         skillset = opened(self.skillset, outside) if outside else self.skillset
         abstraction = without_data(skillset, self.deadline, outside)
@@ -71,7 +68,7 @@ class _Search:
             found = symbolic.search(skillset, abstraction, self.suspects, self.deadline, copies=self.copies)
         return found
 
-    def open_findings(self) -> list[Finding]:
+    def open_findings(self) -> list[Diagnostic]:
         """Return the findings of the model alone, and the errors that arrows which nothing takes lead to."""
         findings = self.findings()
         arrows = untaken(self.skillset)
@@ -83,20 +80,20 @@ class _Search:
         return [f for f in findings if (f.code, f.span) not in shown] + errors
 
 
-def _from_outside(finding: Finding) -> Finding:
+def _from_outside(finding: Diagnostic) -> Diagnostic:
     """Say of a finding that it needs arrows which nothing in the model takes."""
     missing = "nothing in the model takes the arrow that comes from outside"
     hint = f"{missing}: make it `extern`, add a skill or event that takes it, or use `--closed-world`"
     return replace(finding, hint=f"{finding.hint}; {hint}" if finding.hint else hint)
 
 
-def _undecided(skillset: Skillset, deadline: Deadline) -> Finding:
+def _undecided(skillset: Skillset, deadline: Deadline) -> Diagnostic:
     """Return ALU540: an error where the user wants something proved."""
     severity = Severity.ERROR if skillset.properties else Severity.WARNING
     message = f"not proved within {deadline.given_s:.3g} s"
-    return Finding("ALU540", message, skillset.span, severity, "allow more time, or model the skillset with fewer resources")
+    return Diagnostic("ALU540", message, skillset.span, severity, "allow more time, or model the skillset with fewer resources")
 
 
-def _unsure(suspect: Suspect, deadline: Deadline) -> Finding:
+def _unsure(suspect: Suspect, deadline: Deadline) -> Diagnostic:
     message = f"{suspect.finding.message}; whether it comes to that was not found out within {deadline.given_s:.3g} s"
     return replace(suspect.finding, message=message)

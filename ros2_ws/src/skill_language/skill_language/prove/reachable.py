@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from skill_language.errors import Severity
+from skill_language.errors import Diagnostic, Severity
 from skill_language.prove import story
 from skill_language.prove.explore import Graph
-from skill_language.prove.finding import Finding
 from skill_language.prove.local import Suspect
 from skill_language.prove.steps import Key, State
 from skill_language.stories import Story
@@ -20,15 +19,15 @@ MANY = 6
 NEVER_SEEN = "no reachable situation shows it"
 
 
-def decide(skillset: Skillset, graph: Graph, suspects: Iterable[Suspect]) -> list[Finding]:
+def decide(skillset: Skillset, graph: Graph, suspects: Iterable[Suspect]) -> list[Diagnostic]:
     """Return the suspects with what the search says of them: an error with its story, or a warning that it never comes to that."""
     stories = {fault: story.to(graph, number, move, fault) for fault, (number, move) in graph.faults.items()}
     return judged(skillset, suspects, stories)
 
 
-def judged(skillset: Skillset, suspects: Iterable[Suspect], stories: Mapping[Key, Story]) -> list[Finding]:
+def judged(skillset: Skillset, suspects: Iterable[Suspect], stories: Mapping[Key, Story]) -> list[Diagnostic]:
     """Return the suspects and further faults; ``stories`` has those that are reached."""
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     told: set[Key] = set()
     for suspect in suspects:
         if suspect.key in stories:
@@ -40,11 +39,11 @@ def judged(skillset: Skillset, suspects: Iterable[Suspect], stories: Mapping[Key
     for fault, run in stories.items():
         if fault not in told and fault[0] == "effect":
             message = f"the effect of {named(fault)} fails in a reachable situation"
-            findings.append(Finding("ALU525", message, _place(skillset, fault), story=run))
+            findings.append(Diagnostic("ALU525", message, _place(skillset, fault), story=run))
     return findings
 
 
-def check_graph(skillset: Skillset, graph: Graph) -> list[Finding]:
+def check_graph(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
     """Return unreachable states, dead skills, resources held twice and skills that can be lost for ever."""
     dead = [skill for skill in skillset.skills if not graph.started[skill.name] and not _start_fails(graph, skill)]
     findings = unreachable_states(skillset, [{state.resources[i] for state in graph.states} for i in range(len(skillset.resources))])
@@ -61,7 +60,7 @@ def _start_fails(graph: Graph, skill: Skill) -> bool:
 # --- findings, for both ways of searching -----------------------------------------------------------------------------
 
 
-def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Finding]:
+def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Diagnostic]:
     """Return ALU521 for states that have a way of arrows to them, but no execution that takes it."""
     findings = []
     for resource, states in zip(skillset.resources, seen, strict=True):
@@ -71,36 +70,36 @@ def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Finding
             more = f" and {len(missing) - MANY} more" if len(missing) > MANY else ""
             names = ", ".join(f"`{state}`" for state in missing[:MANY])
             hint = "nothing that can happen takes the arrows that lead there"
-            findings.append(Finding("ALU521", f"`{resource.name}` never gets to {names}{more}", resource.span, Severity.WARNING, hint))
+            findings.append(Diagnostic("ALU521", f"`{resource.name}` never gets to {names}{more}", resource.span, Severity.WARNING, hint))
     return findings
 
 
-def dead_skill(skill: Skill) -> Finding:
+def dead_skill(skill: Skill) -> Diagnostic:
     """Return ALU522."""
     message = f"`{skill.name}` can never start: its preconditions are true in no reachable situation"
-    return Finding("ALU522", message, skill.span, Severity.WARNING)
+    return Diagnostic("ALU522", message, skill.span, Severity.WARNING)
 
 
-def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Story) -> Finding:
+def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Story) -> Diagnostic:
     """Return ALU523."""
     first, second = pair
     holders = f"two executions of `{first}`" if first == second else f"`{first}` and `{second}`"
     message = f"{holders} can hold `{resource}` at once: each has taken it to `{state}`"
     hint = f"let a precondition ask that `{resource}` is free, and an invariant that it is still taken"
-    return Finding("ALU523", message, skillset.skill(second).span, hint=hint, story=run)
+    return Diagnostic("ALU523", message, skillset.skill(second).span, hint=hint, story=run)
 
 
-def lost(skillset: Skillset, names: list[str], run: Story) -> Finding:
+def lost(skillset: Skillset, names: list[str], run: Story) -> Diagnostic:
     """Return ALU524."""
     several = ", ".join(f"`{name}`" for name in names)
     message = f"{several} can come to a situation from which {'it' if len(names) == 1 else 'they'} can never start again"
-    return Finding("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, story=run)
+    return Diagnostic("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, story=run)
 
 
-def crowded(skillset: Skillset, names: set[str], copies: int) -> list[Finding]:
+def crowded(skillset: Skillset, names: set[str], copies: int) -> list[Diagnostic]:
     """Return ALU526 for skills of which more executions can run at once than were looked at."""
     return [
-        Finding(
+        Diagnostic(
             "ALU526",
             f"more than {copies} executions of `{skill.name}` can run at once: what comes of that is not looked at",
             skill.span,
@@ -120,9 +119,9 @@ def takes(skill: Skill) -> dict[str, str]:
 # --- searches ---------------------------------------------------------------------------------------------------------
 
 
-def _held_twice(skillset: Skillset, graph: Graph) -> list[Finding]:
+def _held_twice(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
     taken = {skill.name: takes(skill) for skill in skillset.skills}
-    findings: dict[tuple[str, str, str], Finding] = {}
+    findings: dict[tuple[str, str, str], Diagnostic] = {}
     for number, state in enumerate(graph.states):
         graph.deadline.check()
         for resource, first, second in _pairs(skillset, state, taken):
@@ -149,7 +148,7 @@ def _pairs(skillset: Skillset, state: State, taken: Mapping[str, Mapping[str, st
                 yield resource.name, first, second
 
 
-def _lost_skills(skillset: Skillset, graph: Graph) -> list[Finding]:
+def _lost_skills(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
     sources = graph.backwards()
     stuck: dict[int, list[str]] = {}
     for skill in skillset.skills:

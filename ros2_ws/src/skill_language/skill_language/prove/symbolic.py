@@ -6,12 +6,11 @@ import itertools
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from skill_language.errors import Severity
+from skill_language.errors import Diagnostic, Severity
 from skill_language.prove import reachable, story
 from skill_language.prove.abstract import Abstraction
 from skill_language.prove.diagrams import Encoded
 from skill_language.prove.encoding import encode
-from skill_language.prove.finding import Finding
 from skill_language.prove.limits import Deadline
 from skill_language.prove.local import Suspect
 from skill_language.prove.properties import failed, lasso, true_in
@@ -23,7 +22,9 @@ from skill_model.expressions import Constant
 from skill_model.model import Property, PropertyKind, Skill, Skillset
 
 
-def search(skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int) -> list[Finding]:
+def search(
+    skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int
+) -> list[Diagnostic]:
     """Return all global findings; raise OutOfTimeError."""
     return _Search(skillset, abstraction, deadline, copies).findings(list(suspects))
 
@@ -37,7 +38,7 @@ class _Search:
         self.sets = Sets(self.model, deadline)
         self.walker = Walker(self.world, self.sets)
 
-    def findings(self, suspects: list[Suspect]) -> list[Finding]:
+    def findings(self, suspects: list[Suspect]) -> list[Diagnostic]:
         """Return the findings of all checks."""
         findings = reachable.judged(self.skillset, suspects, self._stories({suspect.key for suspect in suspects}))
         findings += reachable.unreachable_states(self.skillset, [set(self._seen(r.name)) for r in self.skillset.resources])
@@ -88,8 +89,8 @@ class _Search:
         changing = {s.name for s in self.skillset.skills if s.name not in self.world.idle}
         return {name for name in changing if self._reaches(self.model.crowded[name])}
 
-    def _held_twice(self) -> list[Finding]:
-        findings: list[Finding] = []
+    def _held_twice(self) -> list[Diagnostic]:
+        findings: list[Diagnostic] = []
         taken: dict[tuple[str, str], list[str]] = {}
         for skill in self.skillset.skills:
             for resource, state in reachable.takes(skill).items():
@@ -104,7 +105,7 @@ class _Search:
                     findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), run))
         return findings
 
-    def _lost(self) -> list[Finding]:
+    def _lost(self) -> list[Diagnostic]:
         """Return skills that can be lost; where all can go back to the beginning, what starts at all can start again."""
         if self.sets.can_come_to(self.sets.initial) == self.sets.reached:
             return []
@@ -121,7 +122,7 @@ class _Search:
 
     # --- properties -----------------------------------------------------------------------------------------------
 
-    def _property(self, wanted: Property) -> Finding | None:
+    def _property(self, wanted: Property) -> Diagnostic | None:
         condition = self.model.term(wanted.condition)
         match wanted.kind:
             case PropertyKind.NEVER:
@@ -133,7 +134,7 @@ class _Search:
             case PropertyKind.LEADS_TO:
                 return self._run(wanted, condition, self.model.term(wanted.consequence or Constant(value=False)))
 
-    def _single(self, wanted: Property, bad: Any) -> Finding | None:
+    def _single(self, wanted: Property, bad: Any) -> Diagnostic | None:
         if not self._reaches(bad):
             return None
         moves = self.walker.to(bad)
@@ -142,7 +143,7 @@ class _Search:
         run = story.walked(self.world, self.world.initial(), moves)
         return failed(wanted, story.situation(self.world, self.walker.end(moves)), run)
 
-    def _run(self, wanted: Property, begins: Any, goal: Any) -> Finding | None:
+    def _run(self, wanted: Property, begins: Any, goal: Any) -> Diagnostic | None:
         """Look for a run that avoids the goal for ever; a set that allows one is walked before it is believed."""
         avoiding = self._for_ever(goal, fair=wanted.fair)
         if not self._reaches(begins & avoiding):
@@ -179,6 +180,6 @@ class _Search:
         return avoiding
 
 
-def _unsure(wanted: Property) -> Finding:
+def _unsure(wanted: Property) -> Diagnostic:
     message = f"property `{wanted.name}` was neither proved nor refuted: a run against it may exist, but none was found to show"
-    return Finding("ALU540", message, wanted.span, Severity.ERROR)
+    return Diagnostic("ALU540", message, wanted.span, Severity.ERROR)

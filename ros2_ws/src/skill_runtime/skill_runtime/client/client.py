@@ -7,17 +7,17 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from skill_model.model import Data, Skillset
-from skill_runtime.callbacks import Forget
+from skill_runtime.callbacks import Unsubscribe
 from skill_runtime.client.feed import Feed
 from skill_runtime.client.goal import GoalTracker
 from skill_runtime.client.news import ClientNews, OnChange, OnEvent, OnSkills
-from skill_runtime.core.engine import TransitionReply
 from skill_runtime.core.records import SkillRecord
+from skill_runtime.core.replies import TransitionReply
 from skill_runtime.core.why import Why
 from skill_runtime.handle import Ended, SkillHandle
 from skill_runtime.middleware import CALL_S, Middleware
 from skill_runtime.plain import to_plain
-from skill_runtime.views import DataReading, SkillsetView, TransitionAnswer
+from skill_runtime.views import DataReading, SkillsetView
 from skill_runtime.waiting import Pending
 
 HOOK_CALL_S = 15.0
@@ -47,7 +47,7 @@ class Client:
         Raises:
             CannotWaitError: this is the thread that would bring the answer.
         """
-        return self.ready or self._middleware.host.wait(self._connection.ready, timeout_s)
+        return self.ready or self._middleware.waiter.wait(self._connection.ready, timeout_s)
 
     @property
     def ready(self) -> bool:
@@ -104,16 +104,16 @@ class Client:
         outputs = self._connection.links[skill].outputs_of(plain)
         return Ended(skill, ended.id, ended.state, ended.result, ended.message, outputs)
 
-    def on_change(self, callback: OnChange) -> Forget:
-        """Have ``callback(resources)`` called after each step that changed a resource; the return value ends that."""
+    def on_change(self, callback: OnChange) -> Unsubscribe:
+        """Call ``callback(resources)`` after each step that changed a resource; the return value unsubscribes."""
         return self._news.on_changes.add(callback)
 
-    def on_event(self, callback: OnEvent) -> Forget:
-        """Have ``callback(event)`` called for each event from now on, an ``EngineEvent``; the return value ends that."""
+    def on_event(self, callback: OnEvent) -> Unsubscribe:
+        """Call ``callback(event)`` for each event from now on, an ``EngineEvent``; the return value unsubscribes."""
         return self._news.on_events.add(callback)
 
-    def on_skills(self, callback: OnSkills) -> Forget:
-        """Have ``callback(skills)`` called after changes, with a ``SkillRecord`` by skill; the return value ends that."""
+    def on_skills(self, callback: OnSkills) -> Unsubscribe:
+        """Call ``callback(skills)`` after changes, with a ``SkillRecord`` by skill; the return value unsubscribes."""
         return self._news.on_skills.add(callback)
 
     def data_feed(self, name: str) -> Feed:
@@ -186,20 +186,19 @@ class Client:
 
     # --- resources and data ------------------------------------------------------------------------------------------
 
-    def transition(self, resource: str, to: str) -> Pending[TransitionAnswer]:
+    def transition(self, resource: str, to: str) -> Pending[TransitionReply]:
         """Ask for an extern transition, as the functional layer does."""
 
-        def answer(reply: TransitionReply, tries: int) -> TransitionAnswer:
+        def answer(reply: TransitionReply, tries: int) -> TransitionReply:
             # An answer that got lost may have been that the transition was taken.
             accepted = reply.accepted or (tries > 1 and reply.state == to)
-            return TransitionAnswer(accepted, "" if accepted else reply.reason, reply.state)
+            return TransitionReply(accepted, "" if accepted else reply.reason, reply.state)
 
         return self._ask("transition", {"resource": resource, "to": to}, answer)
 
-    def trigger(self, event: str) -> Pending[TransitionAnswer]:
+    def trigger(self, event: str) -> Pending[TransitionReply]:
         """Ask for an event of the model; it is asked for once only, as it may be taken again and again."""
-        answer = lambda reply, _: TransitionAnswer(reply.accepted, reply.reason, "")  # noqa: E731
-        return self._ask("trigger", {"event": event}, answer, once=True)
+        return self._ask("trigger", {"event": event}, lambda reply, _: reply, once=True)
 
     def read_data(self, name: str) -> Pending[DataReading]:
         """Ask the managers for a data's value as JSON: also of a type that is not known here."""
@@ -261,7 +260,7 @@ class Client:
 
     def _not_started(self, skill: str) -> SkillHandle:
         """Return the handle of an execution that can't be asked for now."""
-        handle = SkillHandle(skill, "", host=self._middleware.host)
+        handle = SkillHandle(skill, "", waiter=self._middleware.waiter)
         handle.fail(self._not_there())
         return handle
 

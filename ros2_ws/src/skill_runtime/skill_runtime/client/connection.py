@@ -7,19 +7,20 @@ from collections.abc import Callable
 
 from skill_model.json_form import from_json
 from skill_model.model import Skillset
-from skill_runtime.middleware import ActionLink, GoalListener, Job, Middleware
+from skill_runtime.middleware import ActionLink, GoalListener, Middleware
+from skill_runtime.timers import Job
 
 DESCRIBE_S = 5.0
 DOUBT_S = 1.0
 """Managers that do not answer for so long (wall clock) after their signs of life stayed away are gone."""
 RIVALS_NS = 1_000_000_000
-"""Managers that tell of something so long after others had taken their place still live: there are two."""
+"""Managers that send a message so long after others had replaced them still live: there are two."""
 
 
 class Connection:
-    """Follows the life of the managers; all of it happens on the middleware's loop, ``ready`` may be waited for on any thread.
+    """Follows whether the managers live and can be called, on the middleware's loop; any thread may wait for ``ready``.
 
-    A starved process may only be late: before managers are taken for dead they are asked, and it is their answer that counts.
+    A starved process may only be late: managers whose signs of life stay away are asked, and are gone when they don't answer.
 
     Args:
         middleware: the client's.
@@ -116,10 +117,10 @@ class Connection:
             self._ask(DESCRIBE_S)
         self._look()
 
-    def _on_silence(self, reason: str) -> None:  # noqa: ARG002 - that they have gone is all there is to say
+    def _on_silence(self, reason: str) -> None:  # noqa: ARG002 - the reason is of no use to callers
         self._asking = False
         if self._alive and not self._doubted:
-            # They live, and are slow or hardly there yet: should they end, the middleware will doubt them.
+            # They live, and are slow or just starting; if they end, the middleware will call `on_doubt`.
             self._middleware.later(DOUBT_S, self._ask_again)
         elif self._alive:
             self._alive, self.gone = False, True

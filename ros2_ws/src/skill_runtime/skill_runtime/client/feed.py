@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 from skill_model.model import Data
-from skill_runtime.callbacks import Callbacks, Forget
+from skill_runtime.callbacks import Callbacks, Unsubscribe
 from skill_runtime.middleware import Middleware, data_topic
 from skill_runtime.staleness import is_stale
 from skill_runtime.views import DataReading, Sample
@@ -41,8 +41,8 @@ class Feed:
             return True
         return sample.stamp_ns is not None and is_stale(self._middleware.now_ns() - sample.stamp_ns, self.data.period_s)
 
-    def on_sample(self, callback: Callable[[Sample], None]) -> Forget:
-        """Have ``callback(sample)`` called for each value from now on; the return value ends that."""
+    def on_sample(self, callback: Callable[[Sample], None]) -> Unsubscribe:
+        """Call ``callback(sample)`` for each value from now on; the return value unsubscribes."""
         return self._callbacks.add(callback)
 
     def _take(self, sample: Sample) -> None:

@@ -9,21 +9,22 @@ from typing import Any, Protocol
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import ExecutionEvent
 from skill_runtime.handle import SkillHandle
-from skill_runtime.middleware import ActionLink, Ending, Middleware, Timer
+from skill_runtime.middleware import ActionLink, GoalResult, Middleware
+from skill_runtime.timers import Timer
 from skill_runtime.waiting import Pending
 
 ACKNOWLEDGE_S = 5.0
-"""Managers take any goal at once; no sign of it or of anything else for so long (wall clock) means that there will be none."""
+"""Managers accept any goal at once. Without any message of theirs for so long (wall clock), the goal is given up."""
 ACKNOWLEDGE_LIMIT = 12
-"""So many times as long where the managers are heard of other goals all the time."""
+"""So many times as long while the managers send messages about other goals."""
 SILENCE_S = 10.0
-"""Managers that took a goal tell of it; after so long without a word its ending is asked for."""
+"""After so long without a message about an accepted goal, its result is asked for."""
 GRACE_S = 0.5
-"""An end waits so long for what belongs to it and comes another way: the resources after the step, the event."""
+"""An end waits so long for the resources after its step, and a result for its event."""
 
 
 class News(Protocol):
-    """What a goal needs to know of its client."""
+    """The part of a client's knowledge that a goal needs."""
 
     @property
     def states_after(self) -> int:
@@ -32,7 +33,7 @@ class News(Protocol):
 
     @property
     def heard(self) -> int:
-        """How many messages of the managers were heard."""
+        """How many messages of the managers have arrived."""
         ...
 
 
@@ -54,7 +55,9 @@ class GoalTracker:
         on_over: Callable[[GoalTracker, bool], None],
     ) -> None:
         identifier = middleware.new_id()
-        self.handle = SkillHandle(skill, identifier, self._interrupt, pause=lambda paused: pause(identifier, paused), host=middleware.host)
+        self.handle = SkillHandle(
+            skill, identifier, self._interrupt, pause=lambda paused: pause(identifier, paused), waiter=middleware.waiter
+        )
         self.link = link
         self.life = ""
         """The managers that have acknowledged it; empty before."""
@@ -65,14 +68,14 @@ class GoalTracker:
         self._lock = threading.Lock()
         self._acknowledged = False
         self._interrupt_wanted = False
-        self._end: tuple[int, Ending] | None = None
+        self._end: tuple[int, GoalResult] | None = None
         self._looks = 0
         self._heard = news.heard
         self._timer: Timer | None = None
         self._feedback: tuple[float, Mapping[str, object]] = (0.0, {})
 
     def send(self, goal: Any) -> None:
-        """Send the goal; all that is to be noted about it comes afterwards."""
+        """Send the goal first, and set the timer afterwards."""
         self.link.send(self.handle.id, goal, self._on_answer)
         with self._lock:
             if not self._acknowledged and not self.handle.done:
@@ -88,7 +91,7 @@ class GoalTracker:
                 self.handle.enter(event.state)
             return
         outputs = self.link.outputs_of(_plain(event.outputs))
-        self._end = (after, Ending(event.state, event.result, event.message, outputs))
+        self._end = (after, GoalResult(event.state, event.result, event.message, outputs))
         self.settle()
         if not self.handle.done:
             self._timer = self._middleware.later(GRACE_S, self._finish)
@@ -100,8 +103,8 @@ class GoalTracker:
             self._feedback = (progress, dict(outputs))
             self.handle.run(progress, outputs)
 
-    def on_ending(self, ending: Ending | None) -> None:
-        """Take the ending as the action tells it; the event of the same end, which says when it was, is waited for a little."""
+    def on_result(self, ending: GoalResult | None) -> None:
+        """Take the result of the action, and wait a little for the event of the same end, which is numbered."""
         if ending is None:
             self.abandon(f"the managers of {self._skillset} do not know this execution; were they restarted?")
         elif self._end is None and not self.handle.done:
@@ -111,12 +114,12 @@ class GoalTracker:
             self._timer = self._middleware.later(GRACE_S, self._finish)
 
     def settle(self) -> None:
-        """End if that was told and the resources are known as they were then."""
+        """End if the end is known, and the resources as they were after it."""
         if self._end is not None and self._news.states_after >= self._end[0]:
             self._finish()
 
     def abandon(self, reason: str, *, orphan: bool = False) -> None:
-        """End because no news will come: as was told last, or else as FAILED for this reason."""
+        """End because no message will come: with the end that is known, or else as FAILED for this reason."""
         if self._end is not None:
             self._finish()
             return
@@ -151,12 +154,12 @@ class GoalTracker:
             self.link.cancel(self.handle.id)
 
     def _look(self) -> None:
-        """See what time has brought: nothing was heard of this goal for a while."""
+        """Deal with silence: no message about this goal has come for a while."""
         if self.handle.done:
             return
         if self._acknowledged:
-            # What was told of it may have got lost; managers that do not know the goal say so.
-            self.link.ask_ending(self.handle.id)
+            # The messages may have got lost; managers that do not know the goal answer that.
+            self.link.request_result(self.handle.id)
             self._timer = self._middleware.later(SILENCE_S, self._look)
             return
         self._looks += 1

@@ -1,7 +1,7 @@
-"""What a client hears of the managers of one skillset, dealt with in one order on the middleware's loop.
+"""The messages of one skillset's managers as a client receives them, put into one order on the middleware's loop.
 
-Topics come in no order with one another. The managers number their events, and tell with their states after which event these are;
-so a caller that is told of an execution's end can see the resources as they are after it.
+The messages of different topics arrive in any order. Events are numbered, and resource states carry the number of the last event that
+they include; so a caller that learns of an execution's end sees the resources as they are after it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from skill_runtime.middleware import (
     EVENTS,
     RESOURCE_STATES,
     SKILL_STATES,
-    Ending,
+    GoalResult,
     Middleware,
+    PublishedEvent,
     ResourceStates,
     SkillStates,
-    Told,
 )
 from skill_runtime.waiting import Pending
 
@@ -34,7 +34,7 @@ OnSkills = Callable[[dict[str, SkillRecord]], None]
 
 
 class ClientNews:
-    """All that a client knows; the goals that it follows, and those that it has given up and the managers have not."""
+    """All that a client knows; the goals that it follows, and the orphans: goals that it has given up and that may still run."""
 
     def __init__(self, middleware: Middleware, skillset: str) -> None:
         self.skillset = skillset
@@ -72,7 +72,7 @@ class ClientNews:
         tracker.send(goal)
 
     def over(self, tracker: GoalTracker, orphan: bool) -> None:  # noqa: FBT001 - as trackers tell it
-        """Follow a goal no more; have it cancelled as soon as the managers are heard of it, when its handle gave up."""
+        """Stop following a goal; an orphan is cancelled at the next message about it."""
         with self._lock:
             self._open.pop(tracker.handle.id, None)
             if orphan:
@@ -82,7 +82,7 @@ class ClientNews:
 
     def moment(self) -> Pending[Any]:
         """Return an answer that is not given yet; it fails when the managers go."""
-        pending: Pending[Any] = Pending(self._middleware.host)
+        pending: Pending[Any] = Pending(self._middleware.waiter)
         with self._lock:
             self._pending.add(pending)
         return pending
@@ -93,21 +93,21 @@ class ClientNews:
         self.connection.close()
         self._abandon(reason, orphans=False)
 
-    # --- what goals tell ---------------------------------------------------------------------------------------------
+    # --- feedback and results of goals ---------------------------------------------------------------------------------------------
 
     def on_feedback(self, goal_id: str, progress: float, outputs: Mapping[str, object]) -> None:
-        """Take a report of a goal that runs."""
+        """Take the feedback of a goal."""
         tracker = self._open.get(goal_id)
         if tracker is not None:
             tracker.on_feedback(progress, outputs)
 
-    def on_ending(self, goal_id: str, ending: Ending | None) -> None:
-        """Take the ending of a goal."""
+    def on_result(self, goal_id: str, ending: GoalResult | None) -> None:
+        """Take the result of a goal."""
         tracker = self._open.get(goal_id)
         if tracker is not None:
-            tracker.on_ending(ending)
+            tracker.on_result(ending)
 
-    # --- what topics tell --------------------------------------------------------------------------------------------
+    # --- messages of topics --------------------------------------------------------------------------------------------
 
     def _on_states(self, states: ResourceStates) -> None:
         if self.closed or not self.connection.heard(states.life, states.stamp_ns) or states.after <= self.states_after:
@@ -123,9 +123,9 @@ class ClientNews:
                 tracker.settle()
             self.connection.heard_states()
 
-    def _on_told(self, told: Told) -> None:
+    def _on_told(self, told: PublishedEvent) -> None:
         event = told.event
-        # Twice comes what was published while the history of earlier events was on its way.
+        # An event that was published while the history was on its way comes twice.
         if self.closed or not self.connection.heard(told.life, event.stamp_ns) or event.sequence <= self._last_event:
             return
         self.heard += 1
@@ -134,12 +134,12 @@ class ClientNews:
         if isinstance(event, TransitionEvent):
             self._last_transition = event.sequence
         if gap:
-            self._ask_endings()
+            self._request_results()
         try:
             for callback in self.on_events:
                 callback(event)
         finally:
-            # Whatever a callback raises: a goal that has ended ends for its handle.
+            # Also after a callback has raised: the handle of a goal that has ended must end.
             if isinstance(event, ExecutionEvent):
                 self._follow_event(event, told.life)
 
@@ -172,7 +172,7 @@ class ClientNews:
     # --- life and death ----------------------------------------------------------------------------------------------
 
     def _on_life(self) -> None:
-        """Forget what was known of earlier managers: these are others."""
+        """Drop what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
         self.last.clear()
         # A goal without an acknowledgement may still be on its way, also to restarted managers.
@@ -191,10 +191,10 @@ class ClientNews:
         for goal_id, tracker in list(self._orphans.items()):
             tracker.link.cancel(goal_id)
 
-    def _ask_endings(self) -> None:
-        """Make good for events that got lost."""
+    def _request_results(self) -> None:
+        """Ask for the results of all goals, because events got lost."""
         for tracker in self._trackers():
-            tracker.link.ask_ending(tracker.handle.id)
+            tracker.link.request_result(tracker.handle.id)
 
     def _abandon(self, reason: str, *, orphans: bool) -> None:
         for tracker in self._trackers():

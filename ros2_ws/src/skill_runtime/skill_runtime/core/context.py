@@ -15,16 +15,7 @@ from skill_model.model import Skillset
 from skill_model.situation import Change, Entered, Running, Situation, Step
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 from skill_runtime.core.execution import Execution
-from skill_runtime.core.records import Records
-
-
-@dataclass(frozen=True)
-class ResourceStatus:
-    """A resource at one moment; ``previous`` is empty and ``stamp_ns`` that of the engine's start before the first transition."""
-
-    state: str
-    previous: str
-    stamp_ns: int
+from skill_runtime.core.records import Records, ResourceStatus
 
 
 @dataclass(eq=False)
@@ -64,7 +55,7 @@ class ExecutionContext:
         self.entries: dict[str, Entry] = {}
         self.sequence = 0
 
-    # --- what is the case ------------------------------------------------------------------------------------------------
+    # --- the present ------------------------------------------------------------------------------------------------
 
     @property
     def situation(self) -> Situation:
@@ -125,7 +116,7 @@ class ExecutionContext:
         self._situation = semantics.progressed(self._skillset, self.situation, entry.key)
 
     def commit(self, step: Step, *, by_itself: Entry | None = None) -> list[Entry]:
-        """Make a step the present; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
+        """Apply a step; return the executions whose function is to be stopped now, but not that of ``by_itself``."""
         self._situation = step.situation
         events: list[EngineEvent] = []
         ended: list[Entry] = []
@@ -144,7 +135,7 @@ class ExecutionContext:
         return [entry for entry in ended if entry is not by_itself and _stop_now(entry)]
 
     def forget_if_through(self, entry: Entry) -> None:
-        """Drop an execution of which nothing is to come any more."""
+        """Drop an execution that has ended and whose hooks have returned."""
         if entry.execution.done and not entry.dispatching:
             self.entries.pop(entry.key.id, None)
 

@@ -1,7 +1,7 @@
 """Runs one skillset: takes the steps of ``semantics`` one after another and calls the hooks between them.
 
 All changes of the execution context go through one lock; hooks and the listener are never called while it is held, so a hook may
-end, interrupt or start whatever it likes, from any thread. Events are queued under the lock, so in the order of the steps.
+end, interrupt or start any execution, from any thread. Events are queued under the lock, so in the order of the steps.
 
 The stop contract: an interruption is asked for, then done; when that takes too long, it is an emergency. Asked: the execution is
 INTERRUPTING (its resources are still held, it may still end by a result or a violation), and ``on_interrupt`` is called, after
@@ -19,23 +19,23 @@ import functools
 import logging
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from skill_model import semantics
 from skill_model.errors import UnsupportedModelError
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Skillset
 from skill_model.situation import Running
-from skill_runtime.core.context import Entry, ExecutionContext, ResourceStatus
+from skill_runtime.core.context import Entry, ExecutionContext
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.events import Listener
 from skill_runtime.core.execution import Execution
 from skill_runtime.core.hook_calls import HookAnswer, HookCaller, LocalHooks, Then
 from skill_runtime.core.outbox import Outbox
-from skill_runtime.core.records import SkillRecord
+from skill_runtime.core.records import ResourceStatus, SkillRecord
+from skill_runtime.core.replies import PauseReply, TransitionReply
+from skill_runtime.core.sanitize import as_text, fitted_outputs
 from skill_runtime.core.watchdog import WATCHDOG
 from skill_runtime.core.why import Why, resources_of, sentence, unmet
-from skill_runtime.core.wire import as_text, fitted_outputs
 from skill_runtime.hooks import SkillHooks
 
 _LOG = logging.getLogger(__name__)
@@ -52,26 +52,6 @@ _STARTS = frozenset({"on_dispatch", "on_pause", "on_resume"})
 _STOPS = frozenset({"on_violation", "on_failure"})
 
 
-@dataclass(frozen=True)
-class TransitionReply:
-    """Answer to an extern transition or an event.
-
-    ``state`` is the resource's state afterwards, empty for an event and when there is no such resource.
-    """
-
-    accepted: bool
-    reason: str
-    state: str
-
-
-@dataclass(frozen=True)
-class PauseReply:
-    """Answer to a pause or a resumption; ``reason`` is empty when it is accepted."""
-
-    accepted: bool
-    reason: str = ""
-
-
 Reply = Callable[[PauseReply], None]
 
 
@@ -86,7 +66,7 @@ def log_error(text: str) -> None:
 
 
 def _nothing(_: object) -> None:
-    """Do nothing more."""
+    """Ignore the answer."""
 
 
 class SkillsetEngine:
@@ -152,7 +132,7 @@ class SkillsetEngine:
         return execution
 
     def register(self, skill: str, inputs: object, *, execution_id: str = "") -> Execution:
-        """Take down a request without calling a hook, so that it can be interrupted; ``run`` has to follow. Raises as ``request``."""
+        """Register a request without calling a hook, so that it can be interrupted; ``run`` has to follow. Raises as ``request``."""
         self.skillset.skill(skill)
         with self._lock:
             execution_id = execution_id or str(self._context.sequence + 1)
@@ -165,9 +145,9 @@ class SkillsetEngine:
         return entry.execution
 
     def run(self, execution_id: str, submit: Submit = run_at_once) -> None:
-        """Have a registered request validated and started, unless it has ended meanwhile.
+        """Validate and start a registered request, unless it has ended meanwhile.
 
-        ``submit`` runs ``validate`` and ``on_dispatch``, which may wait, where they are written; all else is done in this thread.
+        ``submit`` runs ``validate`` and ``on_dispatch``, which may wait, where they are overridden; all else runs in this thread.
         """
         with self._lock:
             entry = self._context.open(execution_id)
@@ -201,7 +181,7 @@ class SkillsetEngine:
         if started and dispatch:
             submit(lambda: self._call(entry, "on_dispatch"))
 
-    # --- what the functional layer tells -----------------------------------------------------------------------------------
+    # --- reports of the functional layer -----------------------------------------------------------------------------------
 
     def transition(self, resource: str, to: str) -> TransitionReply:
         """Take an extern transition, or say why not."""
@@ -264,7 +244,7 @@ class SkillsetEngine:
         return True
 
     def interrupted(self, execution_id: str, message: str = "") -> bool:
-        """Say that the stop which ``on_interrupt`` has begun is done; False when none is under way."""
+        """Confirm that the stop which ``on_interrupt`` has begun is done; False when none is under way."""
         self.tick()
         return self._interrupted(execution_id, message)
 
@@ -344,7 +324,7 @@ class SkillsetEngine:
         self._outbox.deliver()
         reply(PauseReply(not reason, reason))
 
-    # --- what functions report; reports after the end come too late, which is no error -------------------------------------
+    # --- reports of functions; reports after the end come too late, which is no error -------------------------------------
 
     def terminate(self, execution_id: str, result: str, message: str = "", outputs: Mapping[str, object] | None = None) -> bool:
         """End a running execution with a result of the model; False when it is not running (any more).
@@ -438,12 +418,12 @@ class SkillsetEngine:
     # --- the end -----------------------------------------------------------------------------------------------------------
 
     def fail_all(self, message: str) -> None:
-        """End whatever was asked for or runs as FAILED."""
+        """End all executions as FAILED."""
         for execution in self.executions:
             self.fail(execution.id, message)
 
     def close(self, message: str) -> None:
-        """Fail whatever runs, for ``message``, and refuse all later requests for the same reason."""
+        """Fail all executions for ``message``, and refuse all later requests for the same reason."""
         with self._lock:
             self._closed = message
         self.fail_all(message)
@@ -457,7 +437,7 @@ class SkillsetEngine:
             return self._context.due_ns
 
     def tick(self) -> None:
-        """Do what has become due: a duration that has run out, a progress deadline, a stop that is too late.
+        """Take the steps that are due: a duration that has run out, a progress deadline, a stop that is too late.
 
         Every other step begins with it, so that a late call makes the step late, not another one.
         """
@@ -496,7 +476,7 @@ class SkillsetEngine:
         self._hooks.call(entry.execution, hook, answered)
 
     def _overdue(self, entry: Entry, hook: str, limit_s: float, then: Then) -> None:
-        """End an execution whose hook does not return; what other hook should stop the function would wait for that one."""
+        """End an execution whose hook does not return. The stop hook would wait for it, so ``on_emergency`` stops the function."""
         problem = f"{hook} has not returned within {limit_s:g} s"
         self._on_error(f"{entry.execution}: {problem}")
         if hook == "on_interrupt":
@@ -509,9 +489,9 @@ class SkillsetEngine:
         self._run_waiting(entry)
 
     def _returned(self, entry: Entry, hook: str) -> None:
-        """Do what was asked for while a hook was called that no stop overtakes.
+        """Run what has waited for a hook that no stop overtakes: the stop, pauses and resumptions.
 
-        Also after an emergency: what a late ``on_dispatch`` or ``on_resume`` has started is not stopped yet.
+        Also after an emergency: a late ``on_dispatch`` or ``on_resume`` may have started the function again.
         """
         if hook == "progress":
             entry.asking = False
@@ -532,7 +512,7 @@ class SkillsetEngine:
             job()
 
     def _after_step(self, stops: list[Entry]) -> None:
-        """Deliver events, then have the functions of executions that were ended stopped; called without the lock."""
+        """Deliver events, then call the stop hooks of executions that the step has ended; called without the lock."""
         self._outbox.deliver()
         for entry in stops:
             self._defer(functools.partial(self._call, entry, entry.stop_hook))

@@ -10,13 +10,13 @@ from typing import Protocol
 from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.core.execution import Execution
-from skill_runtime.core.wire import as_text, error_line, fitted_return
-from skill_runtime.hooks import SkillHooks
+from skill_runtime.core.sanitize import as_text, error_line, fitted_return
+from skill_runtime.hooks import SkillHooks, is_written
 
 
 @dataclass(frozen=True)
 class HookAnswer:
-    """What a hook returned, as its type; or what is wrong with that; or what it raised, as a line (``error``) and as a whole."""
+    """The outcome of a hook's call: its ``value``; or ``wrong``, why its value is refused; or what it raised: ``error``, ``trace``."""
 
     value: object = None
     error: str = ""
@@ -28,7 +28,7 @@ Then = Callable[[HookAnswer], None]
 
 
 class HookCaller(Protocol):
-    """What the engine needs of the owner of the hooks."""
+    """Calls hooks for the engine."""
 
     def call(self, execution: Execution, hook: str, then: Then) -> None:
         """Call a hook of the execution's skill; ``then`` gets the answer, once, in this call or later, from any thread.
@@ -38,7 +38,7 @@ class HookCaller(Protocol):
         ...
 
     def written(self, skill: str, hook: str) -> bool:
-        """Tell whether the hook is written (see ``hooks.unwritten``): then it may wait; else it need not be called."""
+        """Tell whether the hook does anything (see ``hooks.is_written``): then it may wait; else it need not be called."""
         ...
 
 
@@ -55,11 +55,11 @@ class LocalHooks:
 
     def written(self, skill: str, hook: str) -> bool:
         """Tell whether the hook is written."""
-        return not getattr(getattr(self._hooks[skill], hook), "unwritten", False)
+        return is_written(self._hooks[skill], hook)
 
 
 def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookAnswer:
-    """Call one hook and return what came of it."""
+    """Call one hook and return the outcome."""
     try:
         value = getattr(hooks, hook)(execution.inputs if hook == "validate" else execution)
     except BaseException as error:  # noqa: BLE001 - whatever a hook raises, also SystemExit, ends its execution only

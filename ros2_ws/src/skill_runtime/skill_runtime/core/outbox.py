@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, Listener
-from skill_runtime.core.wire import as_text, error_line
+from skill_runtime.core.sanitize import as_text, error_line
 
 
 class Outbox:
@@ -29,7 +29,7 @@ class Outbox:
                 self._steps.append(tuple(events))
 
     def deliver(self) -> None:
-        """Give queued events to the listener; a thread that finds another at it leaves its events to that one."""
+        """Give queued events to the listener; if another thread does that already, it also delivers this thread's events."""
         while True:
             with self._lock:
                 if self._delivering or not self._steps:
@@ -43,7 +43,7 @@ class Outbox:
                     self._delivering = False
 
     def _tell(self, events: tuple[EngineEvent, ...]) -> None:
-        """Tell of a step; what can't be told with its values is told without them, so that no caller misses an end."""
+        """Give a step to the listener; if that raises, again without inputs and outputs, so that no caller misses an end."""
         try:
             self._listener(events)
         except Exception as error:  # noqa: BLE001 - a listener must not stop the managers

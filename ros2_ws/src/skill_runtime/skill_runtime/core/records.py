@@ -1,4 +1,4 @@
-"""What has happened, for later questions: each skill's executions, each resource's last transitions."""
+"""What has happened: the state of each resource and its last transitions, the executions of each skill."""
 
 from __future__ import annotations
 
@@ -12,6 +12,15 @@ from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 
 HISTORY = 20
 """Transitions that are kept of each resource."""
+
+
+@dataclass(frozen=True)
+class ResourceStatus:
+    """A resource at one moment; before its first transition ``previous`` is empty and ``stamp_ns`` that of the engine's start."""
+
+    state: str
+    previous: str
+    stamp_ns: int
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ class Watch:
         self.overdue = overdue
 
     def end(self) -> bool:
-        """Say that the call has returned; False when it was found overdue before."""
+        """End the watch: the call has returned. False when it was found overdue before."""
         return self._dog.forget(self)
 
 

@@ -12,8 +12,6 @@ from pathlib import Path
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.execution import Execution
 
-HOOKS = ("validate", "on_dispatch", "progress", "on_interrupt", "on_emergency", "on_pause", "on_resume", "on_violation", "on_failure")
-
 
 def pipe_address(*names: str) -> str:
     """Return the path of a socket for a skillset that is named by domain, namespace and name; only this user may enter its folder."""

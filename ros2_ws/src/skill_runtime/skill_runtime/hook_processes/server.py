@@ -14,9 +14,9 @@ from typing import Any
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.execution import Execution
 from skill_runtime.core.hook_calls import HookAnswer, call_hook
-from skill_runtime.core.wire import as_text, error_line
-from skill_runtime.hook_processes.place import HOOKS, Snapshot
-from skill_runtime.hooks import SkillHooks
+from skill_runtime.core.sanitize import as_text, error_line
+from skill_runtime.hook_processes.place import Snapshot
+from skill_runtime.hooks import HOOKS, SkillHooks, is_written
 from skill_runtime.workers import Workers
 
 AGAIN_S = 0.1
@@ -110,7 +110,7 @@ class HookServer:
             except OSError:
                 self._over.wait(AGAIN_S)
                 continue
-            written = [hook for hook in HOOKS if not getattr(getattr(self._hooks, hook), "unwritten", False)]
+            written = [hook for hook in HOOKS if is_written(self._hooks, hook)]
             self._pipe = pipe
             self._send(("hello", self._skill, written))
             self._read(pipe)

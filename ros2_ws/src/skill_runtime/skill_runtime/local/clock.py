@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
-from collections.abc import Callable
-
 from skill_runtime.core.errors import SkillRuntimeError
+from skill_runtime.timers import Job, Timer, TimerQueue
 
-Job = Callable[[], object]
 NANOSECONDS = 1_000_000_000
 JOBS_AT_ONCE = 100_000
 """So many jobs at one moment can only be jobs that beget each other without end."""
@@ -16,25 +12,6 @@ JOBS_AT_ONCE = 100_000
 
 class WorldError(SkillRuntimeError):
     """The world in one process can't go on as it was asked to; the message says why."""
-
-
-class Timer:
-    """A job that waits for its moment."""
-
-    __slots__ = ("job", "when_ns")
-
-    def __init__(self, when_ns: int, job: Job) -> None:
-        self.when_ns = when_ns
-        self.job: Job | None = job
-
-    @property
-    def pending(self) -> bool:
-        """Tell whether the job is still to come."""
-        return self.job is not None
-
-    def cancel(self) -> None:
-        """Let the job not happen; without effect when it has."""
-        self.job = None
 
 
 class VirtualClock:
@@ -45,8 +22,7 @@ class VirtualClock:
 
     def __init__(self, start_s: float = 0.0) -> None:
         self._now_ns = round(start_s * NANOSECONDS)
-        self._queue: list[tuple[int, int, Timer]] = []
-        self._numbers = itertools.count()
+        self._timers = TimerQueue()
         self._at_once = 0
 
     @property
@@ -62,21 +38,18 @@ class VirtualClock:
     @property
     def idle(self) -> bool:
         """Tell whether nothing is to come."""
-        return not any(timer.pending for _, _, timer in self._queue)
+        return self._timers.due_ns is None
 
     def at(self, when_ns: int, job: Job) -> Timer:
-        """Have a job done at a moment; at once, after what is due already, when the moment has passed."""
-        when_ns = max(when_ns, self._now_ns)
-        timer = Timer(when_ns, job)
-        heapq.heappush(self._queue, (when_ns, next(self._numbers), timer))
-        return timer
+        """Run a job at a moment; at once, after what is due already, when the moment has passed."""
+        return self._timers.put(max(when_ns, self._now_ns), job)
 
     def after(self, delay_s: float, job: Job) -> Timer:
-        """Have a job done after a delay in seconds."""
+        """Run a job after a delay in seconds."""
         return self.at(self._now_ns + round(delay_s * NANOSECONDS), job)
 
     def soon(self, job: Job) -> Timer:
-        """Have a job done at this moment, after all that is due already."""
+        """Run a job at this moment, after all that is due already."""
         return self.at(self._now_ns, job)
 
     def do_next(self, until_ns: int) -> bool:
@@ -85,17 +58,14 @@ class VirtualClock:
         Raises:
             WorldError: jobs beget jobs without end, and time stands still.
         """
-        queue = self._queue
-        while queue and queue[0][0] <= until_ns:
-            when_ns, _, timer = heapq.heappop(queue)
-            job, timer.job = timer.job, None
-            if job is None:  # cancelled
-                continue
-            self._at_once = self._at_once + 1 if when_ns == self._now_ns else 0
-            if self._at_once > JOBS_AT_ONCE:
-                raise WorldError(f"time stands still at {self.now_s:g} s: more than {JOBS_AT_ONCE} jobs at one moment")
-            self._now_ns = when_ns
-            job()
-            return True
-        self._now_ns = max(self._now_ns, until_ns)
-        return False
+        due = self._timers.pop_due(until_ns)
+        if due is None:
+            self._now_ns = max(self._now_ns, until_ns)
+            return False
+        when_ns, job = due
+        self._at_once = self._at_once + 1 if when_ns == self._now_ns else 0
+        if self._at_once > JOBS_AT_ONCE:
+            raise WorldError(f"time stands still at {self.now_s:g} s: more than {JOBS_AT_ONCE} jobs at one moment")
+        self._now_ns = when_ns
+        job()
+        return True

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 from skill_model.json_form import to_json
 from skill_model.model import Skillset
-from skill_runtime.core.engine import SkillsetEngine, TransitionReply
-from skill_runtime.core.events import EngineEvent
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.events import Listener
+from skill_runtime.core.replies import TransitionReply
 from skill_runtime.hooks import SkillHooks
-from skill_runtime.local.clock import Job, Timer, VirtualClock
+from skill_runtime.local.clock import VirtualClock
 from skill_runtime.local.middleware import Bus, VirtualMiddleware
 from skill_runtime.managers import Managers
+from skill_runtime.timers import Job, Timer
 
 HooksFactory = Callable[["LocalManagers"], Mapping[str, SkillHooks]]
 
@@ -47,11 +49,11 @@ class LocalManagers:
         return self._middleware.errors
 
     def soon(self, job: Job) -> None:
-        """Have a job done at this moment, after all that is due already."""
+        """Run a job at this moment, after all that is due already."""
         self._middleware.submit(job)
 
     def after(self, delay_s: float, job: Job) -> Timer:
-        """Have a job done after a delay in seconds; not when the managers have gone by then."""
+        """Run a job after a delay in seconds; not when the managers have gone by then."""
         return self._middleware.later(delay_s, job)
 
     def transition(self, resource: str, to: str) -> TransitionReply:
@@ -66,8 +68,8 @@ class LocalManagers:
         """Have conditions see a value of a data, or None: there is no fresh one any more."""
         self._managers.update_data(name, value)
 
-    def on_step(self, callback: Callable[[Sequence[EngineEvent]], None]) -> None:
-        """Have ``callback(events)`` called at each step, within it: clients hear of it later."""
+    def on_step(self, callback: Listener) -> None:
+        """Call ``callback(events)`` at each step, within it: clients hear of it later."""
         self._managers.on_step.append(callback)
 
     def describe(self) -> str:

@@ -15,10 +15,11 @@ from typing import Any
 from skill_model.execution_state import ExecutionState
 from skill_model.model import Skill, Skillset
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.local.clock import Job, Timer, VirtualClock, WorldError
+from skill_runtime.local.clock import VirtualClock, WorldError
 from skill_runtime.local.values import Types, complete, fit, ros_type
-from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
-from skill_runtime.waiting import CannotWaitError, Host
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, GoalResult, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from skill_runtime.timers import Job, Timer
+from skill_runtime.waiting import CannotWaitError, Waiter
 
 _LOG = logging.getLogger(__name__)
 FOREVER_S = 1e9
@@ -66,7 +67,7 @@ class Bus:
         return self._topics.setdefault(name, VirtualTopic())
 
     def vanish(self, skillset: str) -> None:
-        """Forget what managers served, as it is when their process is killed; their clients begin to doubt."""
+        """Drop what managers served, as it is when their process is killed; their clients begin to doubt."""
         self.served.pop(skillset, None)
         for name, topic in self._topics.items():
             if name.startswith(f"{skillset}/"):
@@ -105,7 +106,7 @@ class VirtualMiddleware:
         self, bus: Bus, skillset: str, *, model: Skillset | None = None, on_raise: Callable[[Exception], None] | None = None
     ) -> None:
         self.bus = bus
-        self.host: Host = bus
+        self.waiter: Waiter = bus
         self.skillset = skillset
         self.model = model
         self.alive = True
@@ -119,15 +120,15 @@ class VirtualMiddleware:
         return self.bus.clock.now_ns
 
     def at(self, when_ns: int, job: Job) -> Timer:
-        """Have a job done at a moment; not when this side has gone by then."""
+        """Run a job at a moment; not when this side has gone by then."""
         return self.bus.clock.at(when_ns, lambda: self.do(job))
 
     def later(self, delay_s: float, job: Job) -> Timer:
-        """Have a job done after a delay."""
+        """Run a job after a delay."""
         return self.bus.clock.after(delay_s, lambda: self.do(job))
 
     def submit(self, job: Job) -> None:
-        """Have a job done at this moment, after all that is due already."""
+        """Run a job at this moment, after all that is due already."""
         self.bus.clock.soon(lambda: self.do(job))
 
     defer = submit
@@ -162,7 +163,7 @@ class VirtualMiddleware:
 
     def advertise(self, topic: Topic) -> VirtualPublisher:
         """Open a topic."""
-        return VirtualPublisher(self.bus, self.bus.topic(f"{self.skillset}/{topic.name}"), topic.keep)
+        return VirtualPublisher(self.bus, self.bus.topic(f"{self.skillset}/{topic.name}"), topic.depth)
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; those of the functional layer have no values here, they come by ``DataManager.receive``."""
@@ -224,7 +225,7 @@ class VirtualMiddleware:
             self.bus.send(functools.partial(on_sign, life, 0))
 
     def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Be told of the life of the managers."""
+        """Follow the signs of life of the managers."""
         signed: OnSign = lambda life, stamp_ns: self.do(lambda: on_sign(life, stamp_ns))  # noqa: E731
         doubted: Job = lambda: self.do(on_doubt)  # noqa: E731
         self.bus.watchers.setdefault(self.skillset, []).append((signed, doubted))
@@ -249,10 +250,10 @@ class VirtualMiddleware:
 class VirtualPublisher:
     """A topic's writing end."""
 
-    def __init__(self, bus: Bus, topic: VirtualTopic, keep: int) -> None:
+    def __init__(self, bus: Bus, topic: VirtualTopic, depth: int) -> None:
         self._bus = bus
         self._topic = topic
-        self._topic.values = deque(maxlen=keep)
+        self._topic.values = deque(maxlen=depth)
 
     def publish(self, value: Any) -> None:
         """Send to all subscribers."""
@@ -281,8 +282,8 @@ class VirtualGoal:
     def finish(self, event: ExecutionEvent) -> None:
         """Send the result."""
         outputs = self._link.outputs_of(event.outputs)
-        ending = Ending(event.state, event.result, event.message, outputs)
-        self._bus.send(lambda: self._link.listener.on_ending(self.id, ending))
+        ending = GoalResult(event.state, event.result, event.message, outputs)
+        self._bus.send(lambda: self._link.listener.on_result(self.id, ending))
 
 
 class VirtualServer:
@@ -373,7 +374,7 @@ class VirtualLink:
 
         self._bus.send(arrive)
 
-    def ask_ending(self, goal_id: str) -> None:
+    def request_result(self, goal_id: str) -> None:
         """Ask nothing: nothing gets lost here."""
 
     def release(self, goal_id: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -57,8 +57,8 @@ def _fitting(ros: RosType, value: Any, place: str) -> object:
     if ros.array:
         element = RosType(ros.package, ros.name)
         return [_fitting(element, part, where) for where, part in fitting.elements(value, ros.interface, place)]
-    kind = PRIMITIVES.get(ros.name) if not ros.package else None
-    return _namespaces(value) if kind is None else _SCALARS[kind](ros.name, value, place)
+    is_primitive = not ros.package and ros.name in PRIMITIVES
+    return fitting.primitive(ros.name, value, place) if is_primitive else _namespaces(value)
 
 
 def _namespaces(value: Any) -> object:
@@ -68,11 +68,3 @@ def _namespaces(value: Any) -> object:
     if isinstance(value, list | tuple) and len(value) == len(_VECTOR) and all(fitting.is_number(part) for part in value):
         return SimpleNamespace(**{name: float(part) for name, part in zip(_VECTOR, value, strict=True)})
     return copy.deepcopy(value)
-
-
-_SCALARS: Mapping[str, Callable[[str, Any, str], object]] = {
-    "bool": lambda kind, value, place: fitting.instance(bool, value, kind, place),
-    "int": lambda kind, value, place: fitting.whole_number(value, kind, place, fitting.INTEGERS[kind]),
-    "float": lambda kind, value, place: float(fitting.number(value, kind, place)),
-    "str": lambda kind, value, place: fitting.instance(str, value, kind, place),
-}

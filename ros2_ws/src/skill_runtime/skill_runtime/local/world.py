@@ -14,7 +14,7 @@ from skill_runtime.local.clock import NANOSECONDS, VirtualClock, WorldError
 from skill_runtime.local.managers import HooksFactory, LocalManagers
 from skill_runtime.local.middleware import Bus, VirtualMiddleware
 from skill_runtime.local.values import Types
-from skill_runtime.middleware import EVENTS, Told
+from skill_runtime.middleware import EVENTS, PublishedEvent
 
 T = TypeVar("T")
 OnEvent = Callable[[str, EngineEvent], None]
@@ -98,7 +98,7 @@ class LocalWorld:
         managers.vanish()
 
     def on_event(self, callback: OnEvent) -> None:
-        """Have ``callback(skillset, event)`` called for each event of the skillsets that are served now."""
+        """Call ``callback(skillset, event)`` for each event of the skillsets that are served now."""
         for name in self.managers:
             VirtualMiddleware(self._bus, name).subscribe(EVENTS, functools.partial(_pass_on, callback, name))
 
@@ -150,5 +150,5 @@ class LocalWorld:
         return returned[0]
 
 
-def _pass_on(callback: OnEvent, name: str, told: Told) -> None:
+def _pass_on(callback: OnEvent, name: str, told: PublishedEvent) -> None:
     callback(name, told.event)

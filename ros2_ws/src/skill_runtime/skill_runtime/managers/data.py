@@ -74,9 +74,9 @@ class DataManager:
         return DataReading(True, True, stale, sample.stamp_ns, json.dumps(to_plain(sample.value)))
 
     def _look_at(self, data: Data, stamp_ns: int) -> None:
-        """Look, when a value of this age will be stale, whether a fresher one has come; there is one alarm a data at a time."""
+        """Look, when a value of this age will be stale, whether a fresher one has come; there is one timer a data at a time."""
 
-        def ring() -> None:
+        def look() -> None:
             with self._lock:
                 latest_ns = self._received[data.name].stamp_ns or 0
                 stale = latest_ns <= stamp_ns
@@ -87,7 +87,7 @@ class DataManager:
             else:
                 self._look_at(data, latest_ns)
 
-        self._middleware.at(stamp_ns + round(STALE_PERIODS * (data.period_s or 0.0) * 1e9) + 1, ring)
+        self._middleware.at(stamp_ns + round(STALE_PERIODS * (data.period_s or 0.0) * 1e9) + 1, look)
 
     def _answer(self, request: Mapping[str, object], reply: Reply) -> None:
         reply(self.read(str(request["name"])))

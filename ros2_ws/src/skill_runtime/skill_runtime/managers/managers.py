@@ -1,4 +1,4 @@
-"""All managers of one skillset: the engine, and what stands between it and the middleware."""
+"""All managers of one skillset: the engine, and the managers that connect it to the middleware."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ from collections.abc import Callable, Mapping, Sequence
 from skill_model.model import Skillset
 from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, SkillsetEngine
 from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.core.events import EngineEvent, ExecutionEvent
+from skill_runtime.core.events import EngineEvent, ExecutionEvent, Listener
 from skill_runtime.core.hook_calls import HookCaller
 from skill_runtime.hooks import SkillHooks
 from skill_runtime.managers.data import DataBindings, DataManager
-from skill_runtime.managers.deadline import EngineAlarm
-from skill_runtime.managers.questions import Questions
+from skill_runtime.managers.engine_timer import EngineTimer
 from skill_runtime.managers.records import SkillStatesPublisher
 from skill_runtime.managers.resources import ResourceManager
+from skill_runtime.managers.services import SkillsetServices
 from skill_runtime.managers.skill import SkillManager
-from skill_runtime.middleware import EVENTS, Middleware, Told
+from skill_runtime.middleware import EVENTS, Middleware, PublishedEvent
 
 FLUSH_S = 1.0
 HOOKS_RETURN_S = 5.0
 """How long (wall clock) the end of the managers waits for hooks that have not returned."""
 MakeInputs = Callable[[str, Mapping[str, object]], object]
 """Makes what the hooks of a skill get from the values of its inputs."""
-OnStep = Callable[[Sequence[EngineEvent]], None]
 
 
 class Managers:
@@ -35,8 +34,8 @@ class Managers:
     Args:
         middleware: serves them.
         skillset: the model.
-        hooks: one a skill, or what calls them in other processes.
-        bindings: where each data comes from; None: nowhere but by ``data.receive``.
+        hooks: one a skill, or the caller of hooks in other processes.
+        bindings: the topic that each data comes from; None: values come by ``data.receive`` only.
         make_inputs: by default the hooks' own ``make_inputs``; the plain values where the hooks are elsewhere.
         interrupt_timeout_s: how long a stop may take where the model does not say.
         hook_timeout_s: how long a hook may take to return, in time that this process could run.
@@ -65,8 +64,8 @@ class Managers:
         self.skillset = skillset
         self.middleware = middleware
         self.life = uuid.uuid4().hex[:12]
-        self.on_step: list[OnStep] = []
-        """Called at each step, within it, before it is told to others."""
+        self.on_step: list[Listener] = []
+        """Called at each step, within it, before it is published."""
         make = make_inputs or _maker(hooks)
         self.engine = SkillsetEngine(
             skillset,
@@ -78,7 +77,7 @@ class Managers:
             interrupt_timeout_s=interrupt_timeout_s,
             hook_timeout_s=hook_timeout_s,
         )
-        self._alarm = EngineAlarm(middleware, self.engine)
+        self._timer = EngineTimer(middleware, self.engine)
         self.data = DataManager(middleware, skillset, bindings, self.update_data)
         self.resources = ResourceManager(middleware, self.engine, self.life)
         self._events = middleware.advertise(EVENTS)
@@ -88,7 +87,7 @@ class Managers:
         self.data.serve()
         self.resources.serve()
         servers = {name: manager.serve() for name, manager in self.skills.items()}
-        Questions(middleware, self.engine, servers, make)
+        SkillsetServices(middleware, self.engine, servers, make)
         # The sign of life comes last: a client that hears it finds everything there.
         middleware.announce(self.life, on_rival or self._on_rival)
 
@@ -106,17 +105,17 @@ class Managers:
             on_step(events)
         self.resources.on_events(events)
         for event in events:
-            self._events.publish(Told(self.life, event))
+            self._events.publish(PublishedEvent(self.life, event))
         for event in events:
             if isinstance(event, ExecutionEvent):
                 self.skills[event.skill].on_event(event)
         self._records.on_events(events)
-        self._alarm.look()
+        self._timer.update()
 
     def update_data(self, name: str, value: object | None) -> None:
-        """Have conditions see a value of a data, or None: there is no fresh one any more."""
+        """Let conditions use a value of a data, or None: there is no fresh one any more."""
         self.engine.update_data(name, value)
-        self._alarm.look()
+        self._timer.update()
 
     def _on_rival(self, reason: str) -> None:
         self.middleware.log(reason)

@@ -7,7 +7,8 @@ from typing import Any
 
 from skill_runtime.core.engine import SkillsetEngine
 from skill_runtime.core.events import EngineEvent, TransitionEvent
-from skill_runtime.middleware import RESOURCE_STATES, Middleware, Reply, ResourceStates, ResourceValue
+from skill_runtime.core.records import ResourceStatus
+from skill_runtime.middleware import RESOURCE_STATES, Middleware, Reply, ResourceStates
 
 
 class ResourceManager:
@@ -19,7 +20,7 @@ class ResourceManager:
         self._life = life
         self._publisher = middleware.advertise(RESOURCE_STATES)
         # Kept apart from the engine's, so that each message is the state after the step that it is sent for.
-        self._latest = {name: ResourceValue(status.state, "", status.stamp_ns) for name, status in engine.resources.items()}
+        self._latest = dict(engine.resources)
         self._publish(0, middleware.now_ns())
 
     def serve(self) -> None:
@@ -31,7 +32,7 @@ class ResourceManager:
         """Follow the transitions of one step."""
         transitions = [event for event in events if isinstance(event, TransitionEvent)]
         for event in transitions:
-            self._latest[event.resource] = ResourceValue(event.to_state, event.from_state, event.stamp_ns)
+            self._latest[event.resource] = ResourceStatus(event.to_state, event.from_state, event.stamp_ns)
         if transitions:
             self._publish(transitions[-1].sequence, transitions[-1].stamp_ns)
 

@@ -66,10 +66,10 @@ class SkillManager:
             self._engine.run(goal.id, self._middleware.defer)
 
     def _inputs(self, goal: Goal) -> tuple[object, str]:
-        """Return what hooks get, or the plain inputs and what is wrong with them: they are made by the developer's class."""
+        """Return what hooks get; or the plain inputs, and the error of the developer's class that makes what hooks get."""
         try:
             return self._make_inputs(self._skill.name, goal.inputs), ""
-        except Exception as error:  # noqa: BLE001 - told to the caller
+        except Exception as error:  # noqa: BLE001 - it is the reason that the caller gets
             return dict(goal.inputs), f"the request could not be taken down: {type(error).__name__}: {error}"
 
     def _on_cancel(self, goal_id: str) -> None:

@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
-Job = Callable[[], None]
-
-
-class Appointment(Protocol):
-    """A job that waits for its moment."""
-
-    def cancel(self) -> None:
-        """Let the job not happen; without effect when it has."""
-        ...
+from skill_runtime.timers import Job, Timer
 
 
 class MockHost(Protocol):
@@ -29,8 +20,8 @@ class MockHost(Protocol):
         """What went wrong and belongs to no execution."""
         ...
 
-    def after(self, delay_s: float, job: Job) -> Appointment:
-        """Have a job done after a delay of mission clock."""
+    def after(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay of mission clock."""
         ...
 
     def transition(self, skillset: str, resource: str, to: str) -> str:

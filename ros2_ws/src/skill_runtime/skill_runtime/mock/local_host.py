@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import SimpleNamespace
 
 from skill_model.model import Skillset
 from skill_runtime.core.events import EngineEvent, TransitionEvent
-from skill_runtime.local import LocalWorld, Timer
+from skill_runtime.local import LocalWorld
 from skill_runtime.mock.behaviour import Behaviour
 from skill_runtime.mock.robot import MakeSkill, MockRobot
 from skill_runtime.mock.skill import MockSkill
+from skill_runtime.timers import Job, Timer
 
 
 class LocalMockHost:
@@ -26,8 +27,8 @@ class LocalMockHost:
         """Mission clock."""
         return self._world.now_s
 
-    def after(self, delay_s: float, job: Callable[[], None]) -> Timer:
-        """Have a job done after a delay."""
+    def after(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay."""
         return self._world.clock.after(delay_s, job)
 
     def transition(self, skillset: str, resource: str, to: str) -> str:

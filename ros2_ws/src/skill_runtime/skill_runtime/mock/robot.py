@@ -10,9 +10,10 @@ from alula_common.faults import FaultRequest
 from skill_model.model import Skill, Skillset
 from skill_runtime.mock.behaviour import Behaviour, DataScript, MockFault, Place, Rule
 from skill_runtime.mock.formula import Formula, FormulaError
-from skill_runtime.mock.host import Job, MockHost
+from skill_runtime.mock.host import MockHost
 from skill_runtime.mock.skill import MockSkill
 from skill_runtime.mock.state import MockState
+from skill_runtime.timers import Job
 
 MakeSkill = Callable[[MockState, str, Skill, Sequence[Rule], random.Random], MockSkill]
 
@@ -88,7 +89,7 @@ class MockRobot(MockState):
     # --- the clock's part --------------------------------------------------------------------------------------------
 
     def _schedule(self, anchor: tuple[Place, str] | None, delay_s: float, job: Job) -> None:
-        """Have a job done so long after a resource first enters a state; None: after now."""
+        """Run a job so long after a resource first enters a state; None: after now."""
         if anchor is None:
             self._do(delay_s, job)
         elif anchor in self._entered_s:
@@ -97,7 +98,7 @@ class MockRobot(MockState):
             self._awaited.setdefault(anchor, []).append((delay_s, job))
 
     def _do(self, delay_s: float, job: Job) -> None:
-        """Have a job done after a delay; a formula in it that has no value is told, and the robot goes on."""
+        """Run a job after a delay; a formula in it that has no value is told, and the robot goes on."""
 
         def safely() -> None:
             try:

@@ -18,7 +18,7 @@ from skill_runtime.mock.state import MockState
 
 if TYPE_CHECKING:
     from skill_runtime.core.execution import Execution
-    from skill_runtime.mock.host import Appointment
+    from skill_runtime.timers import Timer
 
 
 class MockCrashError(Exception):
@@ -50,7 +50,7 @@ class Run:
     started_s: float
     delay_s: float
     moves: dict[str, tuple[object, object]]
-    appointments: list[Appointment] = field(default_factory=list)
+    timers: list[Timer] = field(default_factory=list)
 
 
 class MockSkill(SkillHooks):
@@ -89,11 +89,11 @@ class MockSkill(SkillHooks):
         after = self._state.host.after
         for change in choice.script.changes:
             when_s = max(0.0, self._state.number(change.after_s, run.names, self._chance))
-            run.appointments.append(after(when_s, lambda states=change.states: self._state.take(states)))  # type: ignore[misc]
+            run.timers.append(after(when_s, lambda states=change.states: self._state.take(states)))  # type: ignore[misc]
         if choice.script.ending.crash and not run.delay_s:
             raise MockCrashError(choice.script.ending.crash)
         if choice.script.ending.crash or choice.result:
-            run.appointments.append(after(run.delay_s, lambda: self._finish(run)))
+            run.timers.append(after(run.delay_s, lambda: self._finish(run)))
 
     def progress(self, execution: Execution) -> float:
         """Return the progress of the script."""
@@ -114,7 +114,7 @@ class MockSkill(SkillHooks):
         with self._state.lock:
             self.move()
             run = self._runs.pop(execution.id, None)
-        for appointment in run.appointments if run is not None else ():
+        for appointment in run.timers if run is not None else ():
             appointment.cancel()
         return None
 
@@ -137,7 +137,7 @@ class MockSkill(SkillHooks):
             run = self._runs.pop(execution_id, None)
             if run is not None:
                 self._move(run, 1.0)
-        for appointment in run.appointments if run is not None else ():
+        for appointment in run.timers if run is not None else ():
             appointment.cancel()
 
     # --- parts -------------------------------------------------------------------------------------------------------

@@ -19,11 +19,12 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from unique_identifier_msgs.msg import UUID
 
 from skill_model.execution_state import ExecutionState
+from skill_runtime.action_messages import ActionMessages
 from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.middleware import CALL_S, Ending, Goal, GoalListener, OnError, OnValue
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnValue
 from skill_runtime.ros2.base import ID_DIGITS, RclpyBase
 from skill_runtime.ros2.calls import Calls, Discovery, Withdraw
-from skill_runtime.ros2.convert import fields_of, fill, ros_types, values_of
+from skill_runtime.ros2.convert import TYPES, ros_types
 from skill_runtime.ros2.names import SERVICE
 
 UUID_BYTES = 16
@@ -31,8 +32,11 @@ RESULTS_KEPT_S = 900
 """How long after an execution's end (mission clock) its result can be asked for: rclpy's own default, whatever rcl's is."""
 GOAL_S = 60.0
 """How long a goal is offered to managers that don't answer; the client gives up before."""
-_FEEDBACK_FIELDS = ("progress", "state")
-_RESULT_FIELDS = ("outcome", "result", "message")
+
+
+def action_messages(base: RclpyBase, action: Any, skill: str) -> ActionMessages:
+    """Return what makes and reads the messages of an action."""
+    return ActionMessages(skill, TYPES, goal=action.Goal, feedback=action.Feedback, result=action.Result, on_error=base.log)
 
 
 def execution_id(goal_id: Any) -> str:
@@ -45,15 +49,13 @@ class RclpyGoal:
 
     def __init__(self, server: RclpyServer, handle: Any) -> None:
         self.id = execution_id(handle.goal_id)
-        self.inputs: Mapping[str, object] = values_of(handle.request)
+        self.inputs: Mapping[str, object] = server.messages.read_goal(handle.request)
         self._server = server
         self._handle = handle
 
     def report(self, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
         """Send feedback."""
-        feedback = self._server.action.Feedback(progress=progress, state=state.value)
-        self._server.fill_outputs(feedback, outputs)
-        self._handle.publish_feedback(feedback)
+        self._handle.publish_feedback(self._server.messages.make_feedback(progress, state, outputs))
 
     def finish(self, event: ExecutionEvent) -> None:
         """Set the goal's state and send its result, on the executor: goals change state there only."""
@@ -64,7 +66,8 @@ class RclpyServer:
     """A skill's action at its manager. Every goal is accepted: how its execution ends is its result."""
 
     def __init__(self, base: RclpyBase, action: Any, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> None:
-        self.action = action
+        self.messages = action_messages(base, action, skill)
+        self.inputs_of = self.messages.inputs_of
         self._base = base
         self._skill = skill
         self._on_goal = on_goal
@@ -84,19 +87,6 @@ class RclpyServer:
             result_timeout=RESULTS_KEPT_S,
         )
 
-    def inputs_of(self, plain: Mapping[str, object]) -> dict[str, object]:
-        """Return inputs as a goal carries them."""
-        return values_of(fill(self.action.Goal(), plain, f"inputs of {self._skill}"))
-
-    def fill_outputs(self, message: Any, outputs: Mapping[str, object]) -> str:
-        """Set the outputs of a message; return what is wrong with them, or ""."""
-        try:
-            fill(message, outputs, f"outputs of {self._skill}")
-        except ValueError as error:
-            self._base.log(str(error))
-            return str(error)
-        return ""
-
     def finish(self, handle: Any, event: ExecutionEvent) -> None:
         """End a goal."""
         self._server.notify_execute(handle, lambda goal: self._result(goal, event))
@@ -112,10 +102,7 @@ class RclpyServer:
 
     def _result(self, handle: Any, event: ExecutionEvent) -> Any:
         """Set the goal's state and return its result."""
-        result = self.action.Result(outcome=event.state.value, result=event.result, message=event.message)
-        wrong = self.fill_outputs(result, event.outputs)
-        if wrong:
-            result.message = f"{result.message} ({wrong})".strip()
+        result = self.messages.make_result(event)
         try:
             if event.state is ExecutionState.TERMINATED:
                 handle.succeed()
@@ -135,6 +122,8 @@ class RclpyLink:
         self._base = base
         self._action = action
         self._skill = skill
+        self._messages = action_messages(base, action, skill)
+        self.fit, self.outputs_of = self._messages.fit, self._messages.outputs_of
         self._listener = listener
         self._lock = threading.Lock()
         self._goals: dict[str, Any] = {}
@@ -161,14 +150,6 @@ class RclpyLink:
     def input_types(self) -> dict[str, str]:
         """The inputs with their types."""
         return ros_types(self._action.Goal)
-
-    def fit(self, inputs: Mapping[str, object], place: str) -> Any:
-        """Return the goal's message."""
-        return fill(self._action.Goal(), inputs, place)
-
-    def outputs_of(self, plain: Mapping[str, object]) -> dict[str, Any]:
-        """Return outputs as a result carries them."""
-        return _outputs(fill(self._action.Result(), plain, f"outputs of {self._skill}"), _RESULT_FIELDS)
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:
         """Send a goal."""
@@ -199,20 +180,15 @@ class RclpyLink:
         counted = lambda response, _: on_count(len(response.goals_canceling))  # noqa: E731
         self._cancels.call(CancelGoal.Request(), counted, on_error, timeout_s=CALL_S, once=False)
 
-    def ask_ending(self, goal_id: str) -> None:
+    def request_result(self, goal_id: str) -> None:
         """Ask for a goal's result; managers that do not know the goal answer at once."""
         identifier = self._goals.get(goal_id)
         if identifier is None:
             return
 
         def answered(response: Any, _: int) -> None:
-            result = response.result
-            known = (
-                Ending(ExecutionState(result.outcome), result.result, result.message, _outputs(result, _RESULT_FIELDS))
-                if result.outcome
-                else None
-            )
-            self._listener.on_ending(goal_id, known)
+            known = self._messages.read_result(response.result) if response.result.outcome else None
+            self._listener.on_result(goal_id, known)
 
         self._results.call(self._action.Impl.GetResultService.Request(goal_id=identifier), answered, _nothing, timeout_s=GOAL_S, once=True)
 
@@ -229,11 +205,7 @@ class RclpyLink:
     def _on_feedback(self, message: Any) -> None:
         goal_id = execution_id(message.goal_id)
         if goal_id in self._goals:
-            self._listener.on_feedback(goal_id, message.feedback.progress, _outputs(message.feedback, _FEEDBACK_FIELDS))
-
-
-def _outputs(message: Any, others: tuple[str, ...]) -> dict[str, Any]:
-    return {name: getattr(message, name) for name in fields_of(message) if name not in others}
+            self._listener.on_feedback(goal_id, *self._messages.read_feedback(message.feedback))
 
 
 def _nothing(reason: str) -> None:

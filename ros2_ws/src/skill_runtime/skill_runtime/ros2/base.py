@@ -15,13 +15,14 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from skill_runtime.middleware import Job, OnValue
-from skill_runtime.ros2.alarms import Alarm, Alarms
+from skill_runtime.middleware import OnValue
 from skill_runtime.ros2.calls import Calls
 from skill_runtime.ros2.empty_wakes import watch_empty_wakes
 from skill_runtime.ros2.names import SERVICE
-from skill_runtime.ros2.spinning import SpunHost
-from skill_runtime.waiting import Host
+from skill_runtime.ros2.spinning import NodeWaiter
+from skill_runtime.ros2.timers import RclpyTimers
+from skill_runtime.timers import Job, Timer
+from skill_runtime.waiting import Waiter
 from skill_runtime.workers import Workers
 
 LOOK_S = 0.05
@@ -66,15 +67,15 @@ class RclpyBase:
 
     def __init__(self, node: Node, skillset: str, *, root: str = "") -> None:
         self.node = node
-        self.host: Host = SpunHost(node)
+        self.waiter: Waiter = NodeWaiter(node)
         watch_empty_wakes(node)
         self._skillset = skillset
         self._root = root or skillset
         self._group = RestingGroup()
         self._here = threading.local()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._alarms = Alarms(node, node.get_clock(), self._group, self._is_here)
-        self._delays = Alarms(node, self._steady, self._group, self._is_here)
+        self._timers = RclpyTimers(node, node.get_clock(), self._group, self._is_here)
+        self._delays = RclpyTimers(node, self._steady, self._group, self._is_here)
         self._jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
         self._wake: Any = node.create_guard_condition(self.on_loop(self._work), callback_group=self._group)
         self._workers = Workers(f"{skillset}_hooks", self.log)
@@ -87,25 +88,25 @@ class RclpyBase:
         """Return the mission clock."""
         return self._ended_ns or int(self.node.get_clock().now().nanoseconds)
 
-    def at(self, when_ns: int, job: Job) -> Alarm:
-        """Have a job done at a moment of the mission clock."""
-        return self._alarms.at(when_ns, self.on_loop(job))
+    def at(self, when_ns: int, job: Job) -> Timer:
+        """Run a job at a moment of the mission clock."""
+        return self._timers.at(when_ns, self.on_loop(job))
 
-    def later(self, delay_s: float, job: Job) -> Alarm:
-        """Have a job done after a delay of wall clock."""
+    def later(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay of wall clock."""
         return self._delays.after(delay_s, self.on_loop(job))
 
     def submit(self, job: Job) -> None:
-        """Have a job done on the executor."""
+        """Run a job on the executor."""
         self._jobs.put(job)
         self._wake.trigger()
 
     def defer(self, job: Job) -> None:
-        """Have a job done on a thread of its own."""
+        """Run a job on a thread of its own."""
         self._workers.submit(job)
 
     def when(self, condition: Callable[[], bool], job: Job) -> None:
-        """Have a job done once a condition holds."""
+        """Run a job once a condition holds."""
         if self._closed:
             return
         if condition():

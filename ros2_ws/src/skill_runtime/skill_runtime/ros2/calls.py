@@ -15,7 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from skill_runtime.middleware import Job, OnError, OnReply, Timer
+from skill_runtime.middleware import OnError, OnReply
+from skill_runtime.timers import Job, Timer
 
 AGAIN_S = 1.0
 """An answer that has not come for so long (wall clock) is taken for lost."""
@@ -66,7 +67,7 @@ class Calls:
 
     Args:
         client: rclpy's.
-        later: has a job done after a delay of wall clock.
+        later: runs a job after a delay of wall clock.
         awaits: has the executor wait for the client, or not: it rests while nothing is awaited of it.
     """
 

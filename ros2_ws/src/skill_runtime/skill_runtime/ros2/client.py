@@ -7,8 +7,6 @@ from rclpy.node import Node
 from skill_runtime.client import Client
 from skill_runtime.ros2.middleware import RclpyMiddleware
 
-SERVICES = ("why", "pause", "transition", "get_data")
-
 
 class SkillsetClient(Client):
     """The client of a skillset, served by the executor that spins a node.
@@ -23,6 +21,4 @@ class SkillsetClient(Client):
         self.root = f"{namespace.rstrip('/')}/{name}" if namespace else name
         middleware = RclpyMiddleware(node, name, root=self.root)
         super().__init__(middleware, name)
-        for service in SERVICES:
-            # DDS discovers a service early: the first answer of one that was just met may get lost.
-            middleware.prepare(service)
+        middleware.prepare_calls()

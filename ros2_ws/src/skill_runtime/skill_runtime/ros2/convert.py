@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from skill_runtime.fitting import INTEGERS
+from skill_model.ros_types import INTEGER_RANGES
 from skill_runtime.plain import FieldTypes
 
 _ARRAY = re.compile(r"^sequence<(.*?)(, \d+)?>$|\[.*\]$")
@@ -21,9 +21,9 @@ def _element_of(kind: str) -> str:
     return _ARRAY.sub(r"\1", kind) if _ARRAY.search(kind) else ""
 
 
-_TYPES = FieldTypes(fields_of, _element_of, floats={"double", "float"}, integers=INTEGERS, classes={"boolean": bool, "string": str})
-fill = _TYPES.fill
-values_of = _TYPES.values_of
+TYPES = FieldTypes(fields_of, _element_of, floats={"double", "float"}, integers=INTEGER_RANGES, classes={"boolean": bool, "string": str})
+fill = TYPES.fill
+values_of = TYPES.values_of
 
 _PLAIN_NAMES = {"double": "float64", "float": "float32", "boolean": "bool"}
 

@@ -14,14 +14,14 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
-from skill_runtime.codecs import SERVICES, TOPICS, set_stamp, stamp_ns_of
-from skill_runtime.middleware import CALL_S, Goal, GoalListener, Job, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from skill_runtime.codecs import SERVICES, ServiceCodec, codec_of, set_stamp, stamp_ns_of
+from skill_runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
 from skill_runtime.plain import message_class
 from skill_runtime.ros2.actions import RclpyLink, RclpyServer
 from skill_runtime.ros2.base import RclpyBase
-from skill_runtime.ros2.calls import Discovery
+from skill_runtime.ros2.calls import Calls, Discovery
 from skill_runtime.ros2.names import ALIVE, SERVICE, SOURCE, action_type, latched
-from skill_runtime.views import Sample
+from skill_runtime.timers import Job
 
 
 class RclpyMiddleware(RclpyBase):
@@ -43,30 +43,26 @@ class RclpyMiddleware(RclpyBase):
 
     def advertise(self, topic: Topic) -> RclpyPublisher:
         """Open a topic for publishing."""
-        if topic.name in TOPICS:
-            codec = TOPICS[topic.name]
-            kind, encode = codec.kind, functools.partial(codec.encode, self._skillset)
-        else:
-            kind = message_class(topic.type_name)
-            encode = functools.partial(_wrap if topic.wrapped else _value, kind)
+        codec = codec_of(topic)
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
-        return RclpyPublisher(self.node.create_publisher(kind, self.name(topic.name), latched(topic.keep), event_callbacks=quiet), encode)
+        made = self.node.create_publisher(codec.kind, self.name(topic.name), latched(topic.depth), event_callbacks=quiet)
+        return RclpyPublisher(made, functools.partial(codec.encode, self._skillset))
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; the type of a data is asked of the graph where it is not known."""
         if self._closed:
             return lambda: False
-        if topic.name in TOPICS:
-            codec = TOPICS[topic.name]
-            self.listen(self.name(topic.name), codec.kind, lambda message: callback(codec.decode(message)), latched(topic.keep))
-            publishers = self.node.resolve_topic_name(self.name(topic.name))
-            return Discovery(lambda: bool(self.node.count_publishers(publishers)))
-        take: OnValue = lambda message: callback(Sample(message.data if topic.wrapped else message, None))  # noqa: E731
+        codec = codec_of(topic)
+        take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
         if topic.outside:
-            self.listen(topic.name, message_class(topic.type_name), take, SOURCE, events=None)
-        else:
-            self._listen_once_known(self.name(topic.name), take, latched(topic.keep))
-        return lambda: True
+            self.listen(topic.name, codec.kind, take, SOURCE, events=None)
+            return lambda: True
+        if codec.kind is None:
+            self._listen_once_known(self.name(topic.name), take, latched(topic.depth))
+            return lambda: True
+        self.listen(self.name(topic.name), codec.kind, take, latched(topic.depth))
+        publishers = self.node.resolve_topic_name(self.name(topic.name))
+        return Discovery(lambda: bool(self.node.count_publishers(publishers)))
 
     def _listen_once_known(self, name: str, callback: OnValue, qos: QoSProfile) -> None:
         """Subscribe as soon as the graph tells the topic's type."""
@@ -123,13 +119,16 @@ class RclpyMiddleware(RclpyBase):
     ) -> None:
         """Call a service."""
         codec = SERVICES[service]
-        calls = self._calls.get(service) or self.calls(service, codec.kind)
         decoded: OnReply = lambda response, tries: on_reply(codec.decode(response), tries)  # noqa: E731
-        calls.call(codec.kind.Request(**request), decoded, on_error, timeout_s=timeout_s, once=once)
+        self._calls_of(service, codec).call(codec.kind.Request(**request), decoded, on_error, timeout_s=timeout_s, once=once)
 
-    def prepare(self, service: str) -> None:
-        """Have DDS discover a service early: the first answer of one that was just met may get lost."""
-        self.calls(service, SERVICES[service].kind)
+    def prepare_calls(self) -> None:
+        """Have DDS discover all services before they are called: the first answer of one that was just discovered may get lost."""
+        for service, codec in SERVICES.items():
+            self._calls_of(service, codec)
+
+    def _calls_of(self, service: str, codec: ServiceCodec) -> Calls:
+        return self._calls.get(service) or self.calls(service, codec.kind)
 
     # --- actions -----------------------------------------------------------------------------------------------------
 
@@ -168,7 +167,7 @@ class RclpyMiddleware(RclpyBase):
         self._give_sign()
 
     def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Be told of the life of managers, by DDS."""
+        """Follow the signs of life of the managers, by DDS."""
         last: list[str] = []
 
         def hear(sign: Any) -> None:
@@ -207,11 +206,3 @@ class RclpyPublisher:
     def flush(self, timeout_s: float) -> None:
         """Wait (wall clock) until all subscribers have all messages."""
         self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
-
-
-def _value(kind: Any, sample: Sample) -> Any:  # noqa: ARG001 - as where it is wrapped
-    return sample.value
-
-
-def _wrap(kind: Any, sample: Sample) -> Any:
-    return kind(data=sample.value)

@@ -10,12 +10,11 @@ from skillset_interfaces.msg import Event
 
 from skill_runtime.managers import DataBindings
 from skill_runtime.plain import message_class
-from skill_runtime.ros2.alarms import Alarm, Alarms
 from skill_runtime.ros2.convert import fields_of, fill
 from skill_runtime.ros2.names import EVENTS
 from skill_runtime.ros2.node import SkillsetNode
-
-Job = Callable[[], None]
+from skill_runtime.ros2.timers import RclpyTimers
+from skill_runtime.timers import Job, Timer
 
 
 class RosMockHost:
@@ -27,10 +26,10 @@ class RosMockHost:
         self._node = node
         self._bindings = bindings
         self._publishers: dict[tuple[str, str], Any] = {}
-        self._alarms = Alarms(node, node.get_clock(), node.default_callback_group, lambda: False)
+        self._timers = RclpyTimers(node, node.get_clock(), node.default_callback_group, lambda: False)
 
     def watch(self, skillsets: Sequence[str], on_state: Callable[[str, str, str], None]) -> None:
-        """Have ``on_state(skillset, resource, state)`` called for every transition."""
+        """Call ``on_state(skillset, resource, state)`` for every transition."""
 
         def follow(event: Any) -> None:
             if event.kind == Event.TRANSITION:
@@ -47,8 +46,8 @@ class RosMockHost:
     def _now_ns(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)
 
-    def after(self, delay_s: float, job: Job) -> Alarm:
-        """Have a job done after a delay of mission clock; one that raises is told and ends nothing but itself."""
+    def after(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay of mission clock; one that raises is told and ends nothing but itself."""
 
         def attempt() -> None:
             try:
@@ -56,7 +55,7 @@ class RosMockHost:
             except Exception as error:  # noqa: BLE001 - the robot goes on
                 self.note(f"{type(error).__name__}: {error}")
 
-        return self._alarms.after(delay_s, attempt)
+        return self._timers.after(delay_s, attempt)
 
     def transition(self, skillset: str, resource: str, to: str) -> str:
         """Take an extern transition."""

@@ -39,7 +39,7 @@ def spins_here(executor: object) -> bool:
     return False
 
 
-class SpunHost:
+class NodeWaiter:
     """Waits while others spin the node; spins it when it is not spun."""
 
     def __init__(self, node: Node) -> None:

@@ -31,9 +31,7 @@ def ros2_world(skillset: Skillset, hooks: Hooks) -> Iterator[LiveWorld]:
         clock = sessions[1].node.create_publisher(Clock, "/clock", 1)
         tell_time = lambda now_ns: clock.publish(Clock(clock=Time(nanoseconds=now_ns).to_msg()))  # noqa: E731
         world = LiveWorld(serving, calling, tell_time, skillset, hooks)
-        for service in ("transition", "trigger"):
-            # Met before it is wanted: the first answer of a service that was just met may get lost.
-            calling.prepare(service)
+        calling.prepare_calls()
         try:
             yield world
         finally:

@@ -1,4 +1,4 @@
-"""Make what hooks hand over fit for every middleware: UTF-8 texts of bounded length without zeros, outputs of their types."""
+"""Sanitize what hooks hand over, for every middleware: UTF-8 texts of bounded length without zeros, outputs of their types."""
 
 from __future__ import annotations
 
@@ -58,21 +58,14 @@ def fitted_outputs(skill: Skill, outputs: Mapping[str, object]) -> dict[str, obj
 def _fitted(kind: str, value: object, place: str) -> object:
     try:
         if kind in PRIMITIVES:
-            return _SCALARS[PRIMITIVES[kind]](kind, value, place)
+            fitted = fitting.primitive(kind, value, place)
+            return as_text(fitted) if isinstance(fitted, str) else fitted
         json.dumps(to_plain(value))
     except ValueError:
         raise
     except BaseException as error:
         raise ValueError(f"{place} takes a {kind}, not {as_short_text(value)}") from error
     return value
-
-
-_SCALARS: Mapping[str, Callable[[str, Any, str], object]] = {
-    "bool": lambda kind, value, place: fitting.instance(bool, value, kind, place),
-    "int": lambda kind, value, place: fitting.whole_number(value, kind, place, fitting.INTEGERS[kind]),
-    "float": lambda kind, value, place: float(fitting.number(value, kind, place)),
-    "str": lambda kind, value, place: as_text(fitting.instance(str, value, kind, place)),
-}
 
 
 # --- what hooks return --------------------------------------------------------------------------------------------------

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -12,32 +10,10 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock
 from rclpy.node import Node
 
-from skill_runtime.middleware import Job
+from skill_runtime.timers import Job, Timer, TimerQueue
 
 
-class Alarm:
-    """A job that waits for its moment."""
-
-    def __init__(self, job: Job) -> None:
-        self._job: Job | None = job
-
-    @property
-    def pending(self) -> bool:
-        """Tell whether the job is still to come."""
-        return self._job is not None
-
-    def cancel(self) -> None:
-        """Let the job not happen; without effect when it has."""
-        self._job = None
-
-    def ring(self) -> None:
-        """Do the job, unless it was cancelled."""
-        job, self._job = self._job, None
-        if job is not None:
-            job()
-
-
-class Alarms:
+class RclpyTimers:
     """Jobs in the order of their moments, put in from any thread.
 
     Args:
@@ -51,34 +27,30 @@ class Alarms:
         self._clock = clock
         self._on_loop = on_loop
         self._lock = threading.Lock()
-        self._numbers = itertools.count()
-        self._waiting: list[tuple[int, int, Alarm]] = []
+        self._queue = TimerQueue()
         self._timer: Any = node.create_timer(1.0, self._ring, callback_group=group, clock=clock, autostart=False)
         # A timer that is set from another thread does not wake the executor; a guard condition does.
         self._wake: Any = node.create_guard_condition(self._set, callback_group=group)
 
-    def at(self, when_ns: int, job: Job) -> Alarm:
-        """Have a job done at a moment; soon, when that has passed."""
-        alarm = Alarm(job)
+    def at(self, when_ns: int, job: Job) -> Timer:
+        """Run a job at a moment; soon, when that has passed."""
         with self._lock:
-            heapq.heappush(self._waiting, (when_ns, next(self._numbers), alarm))
-            first = self._waiting[0][2] is alarm
+            timer = self._queue.put(when_ns, job)
+            first = self._queue.is_next(timer)
         if first and self._on_loop():
             self._set()
         elif first:
             self._wake.trigger()
-        return alarm
+        return timer
 
-    def after(self, delay_s: float, job: Job) -> Alarm:
-        """Have a job done after a delay."""
+    def after(self, delay_s: float, job: Job) -> Timer:
+        """Run a job after a delay."""
         return self.at(int(self._clock.now().nanoseconds) + round(delay_s * 1e9), job)
 
     def _set(self) -> None:
         """Set the timer for the first job."""
         with self._lock:
-            while self._waiting and not self._waiting[0][2].pending:
-                heapq.heappop(self._waiting)
-            due_ns = self._waiting[0][0] if self._waiting else None
+            due_ns = self._queue.due_ns
         if due_ns is None:
             self._timer.cancel()
         else:
@@ -89,12 +61,12 @@ class Alarms:
         """Do what is due; what a job raises goes on to the executor, after the timer was set for the others."""
         self._timer.cancel()
         try:
-            while (alarm := self._pop()) is not None:
-                alarm.ring()
+            while (job := self._pop()) is not None:
+                job()
         finally:
             self._set()
 
-    def _pop(self) -> Alarm | None:
-        now_ns = int(self._clock.now().nanoseconds)
+    def _pop(self) -> Job | None:
         with self._lock:
-            return heapq.heappop(self._waiting)[2] if self._waiting and self._waiting[0][0] <= now_ns else None
+            due = self._queue.pop_due(int(self._clock.now().nanoseconds))
+        return None if due is None else due[1]

@@ -1,4 +1,4 @@
-"""The services that answer questions and take wishes: ``describe``, ``why`` and ``pause``."""
+"""The services that are about no single resource or data: ``describe``, ``why`` and ``pause``."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from skill_model.json_form import to_json
-from skill_runtime.core.engine import PauseReply, SkillsetEngine
+from skill_runtime.core.engine import SkillsetEngine
+from skill_runtime.core.replies import PauseReply
 from skill_runtime.core.watchdog import WATCHDOG
-from skill_runtime.middleware import ActionServer, Middleware, Reply, ResourceValue, WhyReply
+from skill_runtime.middleware import ActionServer, Middleware, Reply, WhyReply
 
 HOOK_ANSWERS_S = 10.0
 """A hook that has not answered after so long is said to be silent; in time that this process could run."""
 
 
-class Questions:
-    """Serves the questions; a hook that takes its time holds up no other caller."""
+class SkillsetServices:
+    """Serves them; a hook that takes its time holds up no other caller."""
 
     def __init__(
         self,
@@ -52,8 +53,7 @@ class Questions:
         self._middleware.defer(lambda: self._engine.ask_validate(skill, inputs, answer))
 
     def _explain(self, skill: str, refusal: str, reply: Reply) -> None:
-        resources = {name: ResourceValue(one.state, one.previous, one.stamp_ns) for name, one in self._engine.resources.items()}
-        reply(WhyReply("", self._engine.explain(skill, refusal), resources))
+        reply(WhyReply("", self._engine.explain(skill, refusal), self._engine.resources))
 
     def _pause(self, request: Mapping[str, Any], reply: Reply) -> None:
         silent = PauseReply(accepted=False, reason=f"the hook has not answered for {HOOK_ANSWERS_S:g} s")
