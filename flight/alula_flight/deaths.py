@@ -10,6 +10,9 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
 
+DIED = "died"
+"""The way of failing of a process that ended without being told to."""
+
 
 class Consequence(Enum):
     """What the supervisor does when a process has died by itself."""

@@ -35,14 +35,13 @@ from alula_common.signals import Interrupts
 from alula_flight.beside import page_beside
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.live import LiveEvents
-from alula_flight.mocked import STOPPING, MockFront
+from alula_flight.mocked import CANNOT_START, STOPPING, MockFront
 from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_sensors, read_world
 from run_analysis.conformance import Monitor
 from run_analysis.models import models_of
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.world.config import world_names
 
-CANNOT_START = 2
 FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 GIVEN_UP = 1
 PR_SET_PDEATHSIG = 1  # prctl(2)

@@ -8,10 +8,9 @@ from pathlib import Path
 from alula_common.record import EVENTS, FILE, RecordFollower
 from alula_flight.deaths import read_deaths
 from run_analysis.conformance import Monitor
+from run_analysis.run import DEPARTURE
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, TransitionEvent, read_event
-
-DEPARTURE = ("flight_status", "ON_GROUND")  # lift-off is when this resource leaves this state first
 
 
 def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: float = 0.0) -> str | None:

@@ -9,6 +9,8 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from alula_common.robots import behaviour_files
+from alula_common.scenarios import load_scenario
 from alula_common.signals import Interrupts
 from alula_flight.live import LiveEvents
 from alula_flight.spec import RunSpec
@@ -18,16 +20,11 @@ CANNOT_START = 2
 STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at once"
 
 
-def shipped_behaviour(root: Path) -> Path:
-    """Return the drone's own behaviour file."""
-    return root / "skillsets" / "uav" / "mock.yaml"
-
-
 def command(spec: RunSpec, root: Path) -> list[str]:
     """Return the command line of the flight."""
     words = [str(root / "setup" / "in_ros2"), "python", "-m", "uav_missions.mock_flight", "--scenario", spec.scenario]
     words += ["--out", spec.out_dir, "--route", spec.world, "--seed", str(spec.seed)]
-    for file in (str(shipped_behaviour(root)), *spec.behaviour):
+    for file in (*map(str, behaviour_files(load_scenario(spec.scenario).skillsets)), *spec.behaviour):
         words += ["--behaviour", file]
     for fault in spec.faults:
         words += ["--fail", fault]

@@ -11,12 +11,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from alula_common.faults import FaultRequest
+from alula_common.faults import MENDED, FaultChange, FaultRequest
 
 FILE = "process_faults.jsonl"
 KILLED, HUNG = "killed", "hung"
 WAYS = (KILLED, HUNG)
-MENDED = "ok"
 
 
 class Started(Protocol):
@@ -40,15 +39,6 @@ class ProcessFault:
     def mode(self) -> str:
         """Return in which way it fails."""
         return self.request.how or WAYS[0]
-
-
-@dataclass(frozen=True)
-class Applied:
-    """A line of the file, as the simulator tells its own faults; ``t_s``: absolute mission clock."""
-
-    sensor: str
-    mode: str
-    t_s: float
 
 
 class ProcessFaults:
@@ -100,7 +90,7 @@ class ProcessFaults:
         begins = fault not in self._active
         if begins:
             self._active[fault] = process.respawn_delay
-            self._note(Applied(fault.request.what, fault.mode, now_s))
+            self._note(FaultChange(fault.request.what, fault.mode, now_s))
         if fault.mode == KILLED:
             process.respawn_delay = math.inf  # before it dies: then it is not started again
             self._send(fault, signal.SIGKILL)
@@ -109,7 +99,7 @@ class ProcessFaults:
 
     def _mend(self, fault: ProcessFault, now_s: float) -> None:
         respawn_delay_s = self._active.pop(fault)
-        self._note(Applied(fault.request.what, MENDED, now_s))
+        self._note(FaultChange(fault.request.what, MENDED, now_s))
         if fault.mode == HUNG:
             self._send(fault, signal.SIGCONT)
         elif (process := self._find(fault.node)) is not None:
@@ -120,7 +110,7 @@ class ProcessFaults:
         if process is not None and process.popen is not None and process.is_alive():
             process.popen.send_signal(number)
 
-    def _note(self, applied: Applied) -> None:
+    def _note(self, change: FaultChange) -> None:
         # A folder that has gone must not end the run.
         with contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(applied)) + "\n")
+            file.write(json.dumps(asdict(change)) + "\n")

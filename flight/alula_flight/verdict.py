@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from alula_flight.deaths import Death
+from alula_flight.deaths import DIED, Death
 
 MEANING = {
     "accomplished": "mission accomplished",
@@ -17,7 +17,6 @@ MEANING = {
     "running": "the mission's process ended before the mission did",
 }
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
-SAME_MOMENT_S = 0.5
 PICTURES = ("report.html", "timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
 
 
@@ -88,12 +87,10 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def what_failed(summary: Mapping[str, Any]) -> str:
-    """Return what the vehicle had to recover from: what was broken at that moment, else the radio that ended the video."""
+    """Return what the vehicle had to recover from."""
     failure_s = summary["recovery"]["failure_s"]
-    for fault in summary.get("injected") or ():
-        if fault["t_s"] is not None and abs(fault["t_s"] - failure_s) < SAME_MOMENT_S:
-            return f"{fault['sensor']} failed"
-    return "radio lost" if summary.get("video") else "sensor failed"
+    sensor, mode = next(((one["sensor"], one["mode"]) for one in summary["answers"] if one["t_s"] == failure_s), ("sensor", ""))
+    return f"{sensor} {DIED if mode == DIED else 'lost' if sensor == 'radio' else 'failed'}"
 
 
 def conformance_lines(found: Mapping[str, Any]) -> list[str]:

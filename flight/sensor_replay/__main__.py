@@ -25,13 +25,8 @@ import yaml
 from alula_common.faults import FaultError
 from sensor_replay import offline
 from sensor_replay.faults import TOPICS, Faults, read_faults
+from sensor_replay.nodes import NODES, node_and_parameter
 
-NODES = {
-    "zed_depth": ("ZedDepthNode", "ZedSettings"),
-    "lidar_obstacles": ("LidarObstaclesNode", "LidarSettings"),
-    "lidar_mapping": ("LidarMappingNode", "MappingSettings"),
-}
-"""The nodes that perceive: by package, the classes of node and settings in its module ``node``."""
 AGAIN = ("/perception/transition", "/mapping/transition")
 """Calls that the nodes make again."""
 MEASURED = {
@@ -50,11 +45,10 @@ def settings_of(texts: Sequence[str]) -> dict[str, dict[str, object]]:
     """Read ``NODE.NAME=VALUE`` into parameters by node; raises PerceptionError."""
     found: dict[str, dict[str, object]] = {}
     for text in texts:
-        name, _, value = text.partition("=")
-        node, _, parameter = name.removeprefix("perception.").removeprefix("mapping.").partition(".")
+        node, parameter = node_and_parameter(text)
         if node not in NODES or not parameter:
             raise PerceptionError(f"--set {text}: write NODE.NAME=VALUE; nodes are {', '.join(NODES)}")
-        found.setdefault(node, {})[parameter] = yaml.safe_load(value)
+        found.setdefault(node, {})[parameter] = yaml.safe_load(text.partition("=")[2])
     return found
 
 

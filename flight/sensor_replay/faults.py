@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +30,6 @@ WAYS = {
     "imu": tuple(mode.value for mode in _ANY),
 }
 """What can fail, each with the ways in which it can; the first one counts where none is named."""
-
-Deliver = Callable[[str, Any, int], None]
-"""Gets topic, message and when it arrives, nanoseconds."""
 
 
 @dataclass
@@ -68,9 +65,7 @@ class Faults:
     def _mode(self, sensor: str, stamp_ns: int) -> SensorMode:
         mode = SensorMode.OK
         for request in self.requests:
-            begin_ns = 0 if request.begin_s is None else self.lift_off_ns + round(request.begin_s * 1e9)
-            end_ns = None if request.end_s is None else self.lift_off_ns + round(request.end_s * 1e9)
-            if request.what == sensor and begin_ns <= stamp_ns and (end_ns is None or stamp_ns < end_ns):
+            if request.what == sensor and request.lasts((stamp_ns - self.lift_off_ns) / 1e9):
                 mode = SensorMode(request.how or WAYS[sensor][0])
         return mode
 

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from alula_common.record import FILE as RECORD
+from alula_flight.report import making
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.making import make_report
+from run_analysis.errors import AnalysisError
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, Log, failing_flight, write_bag
@@ -47,15 +49,18 @@ def run(log: Log, id_: str, name: str, at_s: float, *end: Any) -> None:
         log.skill(end_s, name, id_, state, result=result, message=message)
 
 
-def report(folder: Path, log: Log, *faults: Fault, scenario: str = "mapping", asked: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the summary; a fault: sensor, from, until, seconds after lift-off."""
+def report(
+    folder: Path, log: Log, *faults: Fault, scenario: str = "mapping", asked: tuple[str, ...] = (), died: dict[str, float] | None = None
+) -> dict[str, Any]:
+    """Return the summary; a fault: sensor, from, until, seconds after lift-off; ``died``: processes, and when."""
     log.write(folder / RECORD)
     told = [{"sensor": name, "mode": "dead", "t_s": LIFT_OFF_S + at_s} for name, at_s, *_ in faults]
     told += [{"sensor": name, "mode": "ok", "t_s": LIFT_OFF_S + until[0]} for name, _, *until in faults if until]
     state = {"lift_off_s": LIFT_OFF_S, "collisions": 0, "min_clearance_m": 1.0, "distance_m": 1.0, "faults": told}
     t_s = np.arange(0.0, 80.0, 0.5)
     write_bag(folder / "functional.bag", poses=(t_s + LIFT_OFF_S, np.outer(t_s, [1.0, 0.0, 0.0])), states=[state])
-    facts = RunFacts(scenario=scenario, seed=0, out_dir=folder, faults=asked, died=(), mission_exit=0)
+    deaths = [{"name": name, "when_s": LIFT_OFF_S + at_s, "how": "signal SIGKILL"} for name, at_s in (died or {}).items()]
+    facts = RunFacts(scenario=scenario, seed=0, out_dir=folder, faults=asked, died=deaths, mission_exit=0)
     return dict(make_report(facts))
 
 
@@ -135,12 +140,62 @@ def test_what_breaks_without_a_fault_that_is_known_has_a_recovery_without_a_fail
     assert summary["answers"] == []
 
 
+GONE = "the managers of perception have gone: they ended, or gave no sign of life"
+
+
+def test_managers_that_die_are_told_as_detected_by_what_the_mission_was_told(tmp_path):
+    log = flight()
+    log.told(31.2, "perception.zed_depthmap", "1", "FAILED", GONE)
+    run(log, "2", "perception.lidar_depthmap", 33.0)
+    summary = report(tmp_path, log, died={"perception": 30.0})
+    (found,) = summary["answers"]
+    assert (found["sensor"], found["mode"], found["t_s"], found["failed"]) == ("perception", "died", 30.0, ["1"])
+    assert (found["detected_s"], found["detected_by"]) == (31.2, "perception.zed_depthmap FAILED")
+    assert (found["skill"], found["after_s"]) == ("perception.lidar_depthmap", 3.02)
+    assert recovery(summary)[:3] == [30.0, 31.2, 33.02]
+    (zed,) = [one for one in summary["skills"] if one["skill"] == "zed_depthmap"]
+    assert (zed["outcome"], zed["end_s"], zed["message"]) == ("FAILED", 31.2, GONE)
+
+
+def test_a_process_that_nothing_hung_on_dies_without_a_recovery(tmp_path):
+    summary = report(tmp_path, flight(), died={"lidar_mapping": 30.0})
+    assert (answers(summary), summary["recovery"]) == ([UNSEEN], None)
+
+
+def test_a_process_that_a_fault_has_ended_is_told_once(tmp_path):
+    applied = {"sensor": "encoder", "mode": "killed", "t_s": LIFT_OFF_S + 20.0}
+    (tmp_path / "process_faults.jsonl").write_text(json.dumps(applied) + "\n")
+    summary = report(tmp_path, flight(scenario="inspection"), scenario="inspection", died={"video_stream": 20.1, "perception": 25.0})
+    assert [(one["sensor"], one["mode"]) for one in summary["answers"]] == [("encoder", "killed"), ("perception", "died")]
+
+
+def test_a_file_of_faults_that_is_wrong_costs_no_report(tmp_path, monkeypatch):
+    def wrong(_):
+        raise AnalysisError("faults.yaml:3: there is no resource")
+
+    monkeypatch.setattr(making, "reaches_of", wrong)
+    summary = report(tmp_path, flight(("zed", 30.3)), ("zed", 30.0))
+    assert "what faults can bring about: AnalysisError: faults.yaml:3: there is no resource" in summary["problems"]
+    assert [one["detected_s"] for one in summary["answers"]] == [30.3], "by its name"
+
+
+def mocked(folder: Path, asked: tuple[str, ...], *told: tuple[str, str, float]) -> dict[str, Any]:
+    """Return the summary of a flight over mocks whose account tells of these faults."""
+    flight(("zed", 20.3), ("zed", 50.3)).write(folder / RECORD)
+    faults = [{"sensor": sensor, "mode": mode, "t_s": LIFT_OFF_S + at_s} for sensor, mode, at_s in told]
+    (folder / "mock.json").write_text(json.dumps({"lift_off_s": LIFT_OFF_S, "faults": faults}))
+    return dict(make_report(RunFacts("mapping", 0, folder, asked, (), 0, mock=True)))
+
+
 def test_mocks_tell_each_fault_of_a_sensor_and_when_it_ended(tmp_path):
-    flight(("zed", 20.3), ("zed", 50.3)).write(tmp_path / RECORD)
-    account = {"lift_off_s": LIFT_OFF_S, "faults": [{"sensor": "zed", "mode": "mock", "t_s": LIFT_OFF_S + 20.0}]}
-    (tmp_path / "mock.json").write_text(json.dumps(account))
     asked = ("zed@50", "zed:dark@20-30", "zed@500", "lidar@700")
-    summary = make_report(RunFacts("mapping", 0, tmp_path, asked, (), 0, mock=True))
+    summary = mocked(tmp_path, asked, ("zed", "dark", 20.0), ("zed", "ok", 30.0), ("zed", "mock", 50.0))
     assert [(one["mode"], one["t_s"]) for one in summary["injected"]] == [("dark", 20.0), ("mock", 50.0)]
     assert [one["until_s"] for one in summary["answers"]] == [30.0, None]
     assert "the fault lidar@700 never happened" in summary["problems"]
+
+
+def test_older_accounts_of_mocks_with_the_first_time_alone_are_read(tmp_path):
+    summary = mocked(tmp_path, ("zed:dark@20-30", "lidar@40"), ("zed:dark", "mock", 20.0), ("lidar", "mock", 40.0))
+    assert [(one["sensor"], one["mode"], one["t_s"]) for one in summary["injected"]] == [("zed", "dark", 20.0), ("lidar", "mock", 40.0)]
+    assert summary["problems"] == ["mission.json is missing"]

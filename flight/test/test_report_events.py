@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from alula_common.record import EVENTS, FILE, RecordError, RecordWriter
-from alula_flight.report.events import fold, gaps, in_order, read_events
+from alula_flight.report.events import fold, gaps, in_order, read_history
 from alula_flight.report.files import Problems
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import TransitionEvent, event_record, read_event
@@ -98,7 +98,7 @@ def test_latched_repetitions_count_once_and_gaps_are_told():
 
 def test_missing_file_is_a_problem(tmp_path):
     problems = Problems()
-    assert read_events(tmp_path / FILE, problems) == []
+    assert read_history(tmp_path / FILE, problems).events == ()
     assert problems.sentences == ["skills.mcap is missing: nothing is known of skills and resources"]
 
 
@@ -108,7 +108,7 @@ def test_a_bad_event_costs_only_itself(tmp_path):
         writer.write(EVENTS, 0, values)
     writer.close()
     problems = Problems()
-    assert [event.sequence for event in read_events(tmp_path / FILE, problems)] == [1]
+    assert [event.sequence for event in read_history(tmp_path / FILE, problems).events] == [1]
     assert len(problems.sentences) == 1
     assert problems.sentences[0].startswith("skills.mcap: event 1 is no event")
 
@@ -117,15 +117,14 @@ def test_what_stands_before_a_cut_is_read_and_the_cut_is_told(tmp_path):
     path = tmp_path / FILE
     failing_flight().write(path)
     whole = path.read_bytes()
-    expected = read_events(path, Problems())
+    expected = read_history(path, Problems()).events
     for part in (0.25, 0.5, 0.9):
         path.write_bytes(whole[: int(part * len(whole))])
         problems = Problems()
-        events = read_events(path, problems)
+        events = read_history(path, problems).events
         assert 0 < len(events) < len(expected)
         assert events == expected[: len(events)]
         assert problems.sentences == ["skills.mcap was cut off"]
-        fold(events, problems)
 
 
 @given(content=st.binary(max_size=300))
@@ -133,7 +132,7 @@ def test_no_content_is_too_bad(content, tmp_path_factory):
     path = tmp_path_factory.mktemp("bad") / FILE
     path.write_bytes(content)
     with contextlib.suppress(RecordError):
-        fold(read_events(path, Problems()), Problems())
+        read_history(path, Problems())
 
 
 @st.composite

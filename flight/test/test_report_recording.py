@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from alula_common.faults import FaultChange
 from alula_flight.report.files import Problems
 from alula_flight.report.page import page_entries
-from alula_flight.report.recording import FaultChange, read_recording
+from alula_flight.report.recording import read_recording
 from mission_console.entries import FAULT, HEALTH, PATH
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import String
 from uav_msgs.msg import GuidanceState, MappingState, SensorHealth
 
-from alula_common.record import EVENTS, RecordWriter
+from alula_common.record import EVENTS, REPORTS, RecordWriter
 
 Floats = NDArray[np.float64]
 Box = tuple[Sequence[float], Sequence[float]]
@@ -119,10 +119,11 @@ def write_bag(
 
 
 class Log:
-    """Events as the mission writes them, each numbered within its skillset."""
+    """Events as the mission writes them, each numbered within its skillset, and reports to it."""
 
     def __init__(self) -> None:
         self.events: list[dict[str, Any]] = []
+        self.reports: list[tuple[float, dict[str, Any]]] = []
 
     def _add(self, t_s: float, skillset: str, kind: str, **values: Any) -> None:
         self.events.append({"stamp_s": LIFT_OFF_S + t_s, "skillset": skillset, "kind": kind, **values})
@@ -137,6 +138,11 @@ class Log:
         skillset, resource = name.split(".")
         self._add(t_s, skillset, "TRANSITION", resource=resource, from_state=source, to_state=target, cause=cause)
 
+    def told(self, t_s: float, name: str, id_: str, state: str, message: str = "") -> None:
+        """Add a report to the mission of an execution."""
+        skillset, skill = name.split(".")
+        self.reports.append((LIFT_OFF_S + t_s, {"skillset": skillset, "skill": skill, "id": id_, "state": state, "message": message}))
+
     def write(self, path: Path, *, until_s: float = math.inf) -> None:
         """Write ``skills.mcap`` in the order of time, as a mission that died at ``until_s`` leaves it."""
         ordered = sorted(self.events, key=lambda event: event["stamp_s"])
@@ -147,6 +153,8 @@ class Log:
         for event in ordered:
             if event["stamp_s"] < until_s:
                 writer.write(EVENTS, round(event["stamp_s"] * 1e9), event)
+        for stamp_s, report in self.reports:
+            writer.write(REPORTS, round(stamp_s * 1e9), report)
         if until_s == math.inf:
             writer.close()
 

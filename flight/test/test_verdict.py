@@ -14,16 +14,17 @@ MOCK = {"wall_s": 1.0, "factor": 100.0, "notes": []}
 
 
 @pytest.mark.parametrize(
-    ("injected", "video", "told"),
+    ("answers", "told"),
     [
-        ([{"sensor": "radio", "mode": "critical", "t_s": 40.0}], None, "radio failed at 40.00 s"),
-        ([{"sensor": "zed", "mode": "dead", "t_s": 40.1}], {"freezes": 1}, "zed failed at 40.00 s"),
-        ([{"sensor": "zed", "mode": "dead", "t_s": 12.0}], {"freezes": 1}, "radio lost at 40.00 s"),
-        ([], None, "sensor failed at 40.00 s"),
+        ([("zed", "dead", 12.0), ("encoder", "killed", 40.0)], "encoder failed at 40.00 s"),
+        ([("perception", "died", 40.0)], "perception died at 40.00 s"),
+        ([("zed", "dead", 12.0), ("radio", "", 40.0)], "radio lost at 40.00 s"),
+        ([], "sensor failed at 40.00 s"),
     ],
 )
-def test_what_failed_is_named(injected, video, told, tmp_path: Path):
-    summary = {"outcome": "degraded", "mock": MOCK, "video": video, "injected": injected, "recovery": {"failure_s": 40.0, **LATER}}
+def test_what_failed_is_named(answers, told, tmp_path: Path):
+    found = [{"sensor": sensor, "mode": mode, "t_s": t_s} for sensor, mode, t_s in answers]
+    summary = {"outcome": "degraded", "mock": MOCK, "answers": found, "recovery": {"failure_s": 40.0, **LATER}}
     lines = verdict_lines(summary, [], tmp_path)
     assert f"  recovery: {told}, detected 0.50 s later" in lines
 

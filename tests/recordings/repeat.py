@@ -33,7 +33,7 @@ def load(processes: int) -> Iterator[None]:
 
 def replays(run: Path, depth: str, rates: Sequence[float]) -> list[tuple[int, bytes, str]]:
     """Replay a recording at all rates at the same time; return of each how it ended, its decisions, and what it said."""
-    words = [sys.executable, "-m", "mission_replay", str(run), "--from", depth, "--json", "--rate"]
+    words = [sys.executable, "-m", "alula_flight.replay", str(run), "--from", depth, "--json", "--rate"]
     started = [subprocess.Popen([*words, str(rate)], stdout=subprocess.PIPE, stderr=subprocess.PIPE) for rate in rates]
     told = [process.communicate() for process in started]
     return [(process.returncode, out, said.decode()) for process, (out, said) in zip(started, told, strict=True)]

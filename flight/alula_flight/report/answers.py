@@ -7,15 +7,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypedDict
 
-from alula_common.faults import parse_fault
+from alula_common.faults import MENDED, FaultChange, parse_fault
 from alula_common.scenarios import Scenario
+from alula_flight.deaths import DIED
 from alula_flight.report.events import History
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.phases import Phases
-from alula_flight.report.recording import MENDED, FaultChange, Recording
+from alula_flight.report.recording import Recording
 from run_analysis.causes.answers import Answer, answer_to_fault
-from run_analysis.causes.faults import Fault, RunTimes, Traced, faults_asked, trace
-from run_analysis.causes.reach import reach_of
+from run_analysis.causes.faults import Fault, Traced, faults_asked, trace
+from run_analysis.causes.reach import Reach, Reaches
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 
 RADIO = "radio"
@@ -35,7 +36,7 @@ class FaultAnswer:
 
 
 class AnswerSummary(TypedDict):
-    """A fault, or the radio that ended the video, and what followed from it (``run_analysis.causes``).
+    """A fault, a process that died, or the radio that ended the video, and what followed from it (``run_analysis.causes``).
 
     ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the
     executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table of a campaign.
@@ -54,21 +55,28 @@ class AnswerSummary(TypedDict):
 
 
 def injected(recording: Recording) -> tuple[FaultChange, ...]:
-    """Return what the simulator, the supervisor or the mocks broke, in the order of time."""
-    return tuple(change for change in _changes(recording) if change.mode != MENDED)
+    """Return what was broken, in the order of time."""
+    return tuple(change for change in recording.faults if change.mode != MENDED)
 
 
 def find_answers(
-    facts: RunFacts, scenario: Scenario, history: History, recording: Recording, phases: Phases, *, radio_lost_s: float | None = None
+    facts: RunFacts,
+    scenario: Scenario,
+    history: History,
+    recording: Recording,
+    phases: Phases,
+    reaches: Reaches,
+    *,
+    radio_lost_s: float | None = None,
 ) -> tuple[FaultAnswer, ...]:
-    """Return every fault of the run with its answer, in the order of time.
+    """Return every fault of the run, and every process that died, with its answer, in the order of time.
 
     ``radio_lost_s``: when the radio was lost that ended the video; a process whose end explains that is not told as the radio.
     """
-    known = [*_told(recording), *_asked(facts, scenario, history, phases)]
-    if radio_lost_s is not None and not any(_explains(fault, change, radio_lost_s) for change, fault in known):
-        change = FaultChange(RADIO, "", radio_lost_s)
-        known.append((change, Fault(RADIO, radio_lost_s, reach=reach_of(RADIO))))
+    known = [*_told(recording, reaches), *_asked(facts, scenario, history, phases, reaches), *_died(facts, scenario, recording, reaches)]
+    radio = reaches.of(RADIO)
+    if radio_lost_s is not None and not any(_explains(fault, change, radio_lost_s, radio) for change, fault in known):
+        known.append((FaultChange(RADIO, "", radio_lost_s), Fault(RADIO, radio_lost_s, reach=radio)))
     known.sort(key=lambda one: one[1].at_s)
     found = []
     for (change, _), traced in zip(known, trace([fault for _, fault in known], history.events), strict=True):
@@ -77,35 +85,38 @@ def find_answers(
     return tuple(found)
 
 
-def _changes(recording: Recording) -> list[FaultChange]:
-    sensors = recording.simulator.faults if recording.simulator is not None else ()
-    return sorted((*sensors, *recording.processes), key=lambda change: change.t_s)
-
-
-def _told(recording: Recording) -> Iterator[tuple[FaultChange, Fault]]:
+def _told(recording: Recording, reaches: Reaches) -> Iterator[tuple[FaultChange, Fault]]:
     """Yield what the recordings tell; a fault lasts until the next change of the same thing."""
-    changes = _changes(recording)
-    for at, change in enumerate(changes):
+    for at, change in enumerate(recording.faults):
         if change.mode != MENDED:
-            until_s = next((later.t_s for later in changes[at + 1 :] if later.sensor == change.sensor), math.inf)
-            yield change, Fault(change.sensor, change.t_s, until_s, reach_of(change.sensor))
+            until_s = next((later.t_s for later in recording.faults[at + 1 :] if later.sensor == change.sensor), math.inf)
+            yield change, Fault(change.sensor, change.t_s, until_s, reaches.of(change.sensor))
 
 
-def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases) -> Iterator[tuple[FaultChange, Fault]]:
+def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases, reaches: Reaches) -> Iterator[tuple[FaultChange, Fault]]:
     """Yield what was asked for and no recording tells: in the simulator the radio's faults."""
     if not facts.mock:
         untold = dict(scenario.faults).keys() - dict(scenario.processes).keys()
         requests = [request for request in map(parse_fault, facts.faults) if request.what in untold]
-        times = RunTimes.of(history.events, phases.zero_s if phases.lifted_off else None)
-        for request, fault in faults_asked(requests, times):
+        lift_off_s = phases.zero_s if phases.lifted_off else None
+        for request, fault in faults_asked(requests, history.events, lift_off_s, reaches):
             yield FaultChange(request.what, request.how, fault.at_s), fault
 
 
-def _explains(fault: Fault, change: FaultChange, radio_lost_s: float) -> bool:
+def _died(facts: RunFacts, scenario: Scenario, recording: Recording, reaches: Reaches) -> Iterator[tuple[FaultChange, Fault]]:
+    """Yield the processes that ended without being told to, but for those that a fault has ended."""
+    nodes = dict(scenario.processes)
+    ended = {nodes.get(change.sensor) for change in recording.processes}
+    for death in facts.died:
+        if death["when_s"] is not None and death["name"] not in ended:
+            yield FaultChange(death["name"], DIED, death["when_s"]), Fault(death["name"], death["when_s"], reach=reaches.of(death["name"]))
+
+
+def _explains(fault: Fault, change: FaultChange, radio_lost_s: float, radio: Reach) -> bool:
     """Tell whether a fault is what the loss of the radio was: a process of the video, or the radio at that moment."""
     if change.sensor == RADIO:
         return abs(fault.at_s - radio_lost_s) < SAME_MOMENT_S
-    return fault.holds(radio_lost_s) and bool(fault.reach.ends & reach_of(RADIO).ends)
+    return fault.holds(radio_lost_s) and bool(fault.reach.ends & radio.ends)
 
 
 def summarise_answer(one: FaultAnswer, phases: Phases) -> AnswerSummary:

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from alula_common.record import EVENTS, RecordFollower
+from alula_common.record import EVENTS, Entry, RecordFollower
 from alula_flight.report.files import Problems, mapping
-from run_analysis.tree import Places
+from run_analysis.causes.told_ends import with_told_ends
+from run_analysis.tree import Places, places_in
 from skill_model.execution_state import ExecutionState
 from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
 
@@ -50,7 +51,7 @@ class History:
         return [execution for execution in self.executions if execution.skill == skill]
 
 
-def read_events(path: Path, problems: Problems) -> list[EngineEvent]:
+def read_history(path: Path, problems: Problems) -> History:
     """Read ``skills.mcap``; a missing file, a missing end, what is no event and lost events are noted as problems.
 
     Raises:
@@ -58,20 +59,26 @@ def read_events(path: Path, problems: Problems) -> list[EngineEvent]:
     """
     if not path.exists():
         problems.note(f"{path.name} is missing: nothing is known of skills and resources")
-        return []
+        return History()
     record = RecordFollower(path)
+    entries = record.poll()
+    events = read_events(path, entries, problems)
+    if not record.ended:
+        problems.note(f"{path.name} was cut off{f': {record.broken}' if record.broken else ''}")
+    for sentence in gaps(events):
+        problems.note(f"{path.name}: {sentence}")
+    return fold(with_told_ends(events, entries), problems, places_in(entries))
+
+
+def read_events(path: Path, entries: Iterable[Entry], problems: Problems) -> list[EngineEvent]:
+    """Return the events of a record in the order of time; what is no event is noted as a problem."""
     events: list[EngineEvent] = []
-    for number, entry in enumerate((entry for entry in record.poll() if entry.topic == EVENTS), start=1):
+    for number, entry in enumerate((entry for entry in entries if entry.topic == EVENTS), start=1):
         try:
             events.append(read_event(entry.value))
         except ValueError as error:
             problems.note(f"{path.name}: event {number} is no event ({error})")
-    if not record.ended:
-        problems.note(f"{path.name} was cut off{f': {record.broken}' if record.broken else ''}")
-    ordered = in_order(events)
-    for sentence in gaps(ordered):
-        problems.note(f"{path.name}: {sentence}")
-    return ordered
+    return in_order(events)
 
 
 def in_order(events: Iterable[EngineEvent]) -> list[EngineEvent]:

@@ -7,10 +7,9 @@ from pathlib import Path
 
 from alula_common.files import write_aside, write_json
 from alula_common.record import FILE as RECORD
-from alula_common.record import read_record
 from alula_common.scenarios import Scenario, load_scenario
 from alula_flight.report.answers import FaultAnswer, find_answers
-from alula_flight.report.events import History, fold, read_events
+from alula_flight.report.events import History, read_history
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.files import Problems
 from alula_flight.report.map_picture import MapScene, draw_map
@@ -28,7 +27,8 @@ from alula_flight.report.video import Video, radio_lost_s, read_video
 from alula_flight.report.video_picture import draw_video
 from alula_flight.report.world import TrueSurfaces
 from mission_console.page import write_report
-from run_analysis.tree import places_in
+from run_analysis.causes.fault_file import reaches_of
+from run_analysis.causes.reach import Reaches
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,9 @@ def make_report(facts: RunFacts) -> Summary:
 def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account:
     folder, history, recording, mock, video = facts.out_dir, History(), Recording(), None, Video()
     with problems.survive(RECORD):
-        events = read_events(folder / RECORD, problems)
-        history = fold(events, problems, places_in(read_record(folder)) if events else None)
+        history = read_history(folder / RECORD, problems)
     if facts.mock:
-        recording, mock = read_mock(facts, history.last_s, problems)
+        recording, mock = read_mock(folder, problems)
     else:
         with problems.survive("functional.bag"):
             recording = read_recording(folder, problems)
@@ -106,7 +105,10 @@ def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account
     if "video" in scenario.report and not facts.mock:
         with problems.survive("video"):
             video = read_video(folder, history, phases, problems)
-    answers = find_answers(facts, scenario, history, recording, phases, radio_lost_s=radio_lost_s(video, phases))
+    reaches = Reaches()
+    with problems.survive("what faults can bring about"):
+        reaches = reaches_of(scenario.skillsets)
+    answers = find_answers(facts, scenario, history, recording, phases, reaches, radio_lost_s=radio_lost_s(video, phases))
     recovery = find_recovery(scenario, history, recording, phases, answers)
     return Account(history, recording, mock, phases, video, answers, recovery)
 

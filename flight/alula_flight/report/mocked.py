@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import TypedDict
 
-from alula_common.faults import parse_fault
-from alula_flight.report.facts import RunFacts
+from alula_common.faults import FaultChange
 from alula_flight.report.files import Problems, finite, mapping, read_json, sequence
-from alula_flight.report.recording import MENDED, FaultChange, Recording, SimulatorAccount
-from run_analysis.causes.faults import RunTimes, faults_asked
-
-MOCK = "mock"
-"""The mode of what failed in mocks without a word for the way of failing."""
+from alula_flight.report.recording import Recording, SimulatorAccount, fault_changes
 
 
 class MockSummary(TypedDict):
@@ -24,17 +20,17 @@ class MockSummary(TypedDict):
     notes: list[str]
 
 
-def read_mock(facts: RunFacts, ended_s: float | None, problems: Problems) -> tuple[Recording, MockSummary]:
-    """Read ``mock.json``; ``ended_s``: when the run was over, seconds of mission clock."""
+def read_mock(folder: Path, problems: Problems) -> tuple[Recording, MockSummary]:
+    """Read ``mock.json``."""
     values: dict[str, object] = {}
     with problems.survive("mock.json"):
-        values = mapping(read_json(facts.out_dir / "mock.json"))
+        values = mapping(read_json(folder / "mock.json"))
     account = SimulatorAccount(
         lift_off_s=finite(values.get("lift_off_s")),
         collisions=None,
         min_clearance_m=None,
         distance_m=None,
-        faults=tuple(_changes(facts, values, ended_s)),
+        faults=tuple(_changes(values.get("faults"))),
     )
     notes = [str(note) for note in sequence(values.get("notes"))]
     for note in notes:
@@ -42,19 +38,8 @@ def read_mock(facts: RunFacts, ended_s: float | None, problems: Problems) -> tup
     return Recording(simulator=account), MockSummary(wall_s=finite(values.get("wall_s")), factor=finite(values.get("factor")), notes=notes)
 
 
-def _changes(facts: RunFacts, values: Mapping[str, object], ended_s: float | None) -> Iterator[FaultChange]:
-    """Yield what failed, and when it worked again.
-
-    The file has when each fault came first; the requests have which of them came again, and when they ended.
-    """
-    faults = [mapping(entry) for entry in sequence(values.get("faults"))]
-    told = {str(fault.get("sensor", "")): t_s for fault in faults if (t_s := finite(fault.get("t_s"))) is not None}
-    requests = [request for request in map(parse_fault, facts.faults) if {request.what, f"{request.what}:{request.how}"} & told.keys()]
-    last_s = max([*told.values(), *([] if ended_s is None else [ended_s])], default=0.0)
-    asked = faults_asked(requests, RunTimes(0.0, finite(values.get("lift_off_s")), last_s), told)
-    for request, fault in asked:
-        yield FaultChange(request.what, request.how or MOCK, fault.at_s)
-        if math.isfinite(fault.until_s) and fault.until_s <= last_s:
-            yield FaultChange(request.what, MENDED, fault.until_s)
-    named = {name for request in requests for name in (request.what, f"{request.what}:{request.how}")}
-    yield from (FaultChange(name, MOCK, t_s) for name, t_s in told.items() if name not in named)
+def _changes(value: object) -> Iterator[FaultChange]:
+    """Yield what failed and what worked again; older files have the first time of each alone, with the way in its name: ``zed:dark``."""
+    for change in fault_changes(value):
+        sensor, _, mode = change.sensor.partition(":")
+        yield replace(change, sensor=sensor, mode=mode or change.mode)

@@ -19,8 +19,7 @@ def page_entries(recording: Recording, world: TrueSurfaces | None) -> Iterator[W
         yield WORLD, None, [[round(float(value), 2) for value in edge.reshape(-1)] for edge in world.outline()]
     if recording.path is not None:
         yield from _path(recording.path)
-    sensors = recording.simulator.faults if recording.simulator is not None else ()
-    for fault in sorted((*sensors, *recording.processes), key=lambda one: one.t_s):
+    for fault in recording.faults:
         yield FAULT, round(fault.t_s, 3), {"sensor": fault.sensor, "mode": fault.mode}
     for change in recording.health:
         said = {"sensor": change.sensor, "ok": change.ok, "fault": change.fault, "reason": change.reason}

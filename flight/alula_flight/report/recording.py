@@ -13,6 +13,7 @@ import numpy as np
 import rosbag
 from numpy.typing import NDArray
 
+from alula_common.faults import FaultChange
 from alula_flight.process_faults import FILE as PROCESS_FAULTS
 from alula_flight.report.bag_rescue import usable_bag
 from alula_flight.report.files import Problems, finite, mapping, sequence
@@ -24,9 +25,6 @@ MAPPING = "/lidar_mapping/state"
 HEALTH = {"/zed_depth/health": "zed", "/lidar_obstacles/health": "lidar"}
 ON_GROUND = 1  # uav_msgs/GuidanceState.landed_state
 LANDING = 4
-MENDED = "ok"
-"""The mode of what works again."""
-
 Floats = NDArray[np.float64]
 
 
@@ -52,15 +50,6 @@ class Track:
             return np.zeros(len(self.t_s))
         velocity = np.gradient(self.position_enu_m[:, :2], self.t_s, axis=0)
         return np.asarray(np.linalg.norm(velocity, axis=1), dtype=np.float64)
-
-
-@dataclass(frozen=True)
-class FaultChange:
-    """A sensor's mode was changed at ``t_s``, absolute seconds of mission clock; mode ``ok`` mends it."""
-
-    sensor: str
-    mode: str
-    t_s: float
 
 
 @dataclass(frozen=True)
@@ -112,6 +101,12 @@ class Recording:
     health: tuple[HealthChange, ...] = ()
     processes: tuple[FaultChange, ...] = ()
     """What the supervisor did to processes."""
+
+    @property
+    def faults(self) -> tuple[FaultChange, ...]:
+        """What the simulator, the supervisor or the mocks broke and mended, in the order of time."""
+        sensors = self.simulator.faults if self.simulator is not None else ()
+        return tuple(sorted((*sensors, *self.processes), key=lambda change: change.t_s))
 
     @property
     def path(self) -> Track | None:
@@ -200,7 +195,7 @@ def _simulator_account(texts: list[str], problems: Problems) -> SimulatorAccount
             collisions=None if collisions is None else int(collisions),
             min_clearance_m=finite(state.get("min_clearance_m")),
             distance_m=finite(state.get("distance_m")),
-            faults=tuple(_faults(state.get("faults"))),
+            faults=tuple(fault_changes(state.get("faults"))),
         )
     return None
 
@@ -211,10 +206,11 @@ def read_process_faults(folder: Path) -> tuple[FaultChange, ...]:
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
         with contextlib.suppress(ValueError):
             lines.append(json.loads(line))
-    return tuple(_faults(lines))
+    return tuple(fault_changes(lines))
 
 
-def _faults(value: object) -> Iterator[FaultChange]:
+def fault_changes(value: object) -> Iterator[FaultChange]:
+    """Yield what failed and what worked again, as it was written, as far as it makes sense."""
     for entry in sequence(value):
         values = mapping(entry)
         t_s = finite(values.get("t_s"))

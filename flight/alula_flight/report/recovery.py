@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alula_common.scenarios import Scenario
+from alula_flight.deaths import DIED
 from alula_flight.report.answers import FaultAnswer
 from alula_flight.report.events import History, PastExecution
 from alula_flight.report.phases import Phases
@@ -53,7 +54,8 @@ def find_recovery(
     if noticed_s is not None:
         fallback_s = _first([e.running_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
         return Recovery(None, noticed_s, fallback_s, _moving(scenario, history, recording, phases, fallback_s))
-    unanswered = [one for one in flown if one.traced.detected_s is not None] or flown
+    broken = [one for one in flown if one.mode != DIED]  # the death of a process that nothing hung on interrupts no flight
+    unanswered = [one for one in broken if one.traced.detected_s is not None] or broken
     return _recovery(unanswered[0], None, None) if unanswered else None
 
 

@@ -1,10 +1,12 @@
 """Faults: one grammar, every error with what would be right."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula_common.faults import FaultError, FaultRequest, parse_fault, parse_faults
+from alula_common.faults import MENDED, FaultError, FaultRequest, changes_of, parse_fault, parse_faults, spans_of
 
 KNOWN = {"zed": ("dead", "dark"), "radio": ("critical",)}
 WORDS = st.text("abz09_", min_size=1, max_size=8)
@@ -83,3 +85,28 @@ def test_any_text_is_read_or_refused(text):
 def test_a_fault_lasts_from_its_beginning_to_its_end(text, there):
     fault = parse_fault(text)
     assert tuple(fault.lasts(since_s) for since_s in (None, 29.99, 30.0, 39.99, 40.0)) == there
+
+
+def spans(*texts, lift_off_s=10.0, ended_s=100.0, first_s=None):
+    found = spans_of([*map(parse_fault, texts)], begun_s=0.5, lift_off_s=lift_off_s, ended_s=ended_s, first_s=first_s)
+    return [(str(span.request), span.at_s, span.until_s) for span in found]
+
+
+def test_faults_come_when_they_were_asked_for_and_not_after_the_run():
+    assert spans("zed@50", "zed@20-30", "lidar@95") == [("zed@20-30", 30.0, 40.0), ("zed@50", 60.0, math.inf)]
+    assert spans("zed", "lidar@3") == [("zed", 0.5, math.inf), ("lidar@3", 13.0, math.inf)]
+    assert spans("zed", "lidar@3", lift_off_s=None) == [("zed", 0.5, math.inf)], "nothing has lifted off"
+
+
+def test_faults_of_mocks_count_from_when_mocks_say_that_the_first_came():
+    first_s = {"zed:dark": 32.0, "zed": 0.2}
+    assert spans("zed:dark@20-21", "zed:dark@40", first_s=first_s) == [("zed:dark@20-21", 32.0, 33.0), ("zed:dark@40", 52.0, math.inf)]
+    assert spans("zed", "zed@20", first_s=first_s) == [("zed", 0.2, math.inf), ("zed@20", 30.0, math.inf)]
+    assert spans("lidar@20", first_s=first_s) == [], "mocks do not tell of it: it never came"
+
+
+def test_begins_and_ends_are_told_in_the_order_of_time_until_the_end():
+    requests = [parse_fault(text) for text in ("zed@50-120", "zed:dark@20-30", "lidar@25")]
+    changes = changes_of(spans_of(requests, begun_s=0.0, lift_off_s=10.0, ended_s=100.0), 100.0, "mock")
+    told = [(change.sensor, change.mode, change.t_s) for change in changes]
+    assert told == [("zed", "dark", 30.0), ("lidar", "mock", 35.0), ("zed", MENDED, 40.0), ("zed", "mock", 60.0)]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from alula_common.faults import FaultError, FaultRequest, parse_fault
+from alula_common.robots import behaviour_files
 from alula_common.scenarios import ScenarioError, load_scenario
 from alula_common.suggestions import nearest
 from mission_replay.fitting import fitted
@@ -112,10 +112,9 @@ def _number(recorded: Recorded, name: str, value: object) -> float:
 def behaviour_for(recorded: Recorded, skillsets: Sequence[Skillset], files: Sequence[Path]) -> Behaviour:
     """Return what mocks do where the record has no answer: as the record fits, then the files, then the drone's own."""
     names = frozenset(skillset.name for skillset in skillsets)
-    shipped = Path(os.environ.get("ALULA_ROOT", ".")) / "skillsets" / "uav" / "mock.yaml"
     robot = [importlib.import_module(f"{name}_managers.model").SKILLSET for name in ROBOT]
     try:
-        own = load_behaviour([shipped, *files], robot).of(names)
+        own = load_behaviour([*behaviour_files(names), *files], robot).of(names)
     except SkillRuntimeError as error:
         raise ReplayError(str(error)) from error
     return replace(fitted(recorded).over(own), faults=own.faults)
@@ -130,10 +129,3 @@ def faults_for(behaviour: Behaviour, texts: Sequence[str]) -> list[FaultRequest]
     except (FaultError, SkillRuntimeError) as error:
         raise ReplayError(f"--fail: {error}") from error
     return faults
-
-
-def changes(options: Mapping[str, object]) -> list[str]:
-    """Return what is not as it was, in words."""
-    return [
-        f"--{name} {value}" for name, values in options.items() for value in (values if isinstance(values, list) else [values]) if value
-    ]

@@ -100,6 +100,22 @@ class Recorded:
         return "" if outcome == "running" else outcome
 
     @property
+    def begun_s(self) -> float:
+        """When the record begins, seconds of mission clock."""
+        return min(entry.stamp_s for entry in self.entries)
+
+    @property
+    def lift_off_s(self) -> float | None:
+        """When the vehicle lifted off, seconds of mission clock; None: never."""
+        lift_off_s = self.mission.get("lift_off_s")
+        return float(lift_off_s) if isinstance(lift_off_s, int | float) else None
+
+    @property
+    def zero_s(self) -> float:
+        """What times count from: lift-off, or the record's beginning where there was none."""
+        return self.begun_s if self.lift_off_s is None else self.lift_off_s
+
+    @property
     def started(self) -> bool:
         """Tell whether the mission ever began."""
         return any(entry.topic == TICKS and not entry.value.get("unmet") for entry in self.entries)

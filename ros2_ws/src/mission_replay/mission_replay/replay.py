@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from alula_common.faults import FaultRequest
 from alula_common.record import OPERATOR, TICKS, Entry
 from mission_replay.comparison import Comparison, Difference
 from mission_replay.recorded import Decision, Knowledge, Recorded, ReplayError
@@ -29,16 +30,17 @@ from skill_runtime.plain import to_plain
 
 TICK_PERIOD_S = 0.1
 LIMIT_S = 3600.0
+"""Mission clock after the record's end, after which a mission that goes round in circles is left."""
 MAX_GAP_S = 86400.0
 """A mission ticks, so a longer silence is a damaged stamp; virtual time would take minutes or years to get there."""
-"""Mission clock after the record's end, after which a mission that goes round in circles is left."""
 
 
 @dataclass(frozen=True)
 class Result:
     """What came of a replay: its decisions, the first difference, and how it ended, None where it was stopped before.
 
-    ``faults``: what failed that had not, and when; seconds of mission clock, as ``lift_off_s``, which is known with a record only.
+    ``faults``: what was to fail that had not; ``first_s``: when mocks say that each came first, by its name in their behaviour, seconds of
+    mission clock, as ``lift_off_s``, which is known with a record only.
     """
 
     decisions: Sequence[Decision]
@@ -48,7 +50,8 @@ class Result:
     simulated_s: float
     wall_s: float
     lift_off_s: float | None
-    faults: Mapping[str, float]
+    faults: Sequence[FaultRequest]
+    first_s: Mapping[str, float]
 
 
 class ReplayClient(MissionClient):
@@ -126,9 +129,17 @@ class Replay:
             end = self.director.end or End(Outcome.RUNNING)
             self._record.finish(end, self.director, self._world.now_s)
         notes = [*self._world.errors, *self.vehicle.host.notes]
-        wall_s, lift_off_s = time.monotonic() - begun, None if self._record is None else self._record.departure_s
-        told = (self._world.now_s, wall_s, lift_off_s, dict(self.vehicle.robot.faults))
-        return Result(self.decisions, self._comparison.difference, self.director.end, notes, *told)
+        return Result(
+            decisions=self.decisions,
+            difference=self._comparison.difference,
+            end=self.director.end,
+            notes=notes,
+            simulated_s=self._world.now_s,
+            wall_s=time.monotonic() - begun,
+            lift_off_s=None if self._record is None else self._record.departure_s,
+            faults=self.vehicle.faults,
+            first_s=dict(self.vehicle.robot.faults),
+        )
 
     # --- what the record says ----------------------------------------------------------------------------------------
 

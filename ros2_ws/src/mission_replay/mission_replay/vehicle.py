@@ -100,6 +100,7 @@ class Vehicle:
         self.host = ReplayHost(self.world)
         self.robot = MockRobot(replace(behaviour, timeline=()), self.host)
         self.handles: dict[str, SkillHandle] = {}
+        self.faults: list[FaultRequest] = []
         self.differs: Callable[[str], None] = lambda _: None
         """Is told, in words, what was not done then, below the decisions of the tree."""
         rules = [rule for found in behaviour.rules.values() for rule in found]
@@ -111,6 +112,7 @@ class Vehicle:
     def fail(self, request: FaultRequest) -> None:
         """Have a fault happen that was not recorded; raises SkillRuntimeError where there is none."""
         self.robot.fail(request)
+        self.faults.append(request)
 
     def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
         """Take note of a request; ``then``: the same one in the record, None where there is none."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula_common.faults import FaultError, FaultRequest
+from alula_common.robots import behaviour_files
 from alula_common.scenarios import Scenario, ScenarioError, load_scenario
 from run_analysis.errors import AnalysisError
 from run_analysis.tree import Places, tip_of
@@ -76,7 +77,7 @@ def load_flights(name: str, behaviour: Sequence[Path] = ()) -> MockFlights:
     try:
         scenario = load_scenario(name)
         route = load_route(root / "ros1_ws" / "src" / "uav_simulator" / "worlds" / f"{scenario.world}.yaml")
-        files = [root / "skillsets" / "uav" / "mock.yaml", *behaviour]
+        files = [*behaviour_files(scenario.skillsets), *behaviour]
         known = load_behaviour(files, drone()).of(frozenset(scenario.skillsets))
     except (ScenarioError, RouteError, SkillRuntimeError) as error:
         raise AnalysisError(str(error)) from None

@@ -7,15 +7,19 @@ import math
 import pytest
 
 from alula_common.faults import parse_fault
+from alula_common.record import REPORTS, Entry
 from run_analysis.campaign.flying import fly
 from run_analysis.campaign.plan import MOCKS, Flight
 from run_analysis.causes.answers import answer_to_fault
-from run_analysis.causes.faults import Fault, RunTimes, faults_asked, trace
-from run_analysis.causes.reach import reach_of
+from run_analysis.causes.fault_file import reaches_of
+from run_analysis.causes.faults import Fault, faults_asked, trace
+from run_analysis.causes.reach import Reaches
+from run_analysis.causes.told_ends import with_told_ends
 from run_analysis.tree import Places
 from skill_model.execution_state import ExecutionState as S
 from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 
+DRONE = reaches_of(["navigation"])
 VIOLATED, TERMINATED, NOT_READY = S.RESOURCE_INVARIANT_VIOLATED, S.TERMINATED, S.NOT_READY
 
 
@@ -39,7 +43,7 @@ def zed_breaks(at_s, number=1):
 
 
 def faults(*several):
-    return [Fault(name, at_s, until_s, reach_of(name)) for name, at_s, until_s in several]
+    return [Fault(name, at_s, until_s, DRONE.of(name)) for name, at_s, until_s in several]
 
 
 def told(several, *parts):
@@ -108,18 +112,46 @@ def test_a_fault_that_is_not_known_reaches_what_has_its_name():
     assert told([("slam", 5.0, math.inf)], BLOCKED) == [(None, [])]
 
 
-def asked(*texts, lift_off_s=10.0, ended_s=100.0, told=None):
-    times = RunTimes(0.5, lift_off_s, ended_s)
-    return [(str(request), fault.at_s, fault.until_s) for request, fault in faults_asked([*map(parse_fault, texts)], times, told)]
+def test_faults_come_when_they_were_asked_for_and_reach_what_the_behaviour_says():
+    events = [
+        change(0.5, "navigation.flight_status", "ON_GROUND", "IN_AIR"),
+        change(100.0, "navigation.flight_status", "IN_AIR", "ON_GROUND"),
+    ]
+    requests = [parse_fault(text) for text in ("zed:dark@50", "zed@20-30", "lidar@95")]
+    found = faults_asked(requests, events, 10.0, DRONE)
+    assert [(str(one), fault.name, fault.at_s, fault.until_s) for one, fault in found] == [
+        ("zed@20-30", "zed", 30.0, 40.0),
+        ("zed:dark@50", "zed:dark", 60.0, math.inf),
+    ]
+    assert all(fault.reach == DRONE.of("zed") for _, fault in found)
+    assert faults_asked(requests, [], 10.0, DRONE) == []
 
 
-def test_faults_come_when_they_were_asked_for_and_not_after_the_run():
-    assert asked("zed@50", "zed@20-30", "lidar@95") == [("zed@20-30", 30.0, 40.0), ("zed@50", 60.0, math.inf)]
-    assert asked("zed", "lidar@3") == [("zed", 0.5, math.inf), ("lidar@3", 13.0, math.inf)]
-    assert asked("zed", "lidar@3", lift_off_s=None) == [("zed", 0.5, math.inf)], "nothing has lifted off"
-    counted = {"zed:dark": 32.0, "zed": 0.2}
-    assert asked("zed:dark@20-21", "zed:dark@40", told=counted) == [("zed:dark@20-21", 32.0, 33.0), ("zed:dark@40", 52.0, math.inf)]
-    assert asked("zed", "zed@20", told=counted) == [("zed", 0.2, math.inf), ("zed@20", 30.0, math.inf)]
+def test_the_end_of_an_execution_whose_managers_have_gone_is_what_the_mission_was_told():
+    begun, ended = (
+        started(4.0, "perception.zed_depthmap"),
+        [*started(5.0, "mapping.lidar_mapping"), end(9.0, "mapping.lidar_mapping", TERMINATED)],
+    )
+    later = change(31.0, "perception.zed_status", "UNKNOWN", "OK")
+
+    def report(at_s, name, state, number=1):
+        skillset, skill = name.split(".")
+        said = {"skillset": skillset, "skill": skill, "id": f"{skill} {number}", "state": state, "message": "the managers have gone"}
+        return Entry(REPORTS, round(at_s * 1e9), said)
+
+    reports = [report(30.0, "perception.zed_depthmap", state) for state in ("RUNNING", "FAILED", "FAILED")]
+    reports += [report(9.1, "mapping.lidar_mapping", "TERMINATED"), report(30.0, "perception.lidar_depthmap", "FAILED", 2)]
+    known = with_told_ends([*begun, *ended, later], reports)
+    (told,) = [event for event in known if event not in [*begun, *ended, later]]
+    assert known.index(told) == len(known) - 2
+    assert (told.stamp_s, told.skillset, told.skill, told.state) == (30.0, "perception", "zed_depthmap", S.FAILED)
+    (traced,) = trace([Fault("perception", 29.5, reach=DRONE.of("perception"))], known)
+    assert (traced.detected_s, [one.end for one in traced.failures]) == (30.0, [told])
+
+
+def test_a_robot_without_a_file_has_the_rule_by_names():
+    assert reaches_of(["somewhere_else"]) == Reaches()
+    assert Reaches().of("zed").states == {"*.zed_status *"}
 
 
 FLOWN = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,8 @@ from alula_common.scenarios import load_scenario
 from run_analysis.campaign.flying import fly
 from run_analysis.campaign.plan import SIMULATOR, Flight, load_campaign
 
-CAMPAIGNS = Path(os.environ["ALULA_ROOT"]) / "tests/campaigns"
+ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
+CAMPAIGNS = ALULA_ROOT / "tests/campaigns"
 SUMMARY = """{"outcome": "degraded", "reason": "zed", "landed": true, "collisions": 0, "min_clearance_m": 1.2, "problems": [],
  "skills": [{"id": "a", "end_s": 3.0}, {"id": "b", "end_s": null}], "died": [{"name": "zed_depth", "when_s": 7.0, "how": "exit code 1"}]}"""
 FLY = """#!/bin/sh
@@ -32,6 +34,8 @@ def recorded_flights(tmp_path, monkeypatch):
     (tmp_path / "summary.json").write_text(SUMMARY, encoding="utf-8")
     (tmp_path / "recorded").mkdir()
     fly_recorded(tmp_path / "recorded", "zed@6")
+    for folder in ("scenarios", "skillsets", "ros1_ws"):
+        (tmp_path / folder).symlink_to(ALULA_ROOT / folder)
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
     monkeypatch.setenv("RECORDING", str(tmp_path / "recorded"))
     return tmp_path
@@ -51,6 +55,20 @@ def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_f
     assert answers["zed"] == answers["perception.zed_status OK -> BROKEN"] == "LiDAR navigation"
     assert answers["lidar"] == answers["zed_depth"] == "not detected"
     assert (failed["outcome"], failed["reason"], failed["exit_code"], failed["failures"]) == ("not_started", "no free domain", 2, [])
+
+
+def test_managers_that_died_are_answered_by_what_the_mission_was_told(recorded_flights, tmp_path):
+    shutil.rmtree(recorded_flights / "recorded")
+    (recorded_flights / "recorded").mkdir()
+    mission = fly_recorded(recorded_flights / "recorded", kill=("perception", 20.0))
+    lift_off_s = mission.departure_s
+    died = [{"name": name, "when_s": 20.0 - lift_off_s, "how": "signal SIGKILL"} for name in ("perception", "lidar_mapping")]
+    summary = {"outcome": "given_up", "reason": "the managers have gone", "landed": True, "skills": [], "died": died}
+    (recorded_flights / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    (row,) = fly([Flight(4, "mapping", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
+    answers = {one["name"]: (one["answered_by"], one["skill"]) for one in row["failures"] if one["kind"] == "process"}
+    assert answers == {"perception": ("given up", "navigation.hover"), "lidar_mapping": ("not detected", "not detected")}
+    assert row["conforms"] is True
 
 
 def test_a_flight_in_which_no_skill_was_started_keeps_its_own_reason(recorded_flights, tmp_path):

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula_common.faults import FaultError, parse_fault
+from alula_common.faults import FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula_common.files import write_json
 from alula_common.scenarios import ScenarioError, load_scenario
 from skill_missions.director import EXIT_CODES, End, Outcome
@@ -25,6 +25,8 @@ from uav_missions.plan import ROBOT, plan_of, write_route
 from uav_missions.route import Route, RouteError, load_route
 
 CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
+MOCK = "mock"
+"""The mode of what failed in mocks without a word for the way of failing."""
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -44,8 +46,8 @@ def drone(names: Sequence[str] = ROBOT) -> list[Skillset]:
     return [importlib.import_module(f"{name}_managers.model").SKILLSET for name in names]
 
 
-def prepare(options: argparse.Namespace) -> tuple[MockedMission, Route]:
-    """Read what the flight needs.
+def prepare(options: argparse.Namespace) -> tuple[MockedMission, Route, list[FaultRequest]]:
+    """Read what the flight needs; return the mission, its route, and what is to fail.
 
     Raises:
         FaultError, ScenarioError, SkillRuntimeError, RouteError: a fault or one of the files, or a fault that the behaviour has not.
@@ -57,18 +59,20 @@ def prepare(options: argparse.Namespace) -> tuple[MockedMission, Route]:
         behaviour.fault(request)
     plan = plan_of(scenario, route)
     options.out.mkdir(parents=True, exist_ok=True)
-    return MockedMission(drone(scenario.skillsets), behaviour, plan, faults=faults, seed=options.seed, out=options.out), route
+    mission = MockedMission(drone(scenario.skillsets), behaviour, plan, faults=faults, seed=options.seed, out=options.out)
+    return mission, route, faults
 
 
-def write_account(path: Path, mission: MockedMission, lift_off_s: float | None) -> None:
+def write_account(path: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
     """Write ``mock.json``; times are mission clock, but for ``wall_s``."""
-    simulated_s = mission.world.now_s
+    simulated_s, lift_off_s = mission.world.now_s, mission.departure_s
+    spans = spans_of(faults, begun_s=0.0, lift_off_s=lift_off_s, ended_s=simulated_s, first_s=mission.robot.faults)
     content = {
         "simulated_s": simulated_s,
         "wall_s": mission.wall_s,
         "factor": simulated_s / mission.wall_s,
         "lift_off_s": lift_off_s,
-        "faults": [{"sensor": name, "mode": "mock", "t_s": when_s} for name, when_s in mission.robot.faults.items()],
+        "faults": [vars(change) for change in changes_of(spans, simulated_s, MOCK)],
         "notes": mission.notes,
     }
     write_json(path, content)
@@ -78,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Fly; return the exit code."""
     options = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        mission, route = prepare(options)
+        mission, route, faults = prepare(options)
         write_route(options.out, route)
     except (FaultError, ScenarioError, SkillRuntimeError, RouteError, OSError) as error:
         sys.stderr.write(f"{error}\n")
@@ -87,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
     end: End = mission.run()
     try:
-        write_account(options.out / "mock.json", mission, mission.departure_s)
+        write_account(options.out / "mock.json", mission, faults)
     except OSError as error:
         sys.stderr.write(f"mock.json could not be written: {error.strerror}\n")
     return EXIT_CODES[end.outcome]

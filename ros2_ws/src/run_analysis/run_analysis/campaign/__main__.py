@@ -13,12 +13,14 @@ from pathlib import Path
 
 from alula_common.files import write_json, write_text
 from alula_common.runs import runs_folder
+from alula_common.scenarios import load_scenario
 from run_analysis.campaign.coverage import Coverage, cover, processes
 from run_analysis.campaign.failures import ways_to_fail
 from run_analysis.campaign.plan import MOCKS, Campaign, load_campaign
 from run_analysis.campaign.running import run
 from run_analysis.campaign.table import ROWS, Table
 from run_analysis.campaign.telling import as_page, as_text
+from run_analysis.causes.fault_file import reaches_of
 from run_analysis.errors import AnalysisError
 from run_analysis.mock_flights import load_flights
 from uav_missions.mock_flight import drone
@@ -41,7 +43,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def check_faults(campaign: Campaign) -> None:
-    """Refuse faults that the mocks of a scenario don't have; raises AnalysisError."""
+    """Refuse faults that the mocks of a scenario don't have, and a robot's file of faults that is wrong; raises AnalysisError."""
+    for name in campaign.scenarios:
+        reaches_of(load_scenario(name).skillsets)
     if campaign.over == MOCKS:
         scenarios = {name: load_flights(name, campaign.behaviour) for name in campaign.scenarios}
         for flight in campaign.flights:

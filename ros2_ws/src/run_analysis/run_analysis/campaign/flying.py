@@ -7,15 +7,18 @@ import json
 import os
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from alula_common.record import RecordError, read_record
+from alula_common.scenarios import load_scenario
 from run_analysis.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
 from run_analysis.campaign.plan import SIMULATOR, Flight
-from run_analysis.causes.faults import Fault, RunTimes, faults_asked
-from run_analysis.causes.reach import reach_of
+from run_analysis.causes.fault_file import reaches_of
+from run_analysis.causes.faults import Fault, faults_asked
+from run_analysis.causes.reach import Reaches
+from run_analysis.causes.told_ends import with_told_ends
 from run_analysis.conformance import Monitor
 from run_analysis.errors import AnalysisError
 from run_analysis.mock_flights import MockFlights, load_flights
@@ -48,7 +51,7 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
     landed = _landed(flown.events)
     found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
     found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
-    return _row(flight, found, _Evidence(flown.events, flown.places, flown.faults, scenario.behaviour), monitor, ways)
+    return _row(flight, found, _Evidence(flown.events, flown.places, first_s=flown.faults, behaviour=scenario.behaviour), monitor, ways)
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
@@ -69,23 +72,33 @@ def _landed(events: Sequence[EngineEvent]) -> bool | None:
 
 @dataclass(frozen=True)
 class _Evidence:
-    """What a flight has left; ``told``: when mocks say that each fault came first; ``behaviour``: theirs."""
+    """What a flight has left.
+
+    Attributes:
+        events: of its managers.
+        places: where in the tree executions were started.
+        known: the events, and the ends that only the mission was told of; None: there are none of these.
+        first_s: when mocks say that each fault came first.
+        behaviour: of the mocks.
+    """
 
     events: Sequence[EngineEvent]
     places: Places
-    told: Mapping[str, float] = field(default_factory=dict)
+    known: Sequence[EngineEvent] | None = None
+    first_s: Mapping[str, float] | None = None
     behaviour: Behaviour | None = None
 
 
 def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
     """Return a row; ``found`` is how the flight went besides its events."""
-    events, origin_s = left.events, origin_of(left.events)
-    for event in events:
+    for event in left.events:
         monitor.take(event)
-    times = RunTimes.of(events, lift_off_of(events))
-    asked = faults_asked(flight.requests, times, left.told, left.behaviour)
+    events = left.events if left.known is None else left.known
+    origin_s = origin_of(events)
+    reaches = _reaches(flight.scenario)
+    asked = faults_asked(flight.requests, events, lift_off_of(events), reaches, first_s=left.first_s, behaviour=left.behaviour)
     begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
-    died = [(Way(PROCESS, one["name"]), _ended(one, times.begun_s, origin_s)) for one in found["died"]]
+    died = [(Way(PROCESS, one["name"]), _ended(one, events, reaches)) for one in found["died"]]
     every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
     every += failures_in(events, ways, left.places)
     return {
@@ -95,15 +108,22 @@ def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Mon
         "faults": list(flight.faults),
         **found,
         "duration_s": round(events[-1].stamp_s - events[0].stamp_s, 6) if events else 0.0,
-        "events": len(events),
+        "events": len(left.events),
         "conforms": monitor.verdict.conforms,
         "failures": [as_dict(failure, origin_s) for failure in every],
     }
 
 
-def _ended(died: Mapping[str, Any], begun_s: float, origin_s: float) -> Fault:
+def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], reaches: Reaches) -> Fault:
     """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
-    return Fault(died["name"], begun_s if died["when_s"] is None else origin_s + died["when_s"], reach=reach_of(died["name"]))
+    begun_s = min((event.stamp_s for event in events), default=0.0)
+    at_s = begun_s if died["when_s"] is None else origin_of(events) + died["when_s"]
+    return Fault(died["name"], at_s, reach=reaches.of(died["name"]))
+
+
+@functools.cache
+def _reaches(scenario: str) -> Reaches:
+    return reaches_of(load_scenario(scenario).skillsets)
 
 
 # --- in the simulator ---------------------------------------------------------------------------------------------------
@@ -128,13 +148,14 @@ def _simulated(flight: Flight, out: Path) -> Row:
         said = (done.stderr.strip() or done.stdout.strip()).splitlines()
         summary = {"outcome": "not_started", "reason": said[-1] if said else ""}
     try:
-        run, places = load_run(folder), places_in(read_record(folder))
+        run, record = load_run(folder), read_record(folder)
     except (AnalysisError, RecordError):  # no skill was ever started
-        run, places = Run(folder, ()), Places()
+        run, record = Run(folder, ()), []
     names = dict.fromkeys(event.skillset for event in run.events)
     ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
     found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
     found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
     found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
     models = models_of(names)
-    return _row(flight, found, _Evidence(run.events, places), Monitor(models), ways_to_fail(models))
+    left = _Evidence(run.events, places_in(record), with_told_ends(run.events, record))
+    return _row(flight, found, left, Monitor(models), ways_to_fail(models))

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from alula_common.faults import FaultRequest
+from alula_common.faults import FaultRequest, spans_of
 from run_analysis.causes.failures import SkillFailure, skill_failures
-from run_analysis.causes.reach import Reach, reach_of
+from run_analysis.causes.reach import Reach, Reaches
 from skill_runtime.core.events import EngineEvent, TransitionEvent
 from skill_runtime.mock import Behaviour
 
@@ -52,59 +52,32 @@ class Traced:
         return None if self.first is None else self.first.stamp_s
 
 
-@dataclass(frozen=True)
-class RunTimes:
-    """When a run began and was over, and when it lifted off (None: never), seconds of mission clock."""
-
-    begun_s: float
-    lift_off_s: float | None
-    ended_s: float
-
-    @classmethod
-    def of(cls, events: Sequence[EngineEvent], lift_off_s: float | None) -> RunTimes:
-        """Return the times of a run's events."""
-        stamps = [event.stamp_s for event in events]
-        return cls(min(stamps, default=0.0), lift_off_s, max(stamps, default=-math.inf))
-
-
 def faults_asked(
-    requests: Sequence[FaultRequest], times: RunTimes, told: Mapping[str, float] | None = None, behaviour: Behaviour | None = None
+    requests: Sequence[FaultRequest],
+    events: Sequence[EngineEvent],
+    lift_off_s: float | None,
+    reaches: Reaches,
+    *,
+    first_s: Mapping[str, float] | None = None,
+    behaviour: Behaviour | None = None,
 ) -> list[tuple[FaultRequest, Fault]]:
     """Return the faults that were asked for and came, with their requests, in the order of time.
 
     Args:
         requests: as on the command line.
-        times: of the run. What was to come later, or after a lift-off that never was, did not come.
-        told: when mocks say that each fault came first, by its name in their behaviour: its time can count from another event.
+        events: of the run.
+        lift_off_s: seconds of mission clock; None: it never lifted off.
+        reaches: of the robot.
+        first_s: what mocks say (see ``alula_common.faults.spans_of``).
         behaviour: of the mocks, which says what the faults reach.
     """
+    stamps = [event.stamp_s for event in events]
+    begun_s, ended_s = min(stamps, default=0.0), max(stamps, default=-math.inf)
     found = []
-    for request in requests:
-        same = [other for other in requests if _name_in(told, other) == _name_in(told, request)]
-        first_s = None if told is None else told.get(_name_in(told, request))
-        at_s, until_s = _span(request, same, first_s, times)
-        if at_s <= times.ended_s:
-            name = f"{request.what}:{request.how}" if request.how else request.what
-            found.append((request, Fault(name, at_s, until_s, reach_of(name, behaviour))))
-    return sorted(found, key=lambda one: one[1].at_s)
-
-
-def _name_in(told: Mapping[str, float] | None, request: FaultRequest) -> str:
-    full = f"{request.what}:{request.how}"
-    return full if told and full in told else request.what
-
-
-def _span(request: FaultRequest, same: Sequence[FaultRequest], first_s: float | None, times: RunTimes) -> tuple[float, float]:
-    """Return from when to when a fault is there; ``first_s``: when the first of the ``same`` came, None: not told."""
-    begins = [other.begin_s for other in same]
-    origin_s = times.lift_off_s
-    if first_s is not None and None not in begins:
-        origin_s = first_s - min(begin for begin in begins if begin is not None)
-    if request.begin_s is None:
-        at_s = times.begun_s if first_s is None else first_s
-    else:
-        at_s = math.inf if origin_s is None else origin_s + request.begin_s
-    return at_s, math.inf if request.end_s is None or origin_s is None else origin_s + request.end_s
+    for span in spans_of(requests, begun_s=begun_s, lift_off_s=lift_off_s, ended_s=ended_s, first_s=first_s):
+        name = f"{span.request.what}:{span.request.how}" if span.request.how else span.request.what
+        found.append((span.request, Fault(name, span.at_s, span.until_s, reaches.of(name, behaviour))))
+    return found
 
 
 def trace(faults: Sequence[Fault], events: Sequence[EngineEvent]) -> list[Traced]:

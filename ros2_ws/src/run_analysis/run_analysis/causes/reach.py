@@ -43,10 +43,6 @@ class Reach:
         """Tell whether an execution can end like this because of it."""
         return _any(self.ends, f"{end.skillset}.{end.skill} {end.result or end.state.value}")
 
-    def __or__(self, other: Reach) -> Reach:
-        """Return what one of both can bring about."""
-        return Reach(self.states | other.states, self.later | other.later, self.ends | other.ends)
-
 
 def _reported(change: TransitionEvent) -> bool:
     return change.cause == EXTERN and change.to_state != WELL
@@ -56,56 +52,25 @@ def _any(patterns: Iterable[str], text: str) -> bool:
     return any(fnmatchcase(text, pattern) for pattern in patterns)
 
 
-def _reach(states: Iterable[str] = (), ends: Iterable[str] = (), later: Iterable[str] = ()) -> Reach:
-    return Reach(frozenset(states), frozenset(later), frozenset(ends))
+@dataclass(frozen=True)
+class Reaches:
+    """What the faults of a robot, and the ends of its processes, can bring about; ``known``: by name, without the way of failing."""
 
+    known: Mapping[str, Reach] = field(default_factory=dict)
 
-_NO_AUTHORITY = "navigation.SDK_authority UNAVAILABLE"
-_CRITERIA = ("video.stream enough_frames", "video.stream good_picture")
-_ZED = _reach(["perception.zed_status BROKEN", "perception.zed_status UNKNOWN"], ["perception.zed_depthmap LOST"])
-_LIDAR_AHEAD = _reach(["perception.lidar_status BROKEN", "perception.lidar_status UNKNOWN"], ["perception.lidar_depthmap LOST"])
-_MAP = _reach(["mapping.slam_status LOST"], ["mapping.lidar_mapping ABORTED"])
-# The control link and the video use the same radio: without it the autopilot flies home by itself.
-_RADIO = _reach(["video.link DOWN"], _CRITERIA, later=[_NO_AUTHORITY])
-_CONTROL = _reach([_NO_AUTHORITY])
-_ENCODER = _reach([], ["video.stream LOST", *_CRITERIA])
-_ALL = _reach([], ["*"])
+    def of(self, name: str, behaviour: Behaviour | None = None) -> Reach:
+        """Return the reach of a fault or a process by its name, as in ``radio`` or ``radio:out``.
 
-KNOWN: Mapping[str, Reach] = {
-    "zed": _ZED,
-    "lidar": _LIDAR_AHEAD | _MAP,
-    "radio": _RADIO,
-    "control": _CONTROL,
-    "pilot": _CONTROL,
-    "encoder": _ENCODER,
-    "ground_station": _RADIO,
-    # Processes by their nodes; of those of the skillsets' managers see ``reach_of``.
-    "zed_depth": _ZED,
-    "lidar_obstacles": _LIDAR_AHEAD,
-    "lidar_mapping": _MAP,
-    "video_stream": _ENCODER,
-    "radio_link": _RADIO,
-    "uav_guidance": _reach([_NO_AUTHORITY], ["navigation.*"]),
-    "ros_bridge": _ALL,
-    "uav_simulator": _ALL,
-    "master": _ALL,
-}
-"""Of the drone: by the name of a fault, without the way of failing, or of a process."""
-
-
-def reach_of(name: str, behaviour: Behaviour | None = None) -> Reach:
-    """Return the reach of a fault or a process by its name, as in ``radio`` or ``radio:out``.
-
-    What is not known here reaches what has its name: the resource ``NAME_status`` and the skillset NAME. A fault that a behaviour of
-    mocks declares brings about the states that are said there.
-    """
-    what = name.partition(":")[0]
-    found = KNOWN.get(what) or _reach([f"*.{what}_status *"], [f"{what}.*"])
-    fault = None if behaviour is None else behaviour.faults.get(name) or behaviour.faults.get(what)
-    if fault is None:
-        return found
-    later = [_named(change.states) for change in fault.changes]
-    return Reach(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
+        What is not known reaches what has its name: the resource ``NAME_status`` and the skillset NAME. A fault that a behaviour of mocks
+        declares brings about the states that are said there.
+        """
+        what = name.partition(":")[0]
+        found = self.known.get(what) or Reach(frozenset([f"*.{what}_status *"]), ends=frozenset([f"{what}.*"]))
+        fault = None if behaviour is None else behaviour.faults.get(name) or behaviour.faults.get(what)
+        if fault is None:
+            return found
+        later = [_named(change.states) for change in fault.changes]
+        return Reach(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
 
 
 def _named(words: Mapping[Place, str]) -> frozenset[str]:

@@ -11,10 +11,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from alula_common.faults import parse_fault
-from mission_replay.__main__ import OTHERWISE
-from mission_replay.kept import first_times
-from run_analysis.causes.faults import RunTimes
+from alula_flight.replay import OTHERWISE
 
 RECORDING = Path(os.environ["ALULA_ROOT"]) / "tests/recordings/mapping"
 
@@ -22,7 +19,7 @@ RECORDING = Path(os.environ["ALULA_ROOT"]) / "tests/recordings/mapping"
 @pytest.mark.parametrize("on", [True, False])
 def test_a_replay_leaves_what_a_flight_leaves(on, tmp_path):
     out = tmp_path / "changed"
-    words = [sys.executable, "-m", "mission_replay", str(RECORDING), "--fail", "zed@6", "--out", str(out), *(["--on"] if on else [])]
+    words = [sys.executable, "-m", "alula_flight.replay", str(RECORDING), "--fail", "zed@6", "--out", str(out), *(["--on"] if on else [])]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == OTHERWISE, done.stderr
     summary, timeline = (json.loads((out / f"{name}.json").read_text()) for name in ("summary", "timeline"))
@@ -37,9 +34,3 @@ def test_a_replay_leaves_what_a_flight_leaves(on, tmp_path):
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "mapping, failing zed@6, replay of mapping" in page
     assert "DecompressionStream" in page
-
-
-def test_of_several_faults_of_a_sensor_the_account_has_when_the_first_came():
-    times = RunTimes(begun_s=1.0, lift_off_s=10.0, ended_s=40.0)
-    spoiled = [parse_fault(text) for text in ("zed:dark@20-22", "zed@5-6", "lidar", "lidar@90", "zed:late@90")]
-    assert first_times(spoiled, times) == {"lidar": 1.0, "zed": 15.0}

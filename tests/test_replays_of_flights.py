@@ -11,14 +11,21 @@ from pathlib import Path
 
 import pytest
 
+import alula_flight.replay
 from alula_common.record import DECISIONS, FILE, MISSION, read_record
-from mission_replay.__main__ import CANNOT_REPLAY, OTHERWISE, SAME, main
+from alula_flight.replay import CANNOT_REPLAY, OTHERWISE, SAME, main
 from uav_missions import mapping
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 RECORDINGS = ALULA_ROOT / "tests" / "recordings"
 FLIGHTS = sorted(path.parent.name for path in RECORDINGS.glob("*/skills.mcap"))
 OTHERS = ALULA_ROOT.parent / "shared" / "data" / "bags"
+
+
+@pytest.fixture(autouse=True)
+def without_report(monkeypatch):
+    """Make no report of a replay: seconds each; ``test_replays_kept`` has those that are made."""
+    monkeypatch.setattr(alula_flight.replay, "make_report", lambda *_: None)
 
 
 def decided(run: Path) -> list[tuple]:

@@ -1,0 +1,22 @@
+"""The perception's nodes, by name; imports no ROS, so that both worlds can tell which settings are theirs."""
+
+from __future__ import annotations
+
+NODES = {
+    "zed_depth": ("ZedDepthNode", "ZedSettings"),
+    "lidar_obstacles": ("LidarObstaclesNode", "LidarSettings"),
+    "lidar_mapping": ("LidarMappingNode", "MappingSettings"),
+}
+"""The nodes that perceive: by package, the classes of node and settings in its module ``node``."""
+
+
+def is_setting(text: str) -> bool:
+    """Tell whether ``NODE.NAME=VALUE`` is about one of the nodes, and not a parameter of the mission."""
+    return node_and_parameter(text)[0] in NODES
+
+
+def node_and_parameter(text: str) -> tuple[str, str]:
+    """Return what ``NODE.NAME=VALUE`` names, a skillset before it left out."""
+    name = text.partition("=")[0]
+    node, _, parameter = name.removeprefix("perception.").removeprefix("mapping.").partition(".")
+    return node, parameter
