@@ -121,6 +121,7 @@ SENSORS: Mapping[str, Thin | None] = {
     "/lidar/points": smaller_cloud,
     "/imu/data": None,
     "/uav_guidance/pose": None,
+    "/tf": None,
     "/tf_static": None,
 }
 

@@ -22,6 +22,7 @@ SPOOL_UP_S = 2.4
 CLIMB_M_S, SINK_M_S = 1.5, 1.0
 ACCEL_M_S2, TOP_M_S, YAW_RAD_S = 2.5, 5.0, 1.2
 GROUND_DISARM_S, LANDED_DISARM_S = 10.0, 0.5
+CHECK_PERIOD_S = 1.0
 FOLLOWED_MASKS = {0x0DF8, 0x09F8, 0x05F8, 0x01F8, 0x0000}
 HOME = (473977418, 85455939, 488000)
 STABILIZE, GUIDED, LOITER, LAND = 0, 4, 5, 9
@@ -50,6 +51,8 @@ class FakeVehicle:
         self.refuse_arming = ""
         self.deaf = False
         self.stuck = False
+        self.position_check_s: float | None = None
+        """Since power-up, when its checks find a position, which GUIDED needs; they run once a second. None: at once, as the others."""
         self.setpoint: tuple[float, float, float, float] | None = None
         self.heartbeats_heard = 0
         self._send = send
@@ -59,6 +62,8 @@ class FakeVehicle:
         self._climb_to: float | None = None
         self._late_text: tuple[float, str] | None = None
         self._booted_s = 0.0
+        self._told_ready = False
+        self._checked_s = -math.inf
         self._armed_s = self._touched_s = self._heartbeat_s = 0.0
 
     @property
@@ -74,6 +79,7 @@ class FakeVehicle:
         """The autopilot's computer restarts in the air: streams, boot time, what it was told, and where it counts from."""
         self.forget_streams()
         self._booted_s = self.now_s
+        self.body.armed = self.body.armed and self.body.landed != 1
         self._change_mode(mode)
         self.body.place = [0.0, 0.0, self.body.place[2]]
 
@@ -82,6 +88,8 @@ class FakeVehicle:
 
     def tick(self) -> None:
         self.now_s += TICK_S
+        if self.position_check_s is None or self.now_s - self._checked_s >= CHECK_PERIOD_S:
+            self._checked_s, self._told_ready = self.now_s, self.ready
         self._move()
         self._speak()
 
@@ -162,6 +170,8 @@ class FakeVehicle:
 
     @property
     def ready(self) -> bool:
+        if self.body.mode == GUIDED and self.position_check_s is not None and self.now_s < self._booted_s + self.position_check_s:
+            return False
         return self.now_s >= self._ready_from_s
 
     def _move(self) -> None:
@@ -230,7 +240,7 @@ class FakeVehicle:
         elif number == mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE:
             self._send(mavlink.MAVLink_extended_sys_state_message(0, body.landed))
         elif number == mavlink.MAVLINK_MSG_ID_SYS_STATUS:
-            health = 0x10000000 if self.ready else 0
+            health = 0x10000000 if self._told_ready else 0
             self._send(mavlink.MAVLink_sys_status_message(0x10000000, 0x10000000, health, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
         elif number == mavlink.MAVLINK_MSG_ID_HOME_POSITION and self.ready:
             self._send_home()

@@ -36,9 +36,8 @@ def test_the_authority_is_of_use_once_there_is_a_position(flight):
 
 
 def test_checks_that_fail_again_on_the_ground_take_nothing_away(flight):
-    flight.until(lambda r: r.authority and r.vehicle.ready)
-    flight.run(0.2)
-    flight.guidance.vehicle = replace(flight.guidance.vehicle, ready=False)
+    flight.until(lambda _: flight.guidance.resources().get("SDK_authority") == "AVAILABLE")
+    flight.guidance.odometry = replace(flight.guidance.odometry, ready=False)
     flight.withheld = {"SYS_STATUS"}
     flight.run(1.0)
     assert flight.guidance.resources()["SDK_authority"] == "AVAILABLE"

@@ -17,13 +17,14 @@ from dynamic_reconfigure.client import Client  # noqa: E402
 from dynamic_reconfigure.encoding import encode_config  # noqa: E402
 from dynamic_reconfigure.msg import Config  # noqa: E402
 from dynamic_reconfigure.srv import Reconfigure  # noqa: E402
-from geometry_msgs.msg import Point, PoseStamped  # noqa: E402
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, TransformStamped, Vector3  # noqa: E402
 from guidance_fake_autopilot import GUIDED, LAND, LOITER, FakeAutopilot  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from skillset_interfaces.msg import ResourceState, ResourceStates  # noqa: E402
 from skillset_interfaces.srv import Transition, TransitionRequest, TransitionResponse  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
-from uav_msgs.msg import GuidanceState, Obstacle  # noqa: E402
+from tf2_msgs.msg import TFMessage  # noqa: E402
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle  # noqa: E402
 from uav_msgs.srv import (  # noqa: E402
     CheckFence,
     Command,
@@ -115,6 +116,46 @@ class Bench:
     def _show(self) -> None:
         resources = [ResourceState(name=name, state=state) for name, state in self.resources.items()]
         self._shown.publish(ResourceStates(skillset="navigation", resources=resources))
+
+
+class Mapping:
+    """A mapping beside the flight: tells T_map_odom, a shift, each time that the guidance tells its state."""
+
+    def __init__(self) -> None:
+        self.shift = Vector3(0.0, 0.0, 0.0)
+        self.problem = ""
+        self.heard: list[TransformStamped] = []
+        self._states = rospy.Publisher("/lidar_mapping/state", MappingState, queue_size=5, latch=True)
+        self._transforms = rospy.Publisher("/tf", TFMessage, queue_size=5)
+        self._subscribers = [
+            rospy.Subscriber("/uav_guidance/state", GuidanceState, self._tell),
+            rospy.Subscriber("/tf", TFMessage, self._hear),
+        ]
+
+    @property
+    def guidance_map(self) -> Vector3:
+        """Where the origin of the map that the guidance flies by lies in odom."""
+        return next(t.transform.translation for t in reversed(self.heard) if t.child_frame_id == "guidance_map")
+
+    def close(self) -> None:
+        for each in (*self._subscribers, self._states, self._transforms):
+            each.unregister()
+
+    def _tell(self, state: GuidanceState) -> None:
+        transform = TransformStamped(header=Header(stamp=state.header.stamp, frame_id="map"), child_frame_id="odom")
+        transform.transform.translation, transform.transform.rotation = self.shift, Quaternion(0.0, 0.0, 0.0, 1.0)
+        self._transforms.publish(TFMessage(transforms=[transform]))
+        self._states.publish(MappingState(header=Header(stamp=state.header.stamp), running=True, problem=self.problem))
+
+    def _hear(self, message: TFMessage) -> None:
+        self.heard.extend(message.transforms)
+
+
+@pytest.fixture
+def mapping() -> Iterator[Mapping]:
+    mapping = Mapping()
+    yield mapping
+    mapping.close()
 
 
 @pytest.fixture
@@ -269,3 +310,48 @@ def test_respawned_in_flight_it_hovers_where_it_is(bench):
     assert [entry for entry in bench.autopilot.transcript if entry[0] != "setpoints"] == sent
     assert bench.call("land", Command).accepted
     bench.until(lambda s: s.landed_state == 1 and not s.armed, "landed")
+
+
+def test_flies_by_the_map_and_its_pose_stays_the_autopilots(bench, mapping):
+    bench.take_off()
+    mapping.shift = Vector3(0.0, 0.8, 0.0)
+    answer = bench.call("set_position", SetPositionReference, Point(6.0, 0.0, 3.0), 1.5, KEEP)
+    bench.until(lambda s: s.reference_id == answer.reference_id and s.distance_to_go_m < 0.1, "at the place of the map")
+    bench.until(lambda _: abs(mapping.guidance_map.y + 0.8) < 0.001, "the correction is followed to its end")
+    wait_until(lambda: bench.autopilot.enu == pytest.approx((6.0, -0.8, 3.0), abs=0.15), timeout_s=10.0, what="there")
+    assert bench.state.position_enu_m.y == pytest.approx(0.0, abs=0.15)
+    assert bench.poses[-1].pose.position.y == pytest.approx(-0.8, abs=0.15)
+    assert (bench.state.header.frame_id, bench.poses[-1].header.frame_id) == ("map", "odom")
+    assert {(t.header.frame_id, t.child_frame_id) for t in mapping.heard} == {
+        ("map", "odom"),
+        ("odom", "base_link"),
+        ("odom", "guidance_map"),
+    }
+
+    mapping.problem = "no scan fitted the map for 2.1 s"
+    bench.until(lambda s, from_s=bench.autopilot.now_s: s.header.stamp.to_sec() > from_s + 1.0, "the mapping is lost")
+    mapping.shift = Vector3(30.0, 0.0, 0.0)
+    bench.until(lambda s, from_s=bench.autopilot.now_s: s.header.stamp.to_sec() > from_s + 2.0, "two seconds more")
+    assert mapping.guidance_map.y == pytest.approx(-0.8)
+
+    mapping.problem, mapping.shift = "", Vector3(0.0, 0.8, 0.0)
+    client = Client("/uav_guidance", timeout=20.0)
+    assert client.update_configuration({"follow_map": False})["follow_map"] is False
+    bench.until(lambda _: mapping.guidance_map.y == 0.0, "it flies by the autopilot's position")
+    client.close()
+
+
+def test_respawned_in_flight_it_begins_with_the_newest_correction(bench, mapping):
+    bench.take_off()
+    mapping.shift = Vector3(0.0, 0.8, 0.0)
+    bench.until(lambda _: abs(mapping.guidance_map.y + 0.8) < 0.001, "the correction is followed to its end")
+    place = bench.autopilot.enu
+    bench.node.kill()
+    bench.node.wait()
+    bench.states.clear()
+    mapping.heard.clear()
+    bench.run_node()
+    bench.until(lambda s: s.authority and s.reference == "hover" and s.position_enu_m.y > -0.2, "hovering, and it knows where")
+    followed = {round(t.transform.translation.y, 3) for t in mapping.heard if t.child_frame_id == "guidance_map"}
+    assert followed <= {0.0, -0.8}, "at once, not evenly"
+    assert math.dist(bench.autopilot.enu, place) < 0.3

@@ -24,6 +24,7 @@ class Authority:
     _land_asked: bool = False
     _land_seen: bool = False
     _start_settled: bool = False
+    _flown: bool = False
 
     def ask_land(self) -> None:
         """Note that the companion itself asks for LAND, before it does."""
@@ -34,7 +35,8 @@ class Authority:
         self._land_asked = False
 
     def update(self, vehicle: Vehicle, *, link: bool) -> Change:
-        """Judge by the mode of the last heartbeat."""
+        """Judge by the mode of the last heartbeat; ``link``: it holds."""
+        self._flown |= vehicle.off_ground
         self._land_seen |= self._land_asked and vehicle.mode == Mode.LAND
         if vehicle.mode not in {Mode.GUIDED, Mode.LAND} or (self._land_seen and vehicle.mode != Mode.LAND):
             self._land_asked = self._land_seen = False
@@ -45,12 +47,16 @@ class Authority:
         return Change.GAINED if self.held else Change.LOST
 
     def wants_start(self, vehicle: Vehicle, *, link: bool) -> bool:
-        """Return whether to take GUIDED now, once in a node's life: ready, on the ground, disarmed, and not flown before."""
+        """Return whether to take GUIDED now, once after a start of the node or the autopilot: ready, on the ground, not flown before."""
         if self._start_settled or not link:
             return False
         if vehicle.armed or self.held or vehicle.off_ground:
             self._start_settled = True
         return not self._start_settled and vehicle.ready and vehicle.on_ground
+
+    def start_over(self) -> None:
+        """Note that the autopilot has restarted: GUIDED may be taken again, unless the vehicle has flown."""
+        self._start_settled = self._flown
 
     def settle_start(self) -> None:
         """Note that GUIDED was asked for, and answered."""

@@ -22,7 +22,7 @@ LONGEST_STEP_S = 0.2  # after a pause of the clock or the link the carrot must n
 
 @dataclass(frozen=True)
 class Setpoint:
-    """Where the vehicle should be now, and its heading: `map`, metres, radians."""
+    """Where the vehicle should be now, and its heading: metres, radians; the guidance sends it in `odom`."""
 
     position_enu_m: Vec3
     yaw_rad: float
@@ -74,6 +74,15 @@ class Follower:
         self._still.restart(now_s)
         if reference is not None:
             reference.accept(vehicle, self.heading)
+
+    def begin_again(self, vehicle: Vehicle, now_s: float) -> None:
+        """Follow the same reference from where the vehicle is now: its place in `map` has jumped, the vehicle has not."""
+        self.heading.carrot.yaw_rad = vehicle.yaw_rad
+        self.streaming = False
+        self._last_setpoint_s = -math.inf
+        self._still.restart(now_s)
+        if self.reference is not None:
+            self.reference.accept(vehicle, self.heading)
 
     def lock_heading(self, yaw_rad: float, rate_rad_s: float, now_s: float) -> None:
         """Turn to a heading and keep it, whatever is followed."""

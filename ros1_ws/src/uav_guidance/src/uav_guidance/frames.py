@@ -66,8 +66,31 @@ def turned(quaternion: Quaternion, rates_body: Vec3, duration_s: float) -> Quate
     if abs(half) < 1e-9:
         return quaternion
     axis = rates_body * (math.sin(half) / speed)
-    bx, by, bz, bw = axis.x, axis.y, axis.z, math.cos(half)
-    ax, ay, az, aw = quaternion
+    return product(quaternion, (axis.x, axis.y, axis.z, math.cos(half)))
+
+
+def turned_about_vertical(quaternion: Quaternion, yaw_rad: float) -> Quaternion:
+    """Return an attitude (x, y, z, w) in a frame that is turned clockwise by this angle."""
+    return product((0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0)), quaternion)
+
+
+def yaw_of(quaternion: Quaternion) -> float:
+    """Return the heading of an attitude (x, y, z, w)."""
+    x, y, z, w = quaternion
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def rotated(quaternion: Quaternion, vector: Vec3) -> Vec3:
+    """Return a vector turned by a unit quaternion (x, y, z, w)."""
+    x, y, z, w = quaternion
+    turned_x, turned_y, turned_z, _ = product(product(quaternion, (vector.x, vector.y, vector.z, 0.0)), (-x, -y, -z, w))
+    return Vec3(turned_x, turned_y, turned_z)
+
+
+def product(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Return the rotation (x, y, z, w) that turns by the second, then by the first."""
+    ax, ay, az, aw = first
+    bx, by, bz, bw = second
     return (
         aw * bx + ax * bw + ay * bz - az * by,
         aw * by - ax * bz + ay * bw + az * bx,

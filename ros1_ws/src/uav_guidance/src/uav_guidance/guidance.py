@@ -1,6 +1,7 @@
 """The guidance's state machine: requests, what the vehicle says and the time go in; commands and setpoints come out.
 
-Everything is in `map` (ENU, metres), times are seconds of the mission clock. Nothing here blocks, nothing here knows of ROS or sockets.
+Everything is in `map` (ENU, metres); only what the autopilot says and is told is in its own frame, `odom`, and is converted where it comes
+in and goes out. Times are seconds of the mission clock. Nothing here blocks, nothing here knows of ROS or sockets.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from typing import Any
 from uav_guidance.authority import Authority, Change
 from uav_guidance.commands import Command, Procedure, arm, disarm, set_mode, take_off
 from uav_guidance.follower import Course, Follower, Setpoint
+from uav_guidance.frames import wrap
+from uav_guidance.localization import Correction, Localization, Transform
 from uav_guidance.obstacles import Sighting
 from uav_guidance.references import Hold, Land, Reference, Takeoff, Travel, Turn
 from uav_guidance.requests import (
@@ -35,11 +38,12 @@ from uav_guidance.requests import (
 )
 from uav_guidance.settings import Settings
 from uav_guidance.vectors import Vec3
-from uav_guidance.vehicle import Landed, Mode, Vehicle, mode_name, updated
+from uav_guidance.vehicle import Landed, Mode, Vehicle, in_map, mode_name, updated
 
 log = logging.getLogger(__name__)
 
 PREARM_PREFIX = "PreArm: "
+CHECKS_S = 1.5  # from a change of mode until SYS_STATUS tells what it did to the autopilot's checks, which run once a second
 
 
 @dataclass(frozen=True)
@@ -57,10 +61,18 @@ class Guidance:
     """Follow one reference at a time, and a heading beside it, as long as the companion has the authority."""
 
     def __init__(self, settings: Settings) -> None:
+        self.odometry = Vehicle()
+        """As the autopilot says, in `odom`."""
         self.vehicle = Vehicle()
+        """The same in `map`."""
         self._settings = settings
+        self._localization = Localization(settings)
+        self._home_map_m: Vec3 | None = None
         self._authority = Authority()
         self._heard_s: float | None = None
+        self._mode_told = False
+        self._gained_s = 0.0
+        self._checks_passed = False
         self._been_ready = False
         self._restarted = False
         self._begun_s: float | None = None
@@ -82,7 +94,13 @@ class Guidance:
     def tune(self, settings: Settings) -> None:
         """Go on with other settings; the reference under way keeps those that it was given with."""
         self._settings = settings
+        self._localization.tune(settings)
         self._follower.tune(settings)
+
+    @property
+    def correction(self) -> Correction:
+        """T_map_odom in use."""
+        return self._localization.correction
 
     # ---- what comes in -------------------------------------------------------------------------------------------------
 
@@ -94,11 +112,16 @@ class Guidance:
             if self._procedure is not None:
                 self._procedure.on_answer(message.command, message.result, now_s)
             return
-        before, self.vehicle = self.vehicle, updated(self.vehicle, message, now_s)
+        before, self.odometry = self.odometry, updated(self.odometry, message, now_s)
+        self._keep_home(before)
+        self.vehicle = in_map(self.odometry, self.correction, self._home_map_m)
         if self.vehicle.boots > before.boots:
             self._start_over(now_s)
         if kind == "HEARTBEAT":
+            self._mode_told = True
             self._check_authority(now_s)
+        elif kind == "SYS_STATUS":
+            self._note_checks(now_s)
 
     def on_text(self, severity: int, text: str) -> None:
         """Take a whole STATUSTEXT of the autopilot."""
@@ -106,6 +129,14 @@ class Guidance:
             self._prearm_text = text.removeprefix(PREARM_PREFIX)
         if self._procedure is not None:
             self._procedure.on_text(severity, text)
+
+    def on_mapping(self, *, running: bool, problem: str, scans: int, now_s: float) -> None:
+        """Take the mapping's state; ``scans`` it has taken since it was started."""
+        self._localization.hear_state(running=running, problem=problem, scans=scans, now_s=now_s)
+
+    def on_transform(self, newest: Transform) -> None:
+        """Take the mapping's T_map_odom."""
+        self._localization.hear_transform(newest)
 
     def on_obstacle(self, sighting: Sighting, now_s: float) -> None:
         """Take a sensor's verdict on the corridor ahead."""
@@ -129,15 +160,16 @@ class Guidance:
     # ---- what goes out -------------------------------------------------------------------------------------------------
 
     def step(self, now_s: float) -> list[Command | Setpoint]:
-        """Go on to this time; return what has to be sent now. To be called at 20 Hz, and whenever something has come in."""
+        """Go on to this time; return what has to be sent now, in `odom`. To be called at 20 Hz, and whenever something has come in."""
+        self._localize(now_s)
         self._check_authority(now_s)
         self._introduce(now_s)
-        self._take_authority_at_start(now_s)
+        self._take_authority_at_start()
         command = self._procedure.due(now_s) if self._procedure is not None else None
         self._drop_what_ended(now_s)
         self._adopt_hover(now_s)
         setpoint = self._follower.step(self.vehicle, now_s, commanded=self._authority.held)
-        return [item for item in (command, setpoint) if item is not None]
+        return [item for item in (command, self._in_odom(setpoint)) if item is not None]
 
     def link(self, now_s: float) -> bool:
         """Return whether anything arrives from the autopilot; heartbeats alone may be seconds apart on a busy machine."""
@@ -147,8 +179,8 @@ class Guidance:
     def resources(self) -> dict[str, str]:
         """Return the states of navigation's resources that the hardware decides; what is not known is left out.
 
-        The authority is of use once the autopilot can fly: with a position, and its checks passed, or armed already. It is not taken
-        away when these checks fail again on the ground, but when the autopilot restarts in flight. Nothing is known before the
+        The authority is of use once the autopilot can fly: with a position, and its checks passed in GUIDED, or armed already. It is not
+        taken away when these checks fail again on the ground, but when the autopilot restarts in flight. Nothing is known before the
         vehicle has introduced itself: a guidance that was started again in flight must not take away from the skills what they rightly
         have, only because it has not heard of it yet.
         """
@@ -262,6 +294,33 @@ class Guidance:
 
     # ---- at each step --------------------------------------------------------------------------------------------------
 
+    def _localize(self, now_s: float) -> None:
+        """Correct where the vehicle is in `map`; where that jumps in flight, the reference begins again from there."""
+        place = self.odometry.position_enu_m
+        if place is None:
+            return
+        jumped = self._localization.step(place, now_s, flying=self.vehicle.armed or not self.vehicle.on_ground)
+        if jumped and self._restarted:  # home, too, counts from the other origin
+            self._set_home()
+        self.vehicle = in_map(self.odometry, self.correction, self._home_map_m)
+        if jumped:
+            self._follower.begin_again(self.vehicle, now_s)
+
+    def _keep_home(self, before: Vehicle) -> None:
+        """Keep where home was in `map` when the autopilot set it: the drift since then has moved its coordinates, not the place."""
+        if self.odometry.home_enu_m != before.home_enu_m:
+            self._set_home()
+
+    def _set_home(self) -> None:
+        home = self.odometry.home_enu_m
+        self._home_map_m = None if home is None else self.correction.to_map(home)
+
+    def _in_odom(self, setpoint: Setpoint | None) -> Setpoint | None:
+        if setpoint is None:
+            return None
+        correction = self.correction
+        return Setpoint(correction.to_odom(setpoint.position_enu_m), wrap(setpoint.yaw_rad - correction.yaw_rad))
+
     def _start_over(self, now_s: float) -> None:
         """Drop what was asked of an autopilot that has restarted since: it has forgotten it, and its origin may be another one.
 
@@ -269,6 +328,8 @@ class Guidance:
         skills get the authority back only when the pilot or the operator gives it: their places may be others now.
         """
         self._restarted = True
+        self._been_ready = self._checks_passed = False
+        self._authority.start_over()
         log.warning("the autopilot has restarted, in %s", mode_name(self.vehicle.mode))
         if self._procedure is not None:
             self._procedure.abort("the autopilot has restarted")
@@ -277,9 +338,12 @@ class Guidance:
 
     def _check_authority(self, now_s: float) -> None:
         """Drop everything when the pilot, a failsafe or a broken link takes the authority away; nothing is taken back."""
-        change = self._authority.update(self.vehicle, link=self.link(now_s))
+        self._mode_told &= self.link(now_s)
+        change = self._authority.update(self.vehicle, link=self._mode_told)
+        if change is not Change.NONE:
+            self._gained_s, self._checks_passed = now_s, False
         vehicle = self.vehicle
-        able = vehicle.located and (vehicle.ready or vehicle.armed or vehicle.off_ground)
+        able = vehicle.located and (self._checks_passed or vehicle.armed or vehicle.off_ground)
         self._been_ready = self._authority.held and (self._been_ready or able)
         self._restarted &= not (vehicle.on_ground and not vehicle.armed)
         if change is not Change.LOST:
@@ -291,11 +355,17 @@ class Guidance:
         self._follower.heading.locked = False
         self._follower.take(None, self.vehicle, now_s)
 
+    def _note_checks(self, now_s: float) -> None:
+        """Note whether the autopilot is ready: said before GUIDED, or just after, it is no promise, for GUIDED alone needs a position."""
+        self._checks_passed = self.vehicle.ready and self._authority.held and abs(now_s - self._gained_s) >= CHECKS_S
+
     def _lost_reason(self, now_s: float) -> str:
         """Return why there is no authority: nothing comes over the link, or the vehicle is in another mode than ours."""
         if not self.link(now_s):
             silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
             return f"the link is lost, nothing was heard of the autopilot for {silent_s:.1f} s"
+        if not self._mode_told:
+            return "the link is back, the autopilot has not told its mode yet"
         mode = mode_name(self.vehicle.mode)
         if self._restarted:
             return f"the autopilot has restarted, in {mode}"
@@ -309,14 +379,14 @@ class Guidance:
         complete = self.link(now_s) and vehicle.landed is not Landed.UNDEFINED and vehicle.home is not None and vehicle.located
         self._introduced |= complete or now_s - self._begun_s > self._settings.link_lost_s
 
-    def _take_authority_at_start(self, now_s: float) -> None:
+    def _take_authority_at_start(self) -> None:
         """Take GUIDED once, when the vehicle stands ready on the ground; try again only if no answer came."""
         running = self._start_procedure
         if running is not None and running.outcome is not None:
             if running.outcome.answered:
                 self._authority.settle_start()
             self._start_procedure = None
-        elif running is None and self._authority.wants_start(self.vehicle, link=self.link(now_s)):
+        elif running is None and self._authority.wants_start(self.vehicle, link=self._mode_told):
             self._start_procedure = Procedure([set_mode(Mode.GUIDED)])
             self._run(self._start_procedure)
 

@@ -8,15 +8,16 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, Obstacle
 
-from uav_guidance.frames import turned
+from perception_core.ros.vehicle import GUIDANCE_MAP, MAP, ODOMETRY
+from uav_guidance.frames import turned, turned_about_vertical
 from uav_guidance.guidance import Report
+from uav_guidance.localization import Correction, Transform
 from uav_guidance.obstacles import Sighting
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Vehicle, mode_name
 
-FRAME = "map"
-ODOMETRY = "odom"
 BODY = "base_link"
+NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 def time_of(stamp_ns: int) -> rospy.Time:
@@ -29,16 +30,31 @@ def vec3(point: Point) -> Vec3:
     return Vec3(point.x, point.y, point.z)
 
 
-def sighting(message: Obstacle) -> Sighting:
-    """Return what a sensor says about the corridor ahead."""
+def sighting(message: Obstacle, correction: Correction) -> Sighting:
+    """Return what a sensor says about the corridor ahead, in `map`: sensors are straightened along the autopilot's motion, in `odom`."""
+    nearest = vec3(message.nearest_enu_m)
     return Sighting(
         source=message.source,
         stamp_s=message.header.stamp.to_sec(),
         detected=message.detected,
         distance_m=message.distance_m,
-        nearest_enu_m=vec3(message.nearest_enu_m),
+        nearest_enu_m=correction.to_map(nearest) if frame(message.header) == ODOMETRY else nearest,
         unknown=message.unknown,
     )
+
+
+def frame(header: Header) -> str:
+    """Return the frame's name; some drivers write it with a slash."""
+    return str(header.frame_id).lstrip("/")
+
+
+def map_to_odom(message: TFMessage) -> Transform | None:
+    """Return the mapping's T_map_odom if the message has it."""
+    for item in message.transforms:
+        if (frame(item.header), item.child_frame_id.lstrip("/")) == (MAP, ODOMETRY):
+            t, q = item.transform.translation, item.transform.rotation
+            return Transform((q.x, q.y, q.z, q.w), Vec3(t.x, t.y, t.z))
+    return None
 
 
 def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
@@ -72,18 +88,18 @@ def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
         unwatched=course.unwatched,
     )
     message.header.stamp = stamp
-    message.header.frame_id = FRAME
+    message.header.frame_id = MAP
     return message
 
 
 def pose_message(vehicle: Vehicle, stamp: rospy.Time) -> PoseStamped | None:
-    """Return the pose at the moment of the position; the attitude, a few ms older or newer, is turned on to it."""
+    """Return the autopilot's pose in `odom`, at the moment of the position; the attitude, a few ms older or newer, is turned on to it."""
     if vehicle.position_enu_m is None or vehicle.quat_xyzw is None:
         return None
     apart_s = min(max((vehicle.boot_ms - vehicle.attitude_boot_ms) * 1e-3, -0.05), 0.05)
     message = PoseStamped()
     message.header.stamp = stamp
-    message.header.frame_id = FRAME
+    message.header.frame_id = ODOMETRY
     place = vehicle.position_enu_m
     message.pose.position = Point(place.x, place.y, place.z)
     message.pose.orientation = Quaternion(*turned(vehicle.quat_xyzw, vehicle.rates_flu_rad_s, apart_s))
@@ -96,4 +112,13 @@ def transform_message(pose: PoseStamped) -> TFMessage:
     place = pose.pose.position
     transform.transform.translation = Vector3(place.x, place.y, place.z)
     transform.transform.rotation = pose.pose.orientation
+    return TFMessage(transforms=[transform])
+
+
+def correction_message(correction: Correction, stamp: rospy.Time) -> TFMessage:
+    """Return where the map that the guidance flies by lies in `odom`: a frame of its own, for it follows `map` at a bounded rate."""
+    transform = TransformStamped(header=Header(stamp=stamp, frame_id=ODOMETRY), child_frame_id=GUIDANCE_MAP)
+    origin = correction.to_odom(Vec3())
+    transform.transform.translation = Vector3(origin.x, origin.y, origin.z)
+    transform.transform.rotation = Quaternion(*turned_about_vertical(NO_TURN, -correction.yaw_rad))
     return TFMessage(transforms=[transform])

@@ -1,4 +1,4 @@
-"""The ROS node /uav_guidance: services and obstacles in, state and pose out, the autopilot behind a MAVLink link."""
+"""The ROS node /uav_guidance: services, obstacles and the map's correction in, state and pose out, the autopilot behind a MAVLink link."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
-from uav_msgs.msg import GuidanceState, Obstacle
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle
 from uav_msgs.srv import (
     CheckFence,
     CheckFenceRequest,
@@ -38,7 +38,16 @@ from uav_guidance.encoding import command_message, heartbeat_message, interval_m
 from uav_guidance.follower import Setpoint
 from uav_guidance.guidance import Guidance
 from uav_guidance.link import Link
-from uav_guidance.messages import pose_message, sighting, state_message, time_of, transform_message, vec3
+from uav_guidance.messages import (
+    correction_message,
+    map_to_odom,
+    pose_message,
+    sighting,
+    state_message,
+    time_of,
+    transform_message,
+    vec3,
+)
 from uav_guidance.settings import Settings
 from uav_guidance.stamping import FineClock, StampClock
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
@@ -48,7 +57,8 @@ log = logging.getLogger(__name__)
 
 STATE_HZ = 20.0
 HEARTBEAT_PERIOD_S = 1.0
-OBSTACLE_BYTES = 1 << 16
+BUFFER_BYTES = 1 << 16
+TRANSFORMS_WAITING = 50  # our own, at 50 Hz, come back on the same topic
 # The autopilot's agreement is bounded on the mission clock; this bounds the wait of a caller should that clock stand still.
 AGREEMENT_WALL_S = 30.0
 SKILLSET = "navigation"
@@ -81,7 +91,9 @@ class GuidanceNode:
             on_idle=self._report_done,
         )
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
-            RawSubscriber(topic, Obstacle, self._on_obstacle, _on_garbage, buffer_bytes=OBSTACLE_BYTES, queue_size=5)
+            RawSubscriber(topic, Obstacle, self._on_obstacle, _on_garbage, buffer_bytes=BUFFER_BYTES, queue_size=5)
+        RawSubscriber("/lidar_mapping/state", MappingState, self._on_mapping, buffer_bytes=BUFFER_BYTES)
+        RawSubscriber("/tf", TFMessage, self._on_transforms, buffer_bytes=BUFFER_BYTES, queue_size=TRANSFORMS_WAITING)
         self._offer_services()
         self._tuning = TunableSettings(settings, self._tune)
 
@@ -148,7 +160,17 @@ class GuidanceNode:
 
     def _on_obstacle(self, message: Obstacle) -> None:
         with self._changed:
-            self._guidance.on_obstacle(sighting(message), _now_s())
+            self._guidance.on_obstacle(sighting(message, self._guidance.correction), _now_s())
+
+    def _on_mapping(self, message: MappingState) -> None:
+        with self._changed:
+            self._guidance.on_mapping(running=message.running, problem=message.problem, scans=message.scans, now_s=_now_s())
+
+    def _on_transforms(self, message: TFMessage) -> None:
+        newest = map_to_odom(message)
+        if newest is not None:
+            with self._changed:
+                self._guidance.on_transform(newest)
 
     def _on_clock(self, message: Clock) -> None:
         self._fine_clock.tick(message.clock.to_nsec(), time.monotonic_ns())
@@ -186,7 +208,7 @@ class GuidanceNode:
     def _stamped_pose(self, boot_ms: int, arrival: rospy.Time) -> PoseStamped | None:
         fine_ns = self._fine_clock.now_ns(time.monotonic_ns())
         stamp_ns = self._stamps.stamp_ns(boot_ms, arrival.to_nsec() if fine_ns is None else fine_ns)
-        return None if stamp_ns is None else pose_message(self._guidance.vehicle, time_of(max(stamp_ns, 0)))
+        return None if stamp_ns is None else pose_message(self._guidance.odometry, time_of(max(stamp_ns, 0)))
 
     # ---- what goes out -------------------------------------------------------------------------------------------------
 
@@ -202,6 +224,8 @@ class GuidanceNode:
                 self._link.send(interval_message(number, STREAMS_HZ[number]))
             self._advance()
             state = state_message(self._guidance.report(now_s), now)
+            correction = correction_message(self._guidance.correction, now)
+        self._tf.publish(correction)
         self._state.publish(state)
         self._stepped_ns = now.to_nsec()
         if self._link.idle:

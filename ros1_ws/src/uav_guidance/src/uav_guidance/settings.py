@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from alula_common.flight_limits import FLIGHT_LIMITS
 from perception_core import tunable
+from perception_core.tunable import KEY, Range
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,12 @@ class Settings:
     reached_m: float = tunable(0.1, 0.01, 1.0, "from the target at which nothing remains to be done")
     reached_rad: float = tunable(math.radians(2.0), 0.005, 0.5, "from the heading at which nothing remains to be done")
     link_lost_s: float = tunable(2.0, 0.5, 30.0, "of silence after which the link counts as lost")
+
+    follow_map: bool = field(default=True, metadata={KEY: Range(0, 1, "fly by the SLAM's map; off: by the autopilot's local position")})
+    map_rate_m_s: float = tunable(0.2, 0.01, 2.0, "at which the vehicle's place in the map is corrected in flight")
+    map_rate_rad_s: float = tunable(math.radians(2.0), 0.001, 0.5, "at which its heading in the map is corrected in flight")
+    map_jump_m: float = tunable(1.0, 0.1, 100.0, "of correction, from which on it is taken at once and the reference begins again")
+    map_jump_rad: float = tunable(math.radians(10.0), 0.01, math.pi, "of correction, likewise")
 
     def lead_m(self, speed_m_s: float) -> float:
         """Return how far ahead of a vehicle that does not follow the carrot comes to rest."""

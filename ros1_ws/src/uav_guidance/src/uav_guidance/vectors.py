@@ -23,6 +23,11 @@ class Vec3:
     def __mul__(self, factor: float) -> Vec3:
         return Vec3(self.x * factor, self.y * factor, self.z * factor)
 
+    def turned(self, yaw_rad: float) -> Vec3:
+        """Return the vector turned about the vertical, counter-clockwise."""
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        return Vec3(c * self.x - s * self.y, s * self.x + c * self.y, self.z)
+
     def dot(self, other: Vec3) -> float:
         """Return the scalar product."""
         return self.x * other.x + self.y * other.y + self.z * other.z

@@ -14,8 +14,11 @@ from uav_guidance.frames import (
     local_enu_from_global,
     quaternion_enu_flu,
     rates_flu_from_frd,
+    turned_about_vertical,
+    wrap,
     yaw_enu_from_ned,
 )
+from uav_guidance.localization import Correction
 from uav_guidance.vectors import ZERO, Vec3
 
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
@@ -71,7 +74,7 @@ def mode_name(mode: int | None) -> str:
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A snapshot of the vehicle. Frame `map` (ENU, origin at the EKF origin), metres, radians, body FLU."""
+    """A snapshot of the vehicle, metres, radians, body FLU; places in `odom` (ENU, origin at the EKF origin), or by `in_map` in `map`."""
 
     heartbeat_s: float | None = None
     mode: int | None = None
@@ -90,20 +93,12 @@ class Vehicle:
     origin: GlobalPlace | None = None
     home: GlobalPlace | None = None
     home_local_enu_m: Vec3 = ZERO
+    home_enu_m: Vec3 | None = None
 
     @property
     def located(self) -> bool:
         """Whether position and attitude are known."""
         return self.position_enu_m is not None and self.quat_xyzw is not None
-
-    @property
-    def home_enu_m(self) -> Vec3 | None:
-        """Home in `map`: from the two global positions, because ArduPilot leaves HOME_POSITION's local fields at zero."""
-        if self.home is None:
-            return None
-        if self.origin is None:
-            return self.home_local_enu_m
-        return local_enu_from_global(self.home, self.origin)
 
     @property
     def on_ground(self) -> bool:
@@ -114,6 +109,19 @@ class Vehicle:
     def off_ground(self) -> bool:
         """Whether it has lifted off: the landed state is known and is not "on ground"."""
         return self.landed in {Landed.IN_AIR, Landed.TAKING_OFF, Landed.LANDING}
+
+
+def in_map(vehicle: Vehicle, correction: Correction, home_map_m: Vec3 | None) -> Vehicle:
+    """Return a snapshot with its place, velocity, attitude and home in `map` in place of `odom`."""
+    place, quaternion = vehicle.position_enu_m, vehicle.quat_xyzw
+    return replace(
+        vehicle,
+        position_enu_m=None if place is None else correction.to_map(place),
+        velocity_enu_m_s=vehicle.velocity_enu_m_s.turned(correction.yaw_rad),
+        quat_xyzw=None if quaternion is None else turned_about_vertical(quaternion, correction.yaw_rad),
+        yaw_rad=wrap(vehicle.yaw_rad + correction.yaw_rad),
+        home_enu_m=home_map_m,
+    )
 
 
 def _heartbeat(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
@@ -129,10 +137,15 @@ def _extended_sys_state(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicl
     return replace(vehicle, landed=Landed(message.landed_state) if known else Landed.UNDEFINED)
 
 
+def _of_this_boot(vehicle: Vehicle, message: Any) -> Vehicle:
+    """Forget what was said before a restart; the attitude shows it at once, a position comes half a minute later."""
+    if message.time_boot_ms + REBOOT_MS >= max(vehicle.boot_ms, vehicle.attitude_boot_ms):
+        return vehicle
+    return Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
+
+
 def _local_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
-    if message.time_boot_ms + REBOOT_MS < vehicle.boot_ms:
-        # The autopilot restarted: nothing of what it said before holds.
-        vehicle = Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
+    vehicle = _of_this_boot(vehicle, message)
     position = enu_from_ned(Vec3(message.x, message.y, message.z))
     velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))
     return replace(vehicle, boot_ms=int(message.time_boot_ms), position_enu_m=position, velocity_enu_m_s=velocity)
@@ -140,7 +153,7 @@ def _local_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
 
 def _attitude(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
     return replace(
-        vehicle,
+        _of_this_boot(vehicle, message),
         quat_xyzw=quaternion_enu_flu(message.roll, message.pitch, message.yaw),
         yaw_rad=yaw_enu_from_ned(message.yaw),
         rates_flu_rad_s=rates_flu_from_frd(Vec3(message.rollspeed, message.pitchspeed, message.yawspeed)),
@@ -150,11 +163,19 @@ def _attitude(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
 
 def _home_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
     local = enu_from_ned(Vec3(message.x, message.y, message.z))
-    return replace(vehicle, home=(message.latitude, message.longitude, message.altitude), home_local_enu_m=local)
+    return _with_home(replace(vehicle, home=(message.latitude, message.longitude, message.altitude), home_local_enu_m=local))
 
 
 def _global_origin(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
-    return replace(vehicle, origin=(message.latitude, message.longitude, message.altitude))
+    return _with_home(replace(vehicle, origin=(message.latitude, message.longitude, message.altitude)))
+
+
+def _with_home(vehicle: Vehicle) -> Vehicle:
+    """Set home in `odom`: from the two global positions, because ArduPilot leaves HOME_POSITION's local fields at zero."""
+    if vehicle.home is None:
+        return vehicle
+    local = vehicle.home_local_enu_m if vehicle.origin is None else local_enu_from_global(vehicle.home, vehicle.origin)
+    return replace(vehicle, home_enu_m=local)
 
 
 _CHANGES: dict[str, Callable[[Vehicle, Any, float], Vehicle]] = {

@@ -53,7 +53,7 @@ def matrix_of_transform(transform: Transform) -> NDArray[np.float64]:
 def obstacle_message(stamp_ns: int, source: str, nearest: Nearest | None, unknown: str = "") -> Obstacle:
     """Return what one sensor says of one measurement: the nearest obstacle, that none is seen, or why that can't be said."""
     stamp = rospy.Time(stamp_ns // NS, stamp_ns % NS)
-    message = Obstacle(header=Header(stamp=stamp, frame_id="map"), source=source, detected=nearest is not None, distance_m=math.inf)
+    message = Obstacle(header=Header(stamp=stamp, frame_id="odom"), source=source, detected=nearest is not None, distance_m=math.inf)
     if nearest is not None:
         message.distance_m = nearest.distance_m
         message.nearest_enu_m = Point(*nearest.point_enu_m)

@@ -17,21 +17,30 @@ from perception_core.ros.subscription import RawSubscriber
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+MAP, ODOMETRY = "map", "odom"
+GUIDANCE_MAP = "guidance_map"
+"""The map as the guidance flies by it: a child of `odom`, which follows the mapping's `map` at a bounded rate."""
 BUFFER_BYTES = 1 << 16
+TRANSFORMS_WAITING = 50  # the vehicle's pose comes on the same topic, at 50 Hz
 POSES_KEPT_S = 3.0
 POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
 
 class Vehicle:
-    """Listen to the guidance and to ``/tf_static``; the attributes are always the latest."""
+    """Listen to the guidance and to ``/tf_static``; the attributes are always the latest.
+
+    All is in the autopilot's frame `odom`, which no correction of the map makes jump: ``poses`` come in it, ``motion`` is turned into it.
+    """
 
     def __init__(self) -> None:
         self.poses = PoseBuffer(keep_s=POSES_KEPT_S)
         self.motion = Motion()
+        self._T_odom_map = np.eye(4)
         self._mounts: dict[str, NDArray[np.float64]] = {}
         self._subscribers = [
             RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, buffer_bytes=BUFFER_BYTES, queue_size=50),
             RawSubscriber("/uav_guidance/state", GuidanceState, self._on_state, buffer_bytes=BUFFER_BYTES),
+            RawSubscriber("/tf", TFMessage, self._on_transforms, buffer_bytes=BUFFER_BYTES, queue_size=TRANSFORMS_WAITING),
             RawSubscriber("/tf_static", TFMessage, self._on_static, buffer_bytes=BUFFER_BYTES, queue_size=10),
         ]
 
@@ -51,9 +60,15 @@ class Vehicle:
         self.poses.add(message.header.stamp.to_nsec(), (p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
     def _on_state(self, message: GuidanceState) -> None:
-        v, t = message.velocity_enu_m_s, message.target_enu_m
-        target = (t.x, t.y, t.z) if message.reference == "position" else None
-        self.motion = Motion(velocity_enu_m_s=(v.x, v.y, v.z), target_enu_m=target)
+        v, t, T_odom_map = message.velocity_enu_m_s, message.target_enu_m, self._T_odom_map  # noqa: N806 -- T_target_source
+        vx, vy, vz = (float(part) for part in T_odom_map[:3, :3] @ (v.x, v.y, v.z))
+        tx, ty, tz = (float(part) for part in (T_odom_map @ (t.x, t.y, t.z, 1.0))[:3])
+        self.motion = Motion(velocity_enu_m_s=(vx, vy, vz), target_enu_m=(tx, ty, tz) if message.reference == "position" else None)
+
+    def _on_transforms(self, message: TFMessage) -> None:
+        for item in message.transforms:
+            if item.child_frame_id.lstrip("/") == GUIDANCE_MAP:
+                self._T_odom_map = matrix_of_transform(item.transform)
 
     def _on_static(self, message: TFMessage) -> None:
         for item in message.transforms:
