@@ -109,6 +109,22 @@ def test_the_body_is_where_a_flying_autopilot_says_on_its_clock():
         peer.server.close()
 
 
+def test_a_simulation_that_falls_behind_is_told_by_how_much():
+    peer = Elsewhere()
+    followed = FollowedVehicle(f"tcp:127.0.0.1:{peer.server.port}")
+    try:
+        assert followed.late_s(0.0) == 0.0
+        while not followed.known(2.0) and peer.now_s < 60.0:
+            peer.go()
+            followed.listen()
+        assert followed.late_s(0.5) >= 1.5
+        assert followed.late_s(60.0) == 0.0
+        assert SimulatedAutopilotVehicle(seed=0).late_s(0.0) == 0.0
+    finally:
+        followed.close()
+        peer.server.close()
+
+
 def command(number, *values):
     sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=191)
     return mavlink.MAVLink_command_long_message(1, 1, number, 0, *values, *([0.0] * (7 - len(values)))).pack(sender)

@@ -23,6 +23,8 @@ from uav_simulator_ardupilot import InThread, Peer
 
 from alula_common.network import free_port
 from alula_testing.ros1 import wait_until
+from uav_simulator.autopilot.link_server import LinkServer
+from uav_simulator.flown import SimulatedAutopilotVehicle
 
 NODE = Path(__file__).parents[1] / "scripts" / "uav_simulator_node"
 PACE_TOPIC = "/uav_simulator_test/work"
@@ -329,6 +331,41 @@ def test_ardupilot_flies_the_body_and_makes_the_clock(start_node, collect):
     finally:
         node.terminate()
         node.wait(10.0)
+        rospy.delete_param("/uav_simulator")
+
+
+def test_an_autopilot_that_is_followed_is_not_kept_waiting_by_a_node_that_hangs(start_node, collect):
+    peer = SimulatedAutopilotVehicle(seed=0)
+    server = LinkServer(peer.endpoint, None, port=0, gcs_port=0)
+    told_s = [0.0]
+
+    def go():
+        told_s[0] += 0.02
+        peer.tick(told_s[0], 0.02)
+        server.serve(0.01)
+
+    vehicle = f"_vehicle:=followed:tcp:127.0.0.1:{server.port}"
+    node = start_node([sys.executable, str(NODE), "__name:=uav_simulator", vehicle, "_rate:=0", f"_pace_topics:=[{PACE_TOPIC}]"])
+    work = rospy.Publisher(PACE_TOPIC, Header, queue_size=1)
+    seen = collect(clock=("/clock", Clock), lidar=("/lidar/points", PointCloud2), imu=("/imu/data", Imu))
+    try:
+        wait_until(lambda: go() or seen.count("lidar") > 1, timeout_s=30.0, what="a sweep")
+        work.publish(Header(stamp=rospy.Time.from_sec(seen.messages["clock"][-1].clock.to_sec())))  # then it hangs
+        begun_s = told_s[0]
+        first_s = seen.messages["clock"][-1].clock.to_sec()
+        for _ in range(400):  # as many ticks at once as the machine can do
+            go()
+        wait_until(
+            lambda: server.serve(0.01) or seen.messages["clock"][-1].clock.to_sec() > first_s + 7.5,
+            timeout_s=10.0,
+            what="the clock is with the autopilot",
+        )
+        assert told_s[0] - begun_s == pytest.approx(8.0)
+        assert seen.count("imu") > 350
+    finally:
+        node.terminate()
+        node.wait(10.0)
+        server.close()
         rospy.delete_param("/uav_simulator")
 
 

@@ -36,6 +36,7 @@ class Driver(Protocol):
 
     sensor: str
     every_ticks: int
+    quick: bool  # costs next to nothing
     at_ticks: tuple[int, ...]  # within its period: sensors take turns, so that the work spreads
 
     def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
@@ -58,7 +59,7 @@ class _Publisher:
 class ZedDriver:
     """Both images and their infos, 10 Hz."""
 
-    sensor, every_ticks = "zed", 5
+    sensor, every_ticks, quick = "zed", 5, False
     at_ticks: tuple[int, ...] = (0,)
 
     def __init__(self, simulation: Simulation, rng: Rng) -> None:
@@ -94,7 +95,7 @@ class ZedDriver:
 class LidarDriver:
     """The sweep that ends at this moment, 10 Hz; its stamp is the sweep's beginning."""
 
-    sensor, every_ticks = "lidar", 5
+    sensor, every_ticks, quick = "lidar", 5, False
     at_ticks: tuple[int, ...] = (2,)
 
     def __init__(self, simulation: Simulation, rng: Rng) -> None:
@@ -116,7 +117,7 @@ class LidarDriver:
 class ImuDriver:
     """One reading each tick, 50 Hz."""
 
-    sensor, every_ticks = "imu", 1
+    sensor, every_ticks, quick = "imu", 1, True
     at_ticks: tuple[int, ...] = (0,)
 
     def __init__(self, simulation: Simulation, rng: Rng) -> None:
@@ -139,7 +140,7 @@ class ImuDriver:
 class CameraDriver:
     """The inspection camera's picture in colour, 20 Hz on the grid of the ticks: 40 and 60 ms apart by turns."""
 
-    sensor, every_ticks = "camera", 5
+    sensor, every_ticks, quick = "camera", 5, False
     at_ticks: tuple[int, ...] = (1, 3)
 
     def __init__(self, simulation: Simulation) -> None:
@@ -181,15 +182,15 @@ class Drivers:
         self._latency_ns = {sensor: round(seconds * 1e9) for sensor, seconds in latency_s.items()}
         self._under_way: dict[str, deque[tuple[int, Measurement]]] = {driver.sensor: deque() for driver in self._drivers}
 
-    def publish_due(self) -> None:
-        """Let the drivers measure whose time has come, and publish what has arrived."""
+    def publish_due(self, *, late: bool) -> None:
+        """Let the drivers measure whose time has come, and publish what has arrived; ``late``: leave out what takes long."""
         now_ns = self._simulation.now_ns
         for driver in self._drivers:
             mode = self._simulation.sensors.mode(driver.sensor)
             under_way = self._under_way[driver.sensor]
             if mode is SensorMode.DEAD:
                 under_way.clear()
-            elif now_ns // TICK_NS % driver.every_ticks in driver.at_ticks:
+            elif now_ns // TICK_NS % driver.every_ticks in driver.at_ticks and (driver.quick or not late):
                 measurement = driver.measure(mode, degradation.FUTURE_NS if mode is SensorMode.FUTURE else 0)
                 if measurement is not None:
                     late_ns = degradation.LATE_NS if mode is SensorMode.LATE else 0

@@ -31,6 +31,9 @@ class Flown(Protocol):
     def tick(self, now_s: float, dt_s: float) -> bool:
         """Advance by one tick that ends at ``now_s``; False: its autopilot has not come so far yet, call again."""
 
+    def late_s(self, now_s: float) -> float:
+        """Return how far its autopilot has gone on beyond this moment; 0 where it waits for the simulation."""
+
 
 class SimulatedAutopilotVehicle:
     """The hexacopter, flown by the simulator's own autopilot behind MAVLink."""
@@ -65,6 +68,10 @@ class SimulatedAutopilotVehicle:
     def landed_state(self) -> LandedState:
         """What the autopilot says."""
         return self.autopilot.landed_state
+
+    def late_s(self, now_s: float) -> float:  # noqa: ARG002
+        """It waits."""
+        return 0.0
 
     def tick(self, now_s: float, dt_s: float) -> bool:
         """Move the body, then let the autopilot decide and speak."""

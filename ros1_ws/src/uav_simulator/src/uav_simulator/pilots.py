@@ -101,8 +101,10 @@ class FollowedPilot:
         self.ports: dict[str, int] = {}
 
     def serve(self, wait_s: float = 0.0) -> None:
-        """Wait: messages are taken by the vehicle's tick."""
-        time.sleep(wait_s)
+        """Hear how far the autopilot has come, also while time waits for nodes."""
+        until_s = time.monotonic() + wait_s
+        while (rest_s := until_s - time.monotonic()) > 0.0:
+            self.flown.listen(rest_s)
 
     def obey(self, word: str) -> None:
         """Refuse: the pilot of a real autopilot has a remote control, or a ground station."""
@@ -114,7 +116,12 @@ class FollowedPilot:
 
 
 def make_pilot(settings: Settings, home: Vec3) -> Pilot:
-    """Return the pilot that the settings name; raises SimulatorError when its port is taken."""
+    """Return the pilot that the settings name; raises SimulatorError when its port is taken, ConfigError for a home that it can't know."""
+    if settings.vehicle != "simulated" and any(home):
+        raise ConfigError(
+            f"the world's `home` is ({home[0]:g}, {home[1]:g}, {home[2]:g}): a real autopilot counts places from where it is switched on; "
+            "write the world so that home is [0, 0, 0]"
+        )
     if settings.followed_url:
         return FollowedPilot(settings, home)
     return ArduPilotPilot(settings, home) if settings.vehicle == "ardupilot" else SimulatedPilot(settings, home)

@@ -85,6 +85,10 @@ class ArduPilotVehicle:
                 self._note_height()
                 return True
 
+    def late_s(self, now_s: float) -> float:  # noqa: ARG002
+        """ArduPilot waits for each answer."""
+        return 0.0
+
     def close(self) -> None:
         """Free the port."""
         self._socket.close()

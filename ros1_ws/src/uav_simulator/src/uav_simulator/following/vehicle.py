@@ -35,6 +35,8 @@ class FollowedVehicle:
     def tick(self, now_s: float, dt_s: float) -> bool:
         """Move the body to where the autopilot was at this moment of its clock; False when it has not come so far."""
         until_s = time.monotonic() + WAIT_S
+        while self.listen():
+            pass  # all that has come: what waits in the socket is how late the simulation is
         while not self.known(now_s):
             rest_s = until_s - time.monotonic()
             if rest_s <= 0.0:
@@ -44,10 +46,12 @@ class FollowedVehicle:
         self._move(now_s, dt_s)
         return True
 
-    def listen(self, wait_s: float = 0.0) -> None:
-        """Take what the autopilot has told, or tells first within ``wait_s``."""
-        for message in self._link.read(wait_s):
+    def listen(self, wait_s: float = 0.0) -> bool:
+        """Take what the autopilot has told, or tells first within ``wait_s``; return whether there was something."""
+        messages = self._link.read(wait_s)
+        for message in messages:
             self._take(message)
+        return bool(messages)
 
     def close(self) -> None:
         """Close the connection."""
@@ -57,6 +61,11 @@ class FollowedVehicle:
         """Tell whether the autopilot has come so far."""
         newest_s = self._track.newest_s
         return newest_s is not None and newest_s >= now_s
+
+    def late_s(self, now_s: float) -> float:
+        """Return how much newer the autopilot's last word is."""
+        newest_s = self._track.newest_s
+        return 0.0 if newest_s is None else max(newest_s - now_s, 0.0)
 
     def _take(self, message: Any) -> None:
         self._tell_wall_s = time.monotonic() + SILENCE_S
