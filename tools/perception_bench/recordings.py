@@ -106,8 +106,15 @@ class Camera:
 
     def restart(self) -> None:
         """Begin as a node does."""
-        self._rig, self._stamps, self._rng = StereoRig(self._settings), StampJudge(self._settings.stamps), np.random.default_rng(0)
+        self._rig, self._stamps = StereoRig(self._settings, self._camera_pose), StampJudge(self._settings.stamps)
+        self._rng = np.random.default_rng(0)
         self._info(1)
+
+    def _camera_pose(self, stamp_ns: int) -> Floats | None:
+        try:
+            return self._recording.poses.at([stamp_ns]).matrix() @ self._recording.mounts["zed_left"]
+        except LookupError:
+            return None
 
     def _info(self, scale: int) -> None:
         for side, info in self._recording.infos.items():
@@ -164,7 +171,8 @@ class Scanner:
         sweep = _broken_sweep(mode, recording.sweeps[last_good if mode in REPEATED else k], self._rng)
         sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0))
         stamp = self._stamps.finding(sweep.end_ns, given.end_ns)
-        finding = first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m))
+        position_m = self._position_m(sweep.end_ns)
+        finding = first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m, position_m=position_m))
         if not finding.ok or not look:
             return finding, "unknown"
         motion, mount = recording.motion(sweep.end_ns), recording.mounts["lidar"]
@@ -173,6 +181,13 @@ class Scanner:
         except LookupError:
             return finding, "unknown"
         return finding, _word(ahead.nearest, ahead.unknown)
+
+    def _position_m(self, stamp_ns: int) -> Floats | None:
+        try:
+            poses = self._recording.poses.at([stamp_ns])
+        except LookupError:
+            return None
+        return poses.matrix()[:3, 3]
 
 
 def _word(nearest: object, unknown: str) -> str:
@@ -266,9 +281,8 @@ def faults_of(sensor: Sensor) -> list[SensorMode]:
     return [SensorMode(mode) for mode in FAULTS[sensor.name]]
 
 
-def judged(path: Path, times: int) -> Iterator[dict[str, object]]:
+def judged(recording: Recording, times: int) -> Iterator[dict[str, object]]:
     """Return a row for each sensor of a recording, and one for each fault of a sensor that broke so many times; see ``told``."""
-    recording = read(path)
     for sensor, count in ((Camera(recording), len(recording.pairs)), (Scanner(recording), len(recording.sweeps))):
         if not count:
             continue

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -86,10 +87,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--case", metavar="WORDS", default="", help="only cases whose name begins so")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help=f"measure so many frames a case (default {FRAMES})")
     parser.add_argument("--recording", type=Path, metavar="BAG", nargs="+", help="say what the nodes make of recorded flights instead")
-    parser.add_argument("--times", type=int, default=0, metavar="N", help="with --recording: break the sensors so often in each way, too")
+    parser.add_argument(
+        "--rendered", metavar="WORLD:SEED", nargs="+", help="say what the nodes make of flights that are rendered along a world's route"
+    )
+    parser.add_argument("--imperfections", default="off", metavar="WORDS", help="of a rendered flight, as of a simulated one (default off)")
+    parser.add_argument(
+        "--times", type=int, default=0, metavar="N", help="with --recording or --rendered: break the sensors so often in each way, too"
+    )
     options = parser.parse_args(arguments)
-    if options.recording:
-        return _judge_recordings(options.recording, options.times, options.json)
+    if options.recording or options.rendered:
+        return _judge_flights(options)
     chosen = [case for case in CASES if case.name.startswith(options.case)]
     if not chosen or options.frames < 1:
         sys.stderr.write(f"alula bench perception: no case begins with {options.case!r}; there are {[case.name for case in CASES]}\n")
@@ -107,15 +114,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return EXIT_OK
 
 
-def _judge_recordings(bags: Sequence[Path], times: int, json_file: Path | None) -> int:
-    """Print what the nodes make of recorded flights."""
-    from perception_bench.recordings import judged, told  # late: the simulator would count as memory of the cases
+def _judge_flights(options: argparse.Namespace) -> int:
+    """Print what the nodes make of recorded and of rendered flights."""
+    # Late: the simulator would count as memory of the cases.
+    from perception_bench.recordings import judged, read, told
+    from perception_bench.rendered import render
+    from uav_simulator.errors import ConfigError
 
+    makers = [partial(read, bag) for bag in options.recording or ()]
+    for flight in options.rendered or ():
+        world, _, seed = flight.rpartition(":")
+        if not world or not seed.isdecimal():
+            sys.stderr.write(f"alula bench perception: --rendered {flight!r}, expected WORLD:SEED, as in yard:1\n")
+            return EXIT_USAGE
+        makers.append(partial(render, world, int(seed), options.imperfections))
     rows = []
-    for bag in bags:
-        for row in judged(bag, times):
-            rows.append(row)
-            sys.stdout.write(told(row) + "\n")
-    if json_file:
-        json_file.write_text(json.dumps(rows, indent=1) + "\n")
+    try:
+        for make in makers:
+            for row in judged(make(), options.times):
+                rows.append(row)
+                sys.stdout.write(told(row) + "\n")
+    except ConfigError as error:
+        sys.stderr.write(f"alula bench perception: {error}\n")
+        return EXIT_USAGE
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1) + "\n")
     return EXIT_OK

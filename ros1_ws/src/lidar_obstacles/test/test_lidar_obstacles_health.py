@@ -170,6 +170,56 @@ def test_a_mirror_of_5_centimetre_steps_is_not_frozen() -> None:
     assert all(finding.ok for finding in judge_all(coarse))
 
 
+def past_a_wall(speed_m_s, beside_m) -> list[np.ndarray]:
+    """Return sweeps of a LiDAR whose scan plane is across the motion (z forward), over ground 3 m below, past the end of a high wall."""
+    azimuth, elevation = np.tile(np.linspace(-np.pi, np.pi, 720, endpoint=False), 16), np.repeat(np.radians(np.linspace(-15, 15, 16)), 720)
+    ray = np.column_stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    sweeps = []
+    for seed, end_m in enumerate(np.arange(3.0, -3.0, -speed_m_s / 10.0)):
+        with np.errstate(divide="ignore"):
+            to_ground = np.where(ray[:, 1] < 0, -3.0 / ray[:, 1], np.inf)
+            to_wall = np.where(ray[:, 0] > 0, beside_m / ray[:, 0], np.inf)
+        to_wall[(to_wall * ray[:, 2] > end_m) | (to_wall * ray[:, 1] > 6.0)] = np.inf
+        ranges = np.minimum(to_ground, to_wall) + np.random.default_rng(seed).normal(0, 0.02, len(ray))
+        seen = ranges < 25.0
+        sweeps.append((ray[seen] * ranges[seen, None]).astype(np.float32))
+    return sweeps
+
+
+@pytest.mark.parametrize("beside_m", [1.5, 2.0, 3.0, 5.0])
+@pytest.mark.parametrize("speed_m_s", [0.5, 1.0, 1.5, 2.0, 3.0])
+def test_a_wall_that_ends_in_open_country_is_no_fault(speed_m_s, beside_m) -> None:
+    assert [finding.reason for finding in judge_all(past_a_wall(speed_m_s, beside_m)) if not finding.ok] == []
+
+
+def test_a_lost_sector_is_broken_while_the_vehicle_is_there_and_blind_when_it_has_gone_away() -> None:
+    judge = CloudJudge(LidarSettings().cloud)
+
+    def found(k, points, x_m) -> Verdict:
+        sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
+        return judge.finding(sweep, self_m=1.0, position_m=np.array([x_m, 0.0, 2.0])).verdict
+
+    assert {found(k, room(k), 0.0) for k in range(4)} == {Verdict.OK}
+    assert {found(k, blind(room(k % 8), -30, 30), 0.0) for k in range(4, 1004)} == {Verdict.BROKEN}  # it stands for 100 s
+    away = [found(1004 + k, blind(room(k, x=1.0 * k), -30, 30), 1.0 * k) for k in range(10)]
+    assert away == [Verdict.BROKEN] * 6 + [Verdict.OK] * 4
+    # The sensor is believed, but the way through the sectors that were lost is not known, for as long as nothing comes from them.
+    assert {found(1014 + k, blind(room(k % 8, x=9.0), -30, 30), 9.0) for k in range(100)} == {Verdict.OK}
+    assert (np.flatnonzero(judge.gone) * 10 - 180).tolist() == [-30, -20, -10, 0, 10, 20]
+    assert found(1114, room(0, x=9.0), 9.0) is Verdict.OK
+    assert not judge.gone.any()
+
+
+def test_few_returns_are_judged_anew_when_the_vehicle_has_gone_away() -> None:
+    judge = CloudJudge(LidarSettings().cloud)
+    verdicts = []
+    for k in range(20):
+        points = room(k) if k < 5 else room(k)[::3]
+        sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
+        verdicts.append(judge.finding(sweep, self_m=1.0, position_m=np.array([max(0.0, k - 10.0), 0.0, 2.0])).verdict)
+    assert verdicts == [Verdict.OK] * 5 + [Verdict.BROKEN] * 11 + [Verdict.OK] * 4
+
+
 @pytest.mark.skipif(not DATA.exists(), reason=f"no real data at {DATA}: set ALULA_DATA")
 def test_real_sweeps_are_good() -> None:
     kitti = [np.fromfile(path, np.float32).reshape(-1, 4)[:, :3] for path in sorted((DATA / "lidar_kitti").glob("*.bin"))]

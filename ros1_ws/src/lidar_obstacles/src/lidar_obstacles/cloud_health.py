@@ -24,6 +24,8 @@ SAMPLE = 8_000  # points are enough to judge a sweep
 RECENT = 3  # sweeps: a sensor loses a sector from one to the next, a moving one gradually
 SECTOR_RETURNS = 50  # of the sample; a sector with fewer can't be missed
 NEAR = 1.5  # of the vehicle's radius: what comes nearer soon is taken for the vehicle, or is too near to be seen
+LEFT_BEHIND_M = 5.0  # from where returns were lost: what was seen there tells nothing of what is to be seen here
+BLIND_RETURNS = 5  # of the sample: with as many, a sector is not blind
 FROZEN_SHARE = 0.9  # of the points, at the same place to the last bit
 
 
@@ -49,7 +51,10 @@ class CloudJudge:
 
     A sector whose surfaces came nearer than the sensor sees, as the ground does at a landing, is hidden: it may be lost or not, and is not
     missed before it has returns again. One or two neighbouring sectors may lose their returns at the edge of a wall: that is no fault, but
-    ``gone`` tells of them.
+    ``gone`` tells of them. So may more of them where the returns became fewer from sweep to sweep before, as beside a wall that ends.
+
+    What is lost stays so until the returns are back, or the vehicle is `LEFT_BEHIND_M` away from where they were lost: the sensor is then
+    judged as one that was just started, but ``gone`` tells of the lost sectors until returns come from them.
     """
 
     def __init__(self, limits: CloudLimits) -> None:
@@ -57,20 +62,27 @@ class CloudJudge:
         self._previous: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
         self._recent: deque[_Sectors] = deque(maxlen=RECENT)
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
+        self._blind: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
+        self._lost_at_m: Floats | None = None
         self._steps = RangeSteps(limits.max_speed_m_s)
         self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
         self.gone: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
-        """Sectors (SECTORS,), from -180 degrees around the sensor's z axis on, that lost their returns in the last `GONE_S` seconds."""
+        """Sectors (SECTORS,), from -180 degrees around the sensor's z axis on, that lost their returns in the last `GONE_S` seconds.
 
-    def finding(self, sweep: Sweep, *, self_m: float) -> Finding:
-        """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own."""
+        Those that had lost them where the vehicle was before stay in it.
+        """
+
+    def finding(self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None) -> Finding:
+        """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown."""
         stride = max(1, len(sweep.points) // SAMPLE)
         sample = sweep.points[::stride]
         previous, self._previous = self._previous, sample
         ranges = np.sqrt(np.einsum("ij,ij->i", sample, sample))
         outside = np.isfinite(ranges) & (ranges > self_m)
         sectors = _sectors(sample, ranges, stride, self_m)
-        before = self._expected()
+        if self._left_behind(position_m):
+            self._forget()
+        before = self._lately()
         count = int(np.count_nonzero(outside)) * stride
         if count < self._limits.min_returns:
             return self._too_few(count, before, self_m)
@@ -83,14 +95,42 @@ class CloudJudge:
         if off_m:
             became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
             return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
-        return self._against_the_past(sectors, before, stride, sweep.stamp_ns)
+        finding = self._against_the_past(sectors, before, stride, sweep.stamp_ns)
+        if finding.ok:
+            self._lost_at_m = None
+        elif self._lost_at_m is None:
+            self._lost_at_m = position_m
+        return finding
 
-    def _expected(self) -> Floats:
-        """Return how many returns each sector should have at least, (SECTORS,): what it lately had, none where it is hidden."""
+    def _left_behind(self, position_m: Floats | None) -> bool:
+        """Return whether the vehicle has gone away from where returns were lost; at a position (3,) that is not known it has not."""
+        if self._lost_at_m is None or position_m is None:
+            return False
+        return bool(np.linalg.norm(position_m - self._lost_at_m) > LEFT_BEHIND_M)
+
+    def _forget(self) -> None:
+        self._blind |= self._lost
+        self._lost[:] = False
+        self._recent.clear()
+        self._lost_at_m = None
+
+    def _lately(self) -> Floats:
+        """Return how many returns each sector lately had at least, (SECTORS,); none where it is hidden."""
         if not self._recent:
             return np.zeros(SECTORS)
         hidden = np.any([sectors.near for sectors in self._recent], axis=0)
         return np.where(hidden, 0.0, np.min([sectors.counts for sectors in self._recent], axis=0))
+
+    def _expected(self, before: Floats) -> Floats:
+        """Return how many returns each sector should have at least, (SECTORS,): what it lately had, less what it lately lost a sweep.
+
+        A wall beside the vehicle that ends leaves the sectors that see it within some sweeps, a sensor's fault from one to the next.
+        """
+        if len(self._recent) < 2:
+            return before
+        lost = np.max(-np.diff([sectors.counts for sectors in self._recent], axis=0), axis=0)
+        expected: Floats = np.maximum(before - np.maximum(lost, 0.0), 0.0)
+        return expected
 
     def _too_few(self, count: int, before: Floats, self_m: float) -> Finding:
         told = f"{'only ' if count else ''}{count} returns"
@@ -107,10 +147,11 @@ class CloudJudge:
         return f"{share:.0%} of the returns are beyond {self._limits.max_range_m:g} m, half of all beyond {middle:.0f} m{unit}"
 
     def _against_the_past(self, sectors: _Sectors, before: Floats, stride: int, stamp_ns: int) -> Finding:
-        counts = sectors.counts
+        counts, expected = sectors.counts, self._expected(before)
         gone = (before >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * before)
-        self._lost = (self._lost & gone) | _together(gone)
-        thin = counts.sum() < self._limits.thin_share * before.sum()
+        missed = gone & (expected >= SECTOR_RETURNS * stride) & (counts < self._limits.sector_share * expected)
+        self._lost = (self._lost & gone) | _together(missed)
+        thin = counts.sum() < self._limits.thin_share * expected.sum()
         if thin and (not self._lost.any() or self._lost[before > 0].all()):
             return broken(FaultKind.RETURNS, f"returns fell from {before.sum():.0f} to {counts.sum():.0f}")
         if self._lost.any():
@@ -118,7 +159,8 @@ class CloudJudge:
         self._recent.append(sectors)
         self._gone_ns[counts >= SECTOR_RETURNS * stride] = LONG_AGO_NS
         self._gone_ns[gone] = stamp_ns
-        self.gone = np.abs(stamp_ns - self._gone_ns) < GONE_S * NS  # a clock may have gone back
+        self._blind &= counts < BLIND_RETURNS * stride
+        self.gone = (np.abs(stamp_ns - self._gone_ns) < GONE_S * NS) | self._blind  # a clock may have gone back
         return FINE
 
 

@@ -90,7 +90,15 @@ class LidarObstaclesNode:
     def _judged(self, sweep: Sweep) -> Finding:
         # The moment of the last return: a sweep stamped at its beginning is not a tenth of a second old when it comes.
         stamp = self._health.stamp(sweep.end_ns)
-        return first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m))
+        position_m = self._position_m(sweep.end_ns)
+        return first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m, position_m=position_m))
+
+    def _position_m(self, stamp_ns: int) -> NDArray[np.float64] | None:
+        try:
+            poses = self._vehicle.poses.at([stamp_ns])
+        except LookupError:
+            return None
+        return poses.matrix()[:3, 3]
 
     def _process(self, item: _Item) -> None:
         sweep = item.sweep

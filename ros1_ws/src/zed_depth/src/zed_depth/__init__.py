@@ -3,12 +3,13 @@
 from zed_depth.ahead import AheadSettings, look_ahead
 from zed_depth.calibration import CalibrationError, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
+from zed_depth.depth_scale import Landmarks, ScaleJudge, ScaleLimits, scale_of
 from zed_depth.image_health import ImageJudge, ImageLimits
 from zed_depth.pairing import Pairing, StereoPair
 from zed_depth.rig import Depth, StereoRig
 from zed_depth.settings import ZedSettings
 from zed_depth.stereo import DisparityRange, MatcherSettings, StereoMatcher, depth_of, points_of
-from zed_depth.view_health import ViewLimits, view_finding
+from zed_depth.view_health import ViewLimits
 
 __all__ = [
     "AheadSettings",
@@ -17,8 +18,11 @@ __all__ = [
     "DisparityRange",
     "ImageJudge",
     "ImageLimits",
+    "Landmarks",
     "MatcherSettings",
     "Pairing",
+    "ScaleJudge",
+    "ScaleLimits",
     "StereoCalibration",
     "StereoGeometry",
     "StereoMatcher",
@@ -30,5 +34,5 @@ __all__ = [
     "depth_of",
     "look_ahead",
     "points_of",
-    "view_finding",
+    "scale_of",
 ]

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 VIEW_M = 3.0  # how far ahead the corridor's cross-section must be in view: farther than the vehicle needs to stop
 VIEW_SHARE = 0.5  # of the cross-section
 GRID = (9, 5)
+UPWARDS = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,32 @@ def look_ahead(
     """Return what is in the corridor, in the map; raise PoseUnavailableError."""
     pose = poses.at([stamp_ns]).matrix()
     T_map_camera = pose @ T_base_camera  # noqa: N806 -- T_target_source
-    points, areas = points_of(depth_m, geometry, max_range_m=settings.max_range_m, stride_px=settings.stride_px)
-    in_map = points @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
     direction = direction_of_motion(pose[:3, 3], pose[:3, 0], motion)
+    stride_px = settings.stride_px
+    depths = depth_m[::stride_px, ::stride_px]
+    wanted = depths <= settings.max_range_m
+    # Most of what is seen is beside the corridor: it is left out before points are made of it.
+    sides = ((np.array([-direction[1], direction[0], 0.0]), settings.corridor.half_width_m), (UPWARDS, settings.corridor.half_height_m))
+    for axis, half_m in sides:
+        offset_m = float(axis @ (T_map_camera[:3, 3] - pose[:3, 3]))
+        wanted &= np.abs(_along(axis @ T_map_camera[:3, :3], depths, geometry, stride_px) + np.float32(offset_m)) <= half_m
+    points, areas = points_of(depth_m, geometry, wanted, stride_px=stride_px)
+    in_map = points @ T_map_camera[:3, :3].T + T_map_camera[:3, 3]
     nearest = nearest_obstacle(in_map, pose[:3, 3], direction, settings.corridor, settings.support, areas)
     if nearest is not None:
         return Ahead(nearest)
     T_camera_map = np.asarray(np.linalg.inv(T_map_camera), dtype=np.float64)  # noqa: N806 -- T_target_source
     return Ahead(None, _unknown(depth_m, geometry, T_camera_map, pose[:3, 3], direction, settings))
+
+
+def _along(axis: Floats, depths_m: NDArray[np.float32], geometry: StereoGeometry, stride_px: int) -> NDArray[np.float32]:
+    """Return how far what the pixels show is along an axis (3,) of the camera's frame, (h, w) metres."""
+    rows, columns = (stride_px * np.arange(length, dtype=np.float32) for length in depths_m.shape)
+    by_column = ((columns - geometry.cx) * (axis[0] / geometry.fx) + axis[2]).astype(np.float32)
+    by_row = ((rows - geometry.cy) * (axis[1] / geometry.fy)).astype(np.float32)
+    with np.errstate(invalid="ignore"):  # of infinite depths
+        along: NDArray[np.float32] = depths_m * (by_column[None, :] + by_row[:, None])
+    return along
 
 
 def _unknown(
@@ -70,7 +89,7 @@ def _unknown(
         np.linspace(-corridor.half_height_m, corridor.half_height_m, GRID[1]),
     )
     left = np.array([-direction[1], direction[0], 0.0])
-    section = origin + VIEW_M * direction + across.reshape(-1, 1) * left + up.reshape(-1, 1) * np.array([0.0, 0.0, 1.0])
+    section = origin + VIEW_M * direction + across.reshape(-1, 1) * left + up.reshape(-1, 1) * UPWARDS
     x, y, z = (section @ T_camera_map[:3, :3].T + T_camera_map[:3, 3]).T
     height, width = depth_m.shape
     ahead = np.maximum(z, 1e-6)

@@ -37,6 +37,8 @@ from zed_depth.stereo import points_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
 IMAGE_BYTES = 1 << 22
 INFO_BYTES = 1 << 16
 SIDES = ("left", "right")
@@ -50,7 +52,8 @@ class ZedDepthNode:
         self._gray = {side: GrayConverter() for side in SIDES}
         self._infos: dict[str, CameraInfo] = {}
         self._pairing = Pairing(tolerance_s=settings.sync_tolerance_s)
-        self._rig = StereoRig(settings)
+        self._vehicle = Vehicle()
+        self._rig = StereoRig(settings, self._camera_pose)
         self._lock = Lock()
         self._frame = ""
         self._depth = rospy.Publisher("~depth", Image, queue_size=1)
@@ -58,7 +61,6 @@ class ZedDepthNode:
         self._points = rospy.Publisher("~points", PointCloud2, queue_size=1)
         self._obstacle = rospy.Publisher("~obstacle", Obstacle, queue_size=1, tcp_nodelay=True)
         self._done = DoneReporter()
-        self._vehicle = Vehicle()
         self._health = HealthReporter("zed", resource="zed_status", limits=settings.health, stamps=settings.stamps)
         self._worker = NewestWorker[StereoPair](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=lambda _enabled: self._rig.rest())
@@ -87,7 +89,7 @@ class ZedDepthNode:
     def _tune(self, settings: ZedSettings) -> None:
         self._health.tune(settings.health, settings.stamps)
         with self._lock:
-            self._settings, self._rig = settings, StereoRig(settings)
+            self._settings, self._rig = settings, StereoRig(settings, self._camera_pose)
             self._pairing = Pairing(tolerance_s=settings.sync_tolerance_s)
             for side, info in self._infos.items():
                 self._rig.take_info(side, info)
@@ -122,6 +124,12 @@ class ZedDepthNode:
                 self._worker.offer(pair)
             else:
                 self._done.done(pair.stamp_ns)
+
+    def _camera_pose(self, stamp_ns: int) -> NDArray[np.float64] | None:
+        try:
+            return self._vehicle.poses.at([stamp_ns]).matrix() @ self._vehicle.mount(self._frame)
+        except LookupError:
+            return None
 
     def _judged(self, pair: StereoPair) -> Finding:
         stamp = self._health.stamp(pair.stamp_ns)
@@ -159,8 +167,9 @@ class ZedDepthNode:
             self._confidence.publish(depth_message(header, depth.confidence()))
         if self._points.get_num_connections():
             stride = self._settings.stride_px
-            points, _ = points_of(depth.metres, depth.geometry, max_range_m=self._settings.max_range_m, stride_px=stride)
-            confidence = depth.confidence()[::stride, ::stride][depth.metres[::stride, ::stride] <= self._settings.max_range_m]
+            wanted = depth.metres[::stride, ::stride] <= self._settings.max_range_m
+            points, _ = points_of(depth.metres, depth.geometry, wanted, stride_px=stride)
+            confidence = depth.confidence()[::stride, ::stride][wanted]
             self._points.publish(cloud_message(header, points.astype(np.float32), confidence))
 
     def _tell(self, stamp_ns: int, ahead: Ahead) -> None:

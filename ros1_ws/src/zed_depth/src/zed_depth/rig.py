@@ -11,13 +11,15 @@ import numpy as np
 from perception_core import FINE, NS, FaultKind, Finding, broken, first_trouble, unsure
 from zed_depth.calibration import CalibrationError, InfoLike, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
+from zed_depth.depth_scale import ScaleJudge
 from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
 from zed_depth.stereo import DisparityRange, StereoMatcher, depth_of
-from zed_depth.view_health import view_finding
+from zed_depth.view_health import view_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from zed_depth.depth_scale import CameraPose
     from zed_depth.pairing import StereoPair
     from zed_depth.settings import ZedSettings
 
@@ -49,10 +51,13 @@ class StereoRig:
     Both images are held against each other every ``view_period_s``, which takes as long as half a matching. A fault in between shows by
     what each pair tells at little cost: images that lost their sharpness are held against each other at once; where fewer pixels have a
     depth or a parallax than in the pair before, the pair is in doubt, and so are those after it until both images were found to fit again.
+    ``camera_pose`` tells the left camera's pose, without which the scale of the depths can't be judged.
     """
 
-    def __init__(self, settings: ZedSettings) -> None:
+    def __init__(self, settings: ZedSettings, camera_pose: CameraPose = lambda _stamp_ns: None) -> None:
         self._settings = settings
+        self._camera_pose = camera_pose
+        self._scale = ScaleJudge(settings.scale)
         self._images = ImageJudge(settings.images)
         self._infos: dict[str, InfoLike] = {}
         self._lock = Lock()
@@ -88,6 +93,7 @@ class StereoRig:
         with self._lock:
             self._calibration, self._info_finding, self._view_ns, self._valid = calibration, finding, None, FINE
             self._shares, self._doubted_ns = {}, None
+        self._scale = ScaleJudge(self._settings.scale)
 
     def finding(self, pair: StereoPair) -> Finding:
         """Return what this pair tells of the rig; call it once for each pair, in order."""
@@ -102,11 +108,14 @@ class StereoRig:
                 prepared = calibration.prepared(pair.left, pair.right)
             except CalibrationError as error:
                 return broken(FaultKind.INFO, str(error))
-            self._view = view_finding(*prepared, offset_px=calibration.geometry.offset_px, limits=self._settings.view)
+            view = view_of(*prepared, offset_px=calibration.geometry.offset_px, limits=self._settings.view)
+            self._view = view.finding
+            if view.landmarks is not None:
+                self._scale.take(pair.stamp_ns, view.landmarks, calibration.geometry, self._camera_pose)
             self._sharpness = self._images.sharpness
             with self._lock:
                 self._view_ns = pair.stamp_ns
-        return first_trouble(self._view, valid)
+        return first_trouble(self._view, self._scale.finding, valid)
 
     def _due(self, pair: StereoPair) -> bool:
         """Return whether both images must be held against each other now."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from perception_core import Corridor, HealthLimits, StampLimits, Support, tunable
 from zed_depth.ahead import AheadSettings
+from zed_depth.depth_scale import ScaleLimits
 from zed_depth.image_health import ImageLimits
 from zed_depth.stereo import MatcherSettings
 from zed_depth.view_health import ViewLimits
@@ -34,6 +35,7 @@ class ZedSettings:
     max_vertical_px: float = tunable(1.0, 0.1, 10.0, "by which matched features may be off their row")
     max_edge_px: float = tunable(6.0, 2.0, 20.0, "width of the strongest edges of a sharp image")
     view_period_s: float = tunable(0.4, 0.1, 5.0, "between two checks of both images against each other")
+    max_scale_error: float = tunable(0.1, 0.02, 1.0, "by which depths may be too long or short by the vehicle's own motion")
     min_valid: float = tunable(0.02, 0.0, 1.0, "of the image that has a depth, or nothing is known")
     # matching
     max_width_px: int = tunable(640, 64, 4096, "of the images that are matched; larger ones are scaled down")
@@ -76,6 +78,11 @@ class ZedSettings:
     def view(self) -> ViewLimits:
         """What is no stereo rig."""
         return ViewLimits(max_vertical_px=self.max_vertical_px, max_edge_px=self.max_edge_px)
+
+    @property
+    def scale(self) -> ScaleLimits:
+        """When the scale of the depths is not believed."""
+        return ScaleLimits(max_error=self.max_scale_error)
 
     @property
     def matcher(self) -> MatcherSettings:

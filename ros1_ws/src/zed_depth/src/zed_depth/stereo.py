@@ -106,13 +106,13 @@ class StereoMatcher:
         sixteenths = _padded(self._sgbm, self.search.last, left, right)
         # Without the one or two rows above an upper edge, where blocks see the edge but nothing tells how far along the row they match.
         sixteenths = cv2.medianBlur(sixteenths, MEDIAN_PX)
-        texture = self._texture(left)
+        textured = self._textured(left)
         pixels: NDArray[np.float32] = np.multiply(sixteenths, np.float32(1.0 / 16.0), dtype=np.float32)
-        pixels[(sixteenths < 16 * self.search.first) | (texture < 1.0)] = np.nan
-        self._put_near(pixels, texture, left, right)
+        pixels[(sixteenths < 16 * self.search.first) | (textured == 0)] = np.nan
+        self._put_near(pixels, textured, left, right)
         return pixels
 
-    def _put_near(self, pixels: NDArray[np.float32], texture: NDArray[np.float32], left: Gray, right: Gray) -> None:
+    def _put_near(self, pixels: NDArray[np.float32], textured: Gray, left: Gray, right: Gray) -> None:
         """Put what is nearer than the range to its end: in the range it would match something by chance, and that is farther away."""
         if self._coarse[0] != left.shape[1]:
             self._coarse = self._coarse_for(left.shape[1])
@@ -122,25 +122,24 @@ class StereoMatcher:
             return
         small = [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in (left, right)]
         coarse = _padded(matcher, count, *small).astype(np.float32) * np.float32(COARSE / 16.0)
-        textured = cv2.resize(texture, size, interpolation=cv2.INTER_AREA) >= 1.0
-        near = (coarse > self.search.last + SURELY_PX) & textured
+        near = (coarse > self.search.last + SURELY_PX) & (cv2.resize(textured, size, interpolation=cv2.INTER_AREA) >= 128)
         # What the right camera can't see can't have been matched.
         near &= COARSE * np.arange(size[0], dtype=np.float32) >= coarse
         if near.any():
             whole = np.repeat(np.repeat(near, COARSE, axis=0), COARSE, axis=1)
             pixels[: whole.shape[0], : whole.shape[1]][whole] = self.search.last
 
-    def _texture(self, image: Gray) -> NDArray[np.float32]:
-        """Return the texture around each pixel in units of the least that can be matched."""
+    def _textured(self, image: Gray) -> Gray:
+        """Return 255 where there is enough texture around a pixel to be matched, else 0, (h, w)."""
         if self._pairs % NOISE_EVERY == 0:
             self._noise = noise_level(image)
         self._pairs += 1
         least = min(self._settings.texture_per_noise * self._noise, self._settings.enough_texture)
-        gradient = np.abs(cv2.Sobel(image, cv2.CV_16S, 1, 0, ksize=1))
-        mean = cv2.boxFilter(gradient, cv2.CV_32F, (TEXTURE_PX, 1))
-        # The Sobel kernel [-1 0 1] spans two pixels.
-        texture: NDArray[np.float32] = np.asarray(mean) * np.float32(0.5 / max(least, 0.1))
-        return texture
+        # The difference spans two pixels.
+        difference = np.zeros_like(image)
+        cv2.absdiff(image[:, 2:], image[:, :-2], dst=difference[:, 1:-1])
+        mean = cv2.boxFilter(difference, cv2.CV_32F, (TEXTURE_PX, 1))
+        return np.asarray(cv2.compare(mean, 2.0 * max(least, 0.1), cv2.CMP_GE), dtype=np.uint8)
 
 
 def _padded(matcher: cv2.StereoSGBM, columns: int, left: Gray, right: Gray) -> NDArray[np.int16]:
@@ -165,15 +164,15 @@ def depth_of(disparity_px: NDArray[np.float32], geometry: StereoGeometry) -> NDA
 
 
 def points_of(
-    depth_m: NDArray[np.float32], geometry: StereoGeometry, *, max_range_m: float, stride_px: int
+    depth_m: NDArray[np.float32], geometry: StereoGeometry, wanted: NDArray[np.bool_], *, stride_px: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points (N, 3) in the left optical frame and the surface (N,) in square metres that each stands for.
 
-    Every ``stride_px``-th pixel of every ``stride_px``-th row is taken; a pixel's surface is its footprint across the view.
+    Every ``stride_px``-th pixel of every ``stride_px``-th row is taken if it is ``wanted``, a mask of these; a pixel's surface is its
+    footprint across the view.
     """
-    z = depth_m[::stride_px, ::stride_px]
-    rows, columns = np.nonzero(z <= max_range_m)
-    z_of = z[rows, columns].astype(np.float64)
-    x = (columns * stride_px - geometry.cx) / geometry.fx * z_of
-    y = (rows * stride_px - geometry.cy) / geometry.fy * z_of
-    return np.stack([x, y, z_of], axis=1), z_of**2 * (stride_px**2 / (geometry.fx * geometry.fy))
+    rows, columns = np.nonzero(wanted)
+    z = depth_m[::stride_px, ::stride_px][rows, columns].astype(np.float64)
+    x = (columns * stride_px - geometry.cx) / geometry.fx * z
+    y = (rows * stride_px - geometry.cy) / geometry.fy * z
+    return np.stack([x, y, z], axis=1), z**2 * (stride_px**2 / (geometry.fx * geometry.fy))

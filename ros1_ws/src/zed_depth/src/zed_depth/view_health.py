@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from perception_core import FINE, FaultKind, Finding, broken, unsure
+from zed_depth.depth_scale import Landmarks, landmarks_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 FEATURES = 400
-FAST_THRESHOLDS = (25, 7)  # corners by clear edges; by faint ones only where the clear ones are few
+FAST_THRESHOLDS = ((60, 300), (25, 120), (7, 0))  # contrast of the corners, and how many are enough not to look for fainter ones
 FEW_FEATURES = 60
 ENOUGH_FEATURES = 120
 ENOUGH_MATCHES = 20
@@ -56,26 +57,41 @@ class Matches:
     disparity_px: Floats
 
 
-def view_finding(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) -> Finding:
-    """Return what a rectified pair tells of its rig; ``offset_px`` is the disparity of infinity."""
+@dataclass(frozen=True)
+class View:
+    """What both images together tell: the finding, and the features in which they agree, where it is OK."""
+
+    finding: Finding
+    landmarks: Landmarks | None = None
+
+
+def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) -> View:
+    """Hold both images of a rectified pair against each other; ``offset_px`` is the disparity of infinity."""
     for side, image in (("left", left), ("right", right)):
         width_px = edge_width_px(image)
         if width_px > limits.max_edge_px:
-            return broken(FaultKind.BLUR, f"{side} image is blurred: its sharpest edges are {width_px:.1f} px wide")
+            return View(broken(FaultKind.BLUR, f"{side} image is blurred: its sharpest edges are {width_px:.1f} px wide"))
     if np.array_equal(left, right):
-        return broken(FaultKind.VIEW, "both cameras deliver the same image")
+        return View(broken(FaultKind.VIEW, "both cameras deliver the same image"))
     matches = match(left, right)
+    fit = fit_rows(matches, FIRST_GUESS_SHARE * left.shape[0])
+    finding = _finding(matches, fit, left.shape, offset_px, limits)
+    if not finding.ok:
+        return View(finding)
+    return View(finding, landmarks_of(left, right, matches.places[fit.agree], matches.disparity_px[fit.agree]))
+
+
+def _finding(matches: Matches, fit: RowFit, shape: tuple[int, ...], offset_px: float, limits: ViewLimits) -> Finding:
     fewest = min(matches.count_left, matches.count_right)
     if fewest < FEW_FEATURES:
         return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {fewest} features")
-    fit = fit_rows(matches, FIRST_GUESS_SHARE * left.shape[0])
     agreeing = int(np.count_nonzero(fit.agree))
     if agreeing < max(ENOUGH_MATCHES, limits.min_agreeing * len(matches.vertical_px)):
         told = f"{agreeing} of {len(matches.vertical_px)} features agree"
         if fewest < ENOUGH_FEATURES:
             return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {told}")
         return broken(FaultKind.VIEW, f"the cameras do not see the same scene: {told}")
-    return _rows_finding(fit, left.shape, limits) or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
+    return _rows_finding(fit, shape, limits) or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
 
 
 def match(left: Gray, right: Gray) -> Matches:
@@ -91,9 +107,9 @@ def match(left: Gray, right: Gray) -> Matches:
 
 def _features(image: Gray) -> tuple[Sequence[cv2.KeyPoint], Gray | None]:
     """Return the corners and their descriptors, (N, 32) or None."""
-    for threshold in FAST_THRESHOLDS:
+    for threshold, enough in FAST_THRESHOLDS:
         keys, words = cv2.ORB_create(FEATURES, fastThreshold=threshold).detectAndCompute(image, None)
-        if len(keys) >= ENOUGH_FEATURES:
+        if len(keys) >= enough:
             break
     return keys, words
 
@@ -171,9 +187,10 @@ def _disparity_finding(disparity_px: Floats, limits: ViewLimits) -> Finding:
 
 def edge_width_px(image: Gray) -> float:
     """Return how wide the strongest edges are: the step over them by their steepest gradient. A sharp image has 3 px, noise or not."""
-    smooth = cv2.GaussianBlur(image, (0, 0), 0.7).astype(np.float32)
-    gradient = cv2.magnitude(cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=1), cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=1)) / 2.0
+    smooth = cv2.GaussianBlur(image, (0, 0), 0.7)
+    # The Sobel kernel [-1 0 1] spans two pixels.
+    gradient = cv2.magnitude(*(cv2.Sobel(smooth, cv2.CV_32F, *axis, ksize=1, scale=0.5) for axis in ((1, 0), (0, 1))))
     strong = gradient >= np.percentile(gradient[::2, ::2], STRONGEST)
     kernel = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1), np.uint8)
-    step = cv2.dilate(smooth, kernel) - cv2.erode(smooth, kernel)
+    step = np.asarray(cv2.subtract(cv2.dilate(smooth, kernel), cv2.erode(smooth, kernel)))
     return float(np.median(step[strong] / np.maximum(gradient[strong], 1e-3)))
