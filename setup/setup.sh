@@ -34,7 +34,7 @@ step() {
     printf '  %-58s %3d s  done\n' "$title" $((SECONDS - begun))
     printf '%s' "$key" >"$stamp"
   else
-    local reason; reason=$(tac "$log" | grep -E '^(E: |ERROR|error:|CMake Error|.*: error: |.*: error ALU[0-9]+: |alula: )' | head -n 1)
+    local reason; reason=$(tac "$log" | grep -E '^(E: |ERROR|error:|[A-Za-z]+Error: |CMake Error|.*: error: |.*: error ALU[0-9]+: |alula: )' | head -n 1)
     fail "'$title' failed: ${reason:-see the log}" "the last lines of $log tell more; './alula setup' goes on where it stopped"
   fi
 }

@@ -57,6 +57,24 @@ def test_wrong_input_is_exit_code_2_and_names_it(words: tuple[str, ...], named: 
     assert named in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("given", "base"),
+    [
+        ({}, "docker.io/library/debian:bookworm-slim"),
+        ({"SUITE": "trixie"}, "docker.io/library/debian:trixie-slim"),
+        ({"SUITE": "trixie", "BASE": "localhost/mine"}, "localhost/mine"),
+    ],
+)
+def test_images_are_built_on_the_suite_or_base_that_is_asked_for(tmp_path: Path, given: dict[str, str], base: str) -> None:
+    engine = tmp_path / "buildah"
+    engine.write_text('#!/bin/sh\necho "$*"\n', encoding="utf-8")
+    engine.chmod(0o755)
+    environment = {key: value for key, value in os.environ.items() if key not in {"SUITE", "BASE"}}
+    environment |= {"ENGINE": "buildah", "PATH": f"{tmp_path}:{os.environ['PATH']}"} | given
+    done = subprocess.run(["docker/build", "fly"], cwd=ALULA_ROOT, env=environment, capture_output=True, text=True, check=True)
+    assert f"--build-arg BASE={base} --target fly " in done.stdout
+
+
 def test_a_host_name_of_the_caller_is_not_joined_by_a_loopback_address() -> None:
     """Roscpp rejects peers by name beside ROS_IP=127.0.0.1."""
     environment = {key: value for key, value in os.environ.items() if key not in {"ROS_IP", "ROS_HOSTNAME"}}

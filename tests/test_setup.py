@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
 from importlib.metadata import Distribution
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from alula_testing.cover import cover
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 PYTHONS = [(3, 11), (3, 12), (3, 13)]  # Debian 12, Ubuntu 24.04, Debian 13
@@ -87,3 +90,14 @@ def test_what_a_wheel_carries_of_another_name_is_no_package_to_remove(tmp_path: 
     egg_info.mkdir()
     (egg_info / "PKG-INFO").write_text("Metadata-Version: 2.1\nName: rclpy\nVersion: 1.0\n", encoding="utf-8")
     assert sync_packages.removable({"ros-rclpy": "1.0"}, tmp_path) == ["leftover"]
+
+
+def test_a_system_is_judged_by_what_it_has_and_not_by_its_name(tmp_path: Path) -> None:
+    """Ubuntu 24.04 carries the same packages."""
+    release = tmp_path / "os-release"
+    release.write_text('ID=ubuntu\nID_LIKE=debian\nVERSION_ID="24.04"\nPRETTY_NAME="Ubuntu 24.04.3 LTS"\n', encoding="utf-8")
+    commands = f"mount --bind {release} /etc/os-release && ./alula setup && ./alula doctor"
+    done = subprocess.run([*cover(tmp_path), "sh", "-c", commands], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Alula is ready" in done.stderr
+    assert "Ubuntu 24.04.3 LTS" in done.stdout
