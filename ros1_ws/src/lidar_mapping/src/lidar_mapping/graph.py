@@ -1,4 +1,8 @@
-"""The pose graph of the keyframes: odometry, loops, and the autopilot's position, optimised when a loop was found (gtsam)."""
+"""The pose graph of the keyframes: odometry, loops, and the autopilot's position, optimised when a loop was found (gtsam).
+
+It also says how well the last keyframe is known in the map. The odometry lays each scan onto keyframes that it has placed itself, so
+its own covariance is that of the pose relative to them, and says nothing of the error that they hand on from one to the next.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from typing import TYPE_CHECKING
 import gtsam
 import numpy as np
 
-from lidar_mapping.inertial import POSITION, InertialFilter, InertialNoise, State
+from lidar_mapping.inertial import POSITION, InertialFilter, InertialNoise, State, cross_matrix
 from lidar_mapping.registration import RegistrationSettings, register
 
 if TYPE_CHECKING:
@@ -33,7 +37,7 @@ class GraphSettings:
     every: int = 3
     drift: float = 0.01
     least_m: float = 0.005
-    turn_rad: float = 0.002
+    turn_rad: float = 0.001
     loop_m: float = 0.03
     loop_rad: float = 0.005
     loop_fitness: float = 0.7
@@ -49,6 +53,8 @@ class PoseGraph:
         self._factors = gtsam.NonlinearFactorGraph()
         self._path_m: list[float] = []
         self.loops = 0
+        self.covariance: Floats = np.zeros((6, 6))
+        """Of the last keyframe's pose: rotation vector and position, map frame (6, 6)."""
 
     def add(self, keyframes: Keyframes, autopilot_position: Floats | None) -> bool:
         """Take the last keyframe; when it closes a loop, move all keyframes' poses and return True."""
@@ -63,11 +69,18 @@ class PoseGraph:
         odometry = _noise(settings.turn_rad, settings.least_m + settings.drift * length_m)
         self._factors.add(gtsam.BetweenFactorPose3(index - 1, index, gtsam.Pose3(step), odometry))
         self._path_m.append(self._path_m[-1] + length_m)
+        self._go_on(frame.pose[:3, 3] - keyframes.all[index - 1].pose[:3, 3], odometry)
         if autopilot_position is not None:
             heard = gtsam.noiseModel.Isotropic.Sigma(3, settings.autopilot_m)
             self._factors.add(gtsam.GPSFactor(index, np.asarray(autopilot_position, dtype=np.float64), heard))
         known = self._known_place(keyframes) if index % settings.every == 0 else None
         return known is not None and self._close(keyframes, known)
+
+    def _go_on(self, moved_m: Floats, odometry: gtsam.noiseModel.Diagonal) -> None:
+        """Carry the covariance on by one keyframe: an error of attitude displaces what lies farther on."""
+        carried = np.eye(6)
+        carried[3:, :3] = -cross_matrix(moved_m)
+        self.covariance = carried @ self.covariance @ carried.T + odometry.covariance()
 
     def _known_place(self, keyframes: Keyframes) -> int | None:
         """Return the nearest keyframe that lies long enough back; None when there is none."""
@@ -106,6 +119,9 @@ class PoseGraph:
         best = gtsam.LevenbergMarquardtOptimizer(self._factors, values).optimize()
         for i, frame in enumerate(keyframes.all):
             frame.pose = best.atPose3(i).matrix()
+        last = len(keyframes.all) - 1
+        turn = np.kron(np.eye(2), keyframes.all[last].pose[:3, :3])  # gtsam tells of the body's axes
+        self.covariance = turn @ gtsam.Marginals(self._factors, best).marginalCovariance(last) @ turn.T
         return True
 
 

@@ -76,11 +76,17 @@ class Slam:
         return self.map.full or self.keyframes.full
 
     def pose(self) -> tuple[Floats, Floats] | None:
-        """Return T_map_base (4, 4) and its covariance (6, 6; position, then rotation about the body's axes); None before the start."""
+        """Return T_map_base (4, 4) and its covariance (6, 6; position, then rotation about the body's axes); None before the start.
+
+        The covariance is that of the pose relative to the keyframes around, and theirs in the map.
+        """
         if self._odometry is None:
             return None
-        order = np.r_[6:9, 0:3]
-        return self._odometry.state.matrix, self._odometry.filter.covariance[np.ix_(order, order)]
+        place, order = self._odometry.state.matrix, np.r_[6:9, 0:3]
+        of_keyframes = self._graph.covariance[np.ix_([3, 4, 5, 0, 1, 2], [3, 4, 5, 0, 1, 2])]
+        into_body = np.eye(6)
+        into_body[3:, 3:] = place[:3, :3].T
+        return place, self._odometry.filter.covariance[np.ix_(order, order)] + into_body @ of_keyframes @ into_body.T
 
     @property
     def problem(self) -> str:
@@ -96,7 +102,7 @@ class Slam:
 
     @property
     def uncertainty_m(self) -> float:
-        """The standard deviation of the position in its worst direction."""
+        """The standard deviation of the position relative to the keyframes around, in its worst direction."""
         if self._odometry is None:
             return 0.0
         return float(np.sqrt(np.linalg.eigvalsh(self._odometry.filter.covariance[POSITION, POSITION])[-1]))
