@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import random
 import select
-import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import av
@@ -53,49 +52,42 @@ class Tamperer:
         self._to, self._others = to, others
         self._chance = random.Random(9)  # noqa: S311 - no secret
         self._socket = udp_socket(self.port)
-        self._socket.settimeout(0.1)
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
 
     def close(self) -> None:
-        self._over.set()
-        self._thread.join()
         self._socket.close()
 
-    def _run(self) -> None:
-        while not self._over.is_set():
-            try:
-                came = [self._socket.recv(LARGEST_DATAGRAM)]
-            except TimeoutError:
-                continue
-            while len(came) < 3:
-                try:
-                    came.append(self._socket.recv(LARGEST_DATAGRAM, socket.MSG_DONTWAIT))
-                except (BlockingIOError, TimeoutError):
-                    break
-            self.heard += came
-            chance = self._chance
-            forged = bytearray(chance.choice(came))
-            forged[chance.randrange(len(forged))] ^= 1 << chance.randrange(8)
-            mixed = [*came, bytes(forged), chance.randbytes(chance.randrange(1500)), b"", *chance.choices(self.heard, k=2)]
-            chance.shuffle(mixed)
-            for data in mixed:
-                self._socket.sendto(data, ("127.0.0.1", self._to))
-            # The same rubbish, and what is right in another place, into the ports that only the radio should use.
-            for port in self._others:
-                for data in (bytes(forged), chance.randbytes(40), chance.choice(self.heard)):
-                    self._socket.sendto(data, ("127.0.0.1", port))
+    def pass_on(self) -> None:
+        """Pass on all that has come, three datagrams at a time."""
+        while came := [data for data in (self._next() for _ in range(3)) if data is not None]:
+            self._pass_on(came)
+
+    def _next(self) -> bytes | None:
+        return self._socket.recv(LARGEST_DATAGRAM) if select.select([self._socket], [], [], 0.0)[0] else None
+
+    def _pass_on(self, came: list[bytes]) -> None:
+        self.heard += came
+        chance = self._chance
+        forged = bytearray(chance.choice(came))
+        forged[chance.randrange(len(forged))] ^= 1 << chance.randrange(8)
+        mixed = [*came, bytes(forged), chance.randbytes(chance.randrange(1500)), b"", *chance.choices(self.heard, k=2)]
+        chance.shuffle(mixed)
+        for data in mixed:
+            self._socket.sendto(data, ("127.0.0.1", self._to))
+        # The same rubbish, and what is right in another place, into the ports that only the radio should use.
+        for port in self._others:
+            for data in (bytes(forged), chance.randbytes(40), chance.choice(self.heard)):
+                self._socket.sendto(data, ("127.0.0.1", port))
 
 
 class Flight:
     """The mission clock and a camera; after each tick the nodes have worked."""
 
-    def __init__(self, done: dict[str, int]) -> None:
+    def __init__(self, done: dict[str, int], tamperers: Sequence[Tamperer]) -> None:
         self.now_ns = 10 * NS
         self.filmed = 0
         self.alive = set(NODES)
         self._done = done
+        self._tamperers = tamperers
         self._scenery = scenery()
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
         self._camera = rospy.Publisher("/camera/image_raw", Image, queue_size=10)
@@ -106,6 +98,9 @@ class Flight:
         return len(self._done) == len(NODES) and self._clock.get_num_connections() >= 3 and self._camera.get_num_connections() >= 2
 
     def _pass(self) -> None:
+        # Within the tick in which it was sent: the way through a tamperer takes no mission clock, however slow the machine is.
+        for tamperer in self._tamperers:
+            tamperer.pass_on()
         self.now_ns += TICK_NS
         self._clock.publish(Clock(rospy.Time(*divmod(self.now_ns, NS))))
 
@@ -181,7 +176,7 @@ def stage(ros_master, start_node, tmp_path):
     ]
     parameters[GROUND] += [f"_video_path:={tmp_path}"]
     nodes = {name: start_node([str(SOURCES / name / f"scripts/{name}_node"), *words]) for name, words in parameters.items()}
-    flight = Flight(done)
+    flight = Flight(done, (video, report))
     wait_until(flight.connected, timeout_s=PATIENCE_S, what="the nodes are up")
 
     def kill(name: str) -> Callable[[], None]:

@@ -85,7 +85,7 @@ def test_sideways_towards_a_box_and_away_from_it(flight: FakeFlight, obstacles: 
     enabled_ns = flight.now_ns
     assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
     assert obstacles[0].header.stamp.to_nsec() - enabled_ns <= 0.2 * NS
-    assert (obstacles[-1].source, obstacles[-1].header.frame_id, obstacles[-1].detected) == ("lidar", "map", True)
+    assert (obstacles[-1].source, obstacles[-1].header.frame_id, obstacles[-1].detected) == ("lidar", "odom", True)
     assert abs(obstacles[-1].distance_m - 5.75) < 0.15
     assert abs(obstacles[-1].nearest_enu_m.y - 5.75) < 0.15
     assert abs(obstacles[-1].size_m.y - 0.6) < 0.15

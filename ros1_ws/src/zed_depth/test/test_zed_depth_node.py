@@ -85,7 +85,7 @@ def test_distance_of_a_wall_while_enabled_and_silence_otherwise(flight: FakeFlig
     assert flight.run(2.0, until=lambda: len(obstacles) >= 3)
     first = obstacles[0]
     assert first.header.stamp.to_nsec() - enabled_ns <= 0.2 * NS
-    assert first.header.frame_id == "map"
+    assert first.header.frame_id == "odom"
     assert first.source == "zed"
     assert first.detected
     expected_m = CAMERA_X_M + 240.0 * 0.12 / 8.0
