@@ -11,7 +11,8 @@ from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
 from perception_core.ros import vehicle as module
-from perception_core.ros.vehicle import GUIDANCE_MAP, Vehicle
+from perception_core.ros.conversions import GUIDANCE_MAP
+from perception_core.ros.vehicle import Vehicle
 
 
 @pytest.fixture

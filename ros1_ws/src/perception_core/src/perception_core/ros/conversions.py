@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
     from perception_core.corridor import Nearest
 
+MAP, ODOMETRY = "map", "odom"
+GUIDANCE_MAP = "guidance_map"
+"""The map as the guidance flies by it: a child of `odom`, which follows the mapping's `map` at a bounded rate."""
+
 
 def depth_message(header: Header, depth_m: NDArray[np.float32]) -> Image:
     """Return a 32FC1 image."""
@@ -53,7 +57,7 @@ def matrix_of_transform(transform: Transform) -> NDArray[np.float64]:
 def obstacle_message(stamp_ns: int, source: str, nearest: Nearest | None, unknown: str = "") -> Obstacle:
     """Return what one sensor says of one measurement: the nearest obstacle, that none is seen, or why that can't be said."""
     stamp = rospy.Time(stamp_ns // NS, stamp_ns % NS)
-    message = Obstacle(header=Header(stamp=stamp, frame_id="odom"), source=source, detected=nearest is not None, distance_m=math.inf)
+    message = Obstacle(header=Header(stamp=stamp, frame_id=ODOMETRY), source=source, detected=nearest is not None, distance_m=math.inf)
     if nearest is not None:
         message.distance_m = nearest.distance_m
         message.nearest_enu_m = Point(*nearest.point_enu_m)

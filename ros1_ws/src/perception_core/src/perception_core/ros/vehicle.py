@@ -11,15 +11,12 @@ from uav_msgs.msg import GuidanceState
 
 from perception_core.corridor import Motion
 from perception_core.poses import PoseBuffer
-from perception_core.ros.conversions import matrix_of_transform
+from perception_core.ros.conversions import GUIDANCE_MAP, matrix_of_transform
 from perception_core.ros.subscription import RawSubscriber
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-MAP, ODOMETRY = "map", "odom"
-GUIDANCE_MAP = "guidance_map"
-"""The map as the guidance flies by it: a child of `odom`, which follows the mapping's `map` at a bounded rate."""
 BUFFER_BYTES = 1 << 16
 TRANSFORMS_WAITING = 50  # the vehicle's pose comes on the same topic, at 50 Hz
 POSES_KEPT_S = 3.0
