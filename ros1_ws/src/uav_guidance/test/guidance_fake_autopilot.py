@@ -258,7 +258,10 @@ class FakeAutopilot(FakeVehicle):
     def __init__(self, *, on_clock: Callable[[float], None], rate: float = 5.0) -> None:
         super().__init__(self._transmit)
         self._on_clock, self._rate = on_clock, rate
+        self.keep_pace: Callable[[], bool] = lambda: True
+        """Tells whether time may go on; asked before each tick."""
         self._listener = socket.create_server(("127.0.0.1", 0))
+        self._port = self._listener.getsockname()[1]
         self._client: socket.socket | None = None
         self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._ended = threading.Event()
@@ -267,7 +270,7 @@ class FakeAutopilot(FakeVehicle):
 
     @property
     def url(self) -> str:
-        return f"tcp:127.0.0.1:{self._listener.getsockname()[1]}"
+        return f"tcp:127.0.0.1:{self._port}"
 
     def start(self) -> None:
         self._thread.start()
@@ -285,6 +288,14 @@ class FakeAutopilot(FakeVehicle):
             self._client = None
             self.forget_streams()
 
+    def close_port(self) -> None:
+        """Be gone: connections are refused until ``open_port``."""
+        self._listener.close()
+        self.drop_client()
+
+    def open_port(self) -> None:
+        self._listener = socket.create_server(("127.0.0.1", self._port))
+
     def pilot(self, mode: int) -> None:
         with self._lock:
             super().pilot(mode)
@@ -295,6 +306,8 @@ class FakeAutopilot(FakeVehicle):
             next_wall_s = max(next_wall_s + TICK_S / self._rate, time.monotonic() - 0.1)
             while (left_s := next_wall_s - time.monotonic()) > 0.0:
                 self._serve(left_s)
+            if not self.keep_pace():
+                continue
             with self._lock:
                 self.tick()
             self._on_clock(self.now_s)
@@ -306,6 +319,7 @@ class FakeAutopilot(FakeVehicle):
             data = client.recv(4096) if ready and client is not None else None
         except (OSError, ValueError):  # closed by another thread
             data = b""
+            time.sleep(wait_s)
         with self._lock:
             if client is None:
                 self._accept()
@@ -316,10 +330,10 @@ class FakeAutopilot(FakeVehicle):
                 self.hear(message)
 
     def _accept(self) -> None:
-        self._listener.settimeout(0.0)
         try:
+            self._listener.settimeout(0.0)
             self._client, _ = self._listener.accept()
-        except BlockingIOError:
+        except OSError:  # nobody connects, or the port is closed
             return
         self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)

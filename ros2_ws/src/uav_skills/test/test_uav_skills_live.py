@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from uav_msgs.msg import SensorHealth
+from uav_skills_functional_fake import STEP_M
 from uav_skills_rig import Rig
 
 CRITERIA = {"min_fps": 8.0, "min_quality": 0.4, "patience": 3.0}
@@ -68,8 +69,7 @@ def test_a_flight_arrives_and_tells_its_progress(rig, skill, heading):
 
 
 def test_an_interrupted_flight_hovers(rig):
-    rig.in_air()
-    handle = rig.start("navigation", "goto_straight", target=(50.0, 0.0, 3.0), speed=1.0)
+    handle = rig.start_long_flight("goto_straight")
     rig.wait(lambda: rig.functional.vehicle.reference == "position")
     handle.interrupt()
     assert rig.ended(handle) == ("INTERRUPTED", "")
@@ -77,21 +77,20 @@ def test_an_interrupted_flight_hovers(rig):
 
 
 def test_a_flight_that_rests_goes_on_to_its_target(rig):
-    rig.in_air()
-    handle = rig.start("navigation", "goto", target=(3.0, 0.0, 3.0), speed=1.0)
+    handle = rig.start_long_flight("goto")
     rig.wait(lambda: rig.functional.vehicle.reference == "position")
     engine = rig.nodes[0].engine
     rig.wait(lambda: engine.pause(handle.id).accepted)
     rig.wait(lambda: rig.functional.vehicle.reference == "hover")
     assert engine.execution(handle.id).state.value == "PAUSED"
+    rig.functional.vehicle.step_m = STEP_M
     assert engine.resume(handle.id).accepted
     assert rig.ended(handle) == ("TERMINATED", "ARRIVED")
     assert rig.functional.names() == ["set_position", "hover", "set_position"]
 
 
 def test_interrupting_at_once_still_stops_last(rig):
-    rig.in_air()
-    handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
+    handle = rig.start_long_flight("goto")
     handle.interrupt()
     assert rig.ended(handle)[0] == "INTERRUPTED"
     rig.wait(lambda: rig.functional.names()[-1:] == ["hover"])
@@ -115,8 +114,7 @@ def test_drifting_off_the_line_aborts_and_stops(rig):
 
 @pytest.mark.parametrize("how", ["dropped", "overtaken", "silent"])
 def test_a_flight_whose_reference_is_lost_aborts(rig, how):
-    rig.in_air()
-    handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
+    handle = rig.start_long_flight("goto")
     rig.wait(lambda: handle.progress > 0.0)
     vehicle = rig.functional.vehicle
     if how == "dropped":
@@ -131,8 +129,7 @@ def test_a_flight_whose_reference_is_lost_aborts(rig, how):
 
 
 def test_a_flight_that_another_reference_lands_is_not_held_up_by_a_hover(rig):
-    rig.in_air()
-    handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
+    handle = rig.start_long_flight("goto")
     rig.wait(lambda: handle.progress > 0.0)
     rig.functional.vehicle.reference, rig.functional.vehicle.reference_id = "land", rig.functional.vehicle.reference_id + 5
     assert rig.ended(handle) == ("TERMINATED", "ABORTED")
@@ -141,8 +138,7 @@ def test_a_flight_that_another_reference_lands_is_not_held_up_by_a_hover(rig):
 
 
 def test_losing_the_authority_ends_the_flight_without_another_command(rig):
-    rig.in_air()
-    handle = rig.start("navigation", "goto", target=(50.0, 0.0, 3.0), speed=1.0)
+    handle = rig.start_long_flight("goto")
     rig.wait(lambda: rig.functional.vehicle.reference == "position")
     rig.set("navigation", "SDK_authority", "UNAVAILABLE")
     assert rig.ended(handle) == ("RESOURCE_INVARIANT_VIOLATED", "keep_sdk_authority")

@@ -1,12 +1,14 @@
 """The functional layer as the skills see it through the bridge, faked on rclpy: services, states, obstacles, a clock.
 
-The mission clock runs five times as fast as the wall clock; the vehicle is a point that goes where it is told.
+The mission clock runs five times as fast as the wall clock, and waits for nodes that have not heard it: on a busy machine it is slower.
+The vehicle is a point that goes where it is told.
 """
 
 from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from builtin_interfaces.msg import Time
@@ -24,7 +26,10 @@ from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Str
 STEP_S = 0.05  # of mission clock
 WALL_STEP_S = 0.01
 CLIMB_M_S = 4.0
-ARRIVE_STEP_M = 0.2
+STEP_M = 0.2
+LONG_WAY_STEP_M = 0.004
+AHEAD_S = 0.2
+"""So far the clock may be ahead of what the slowest node has heard of it."""
 YAW_STEP_RAD = 0.1
 
 
@@ -33,6 +38,7 @@ class Vehicle:
     """What the guidance would say; tests may push it about."""
 
     place: list = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    step_m: float = STEP_M
     yaw: float = 0.0
     armed: bool = False
     reference: str = "idle"
@@ -62,19 +68,20 @@ class Vehicle:
             self.armed = self.in_air
         elif self.reference in {"takeoff", "position"} and not self.stuck:
             distance = self.distance()
-            part = 1.0 if distance < ARRIVE_STEP_M else ARRIVE_STEP_M / distance
+            part = 1.0 if distance < self.step_m else self.step_m / distance
             self.place = [here + part * (there - here) for here, there in zip(self.place, self.target, strict=True)]
         error = self.heading_error()
         if not self.stuck:
             self.yaw += math.copysign(min(abs(error), YAW_STEP_RAD), error)
-        waits = self.stuck and (self.distance() > ARRIVE_STEP_M or abs(error) > YAW_STEP_RAD)
+        waits = self.stuck and (self.distance() > self.step_m or abs(error) > YAW_STEP_RAD)
         self.still_s = self.still_s + STEP_S if waits else 0.0
 
 
 class FakeFunctional:
-    """Runs in threads of its own; ``calls`` has every service call in order."""
+    """Runs in threads of its own; ``calls`` has every service call in order; ``heard_s()`` is the clock of the slowest node."""
 
-    def __init__(self, context=None) -> None:
+    def __init__(self, heard_s: Callable[[], float], context=None) -> None:
+        self._heard_s = heard_s
         self.vehicle = Vehicle()
         self.calls: list = []
         self.enabled: dict[str, bool] = {}
@@ -200,13 +207,16 @@ class FakeFunctional:
     # --- what goes on ------------------------------------------------------------------------------------------------
 
     def _tick(self) -> None:
+        if self.now_s - self._heard_s() > AHEAD_S:
+            self._clock.publish(ClockMessage(clock=self._stamp()))  # told again: it may have got lost
+            return
         with self._lock:
             self.now_s += STEP_S
             self.vehicle.step()
             if self.reports_flight and self.vehicle.in_air is not self._reported_air:
                 self._reported_air = self.vehicle.in_air
                 self.report("navigation", "flight_status", "IN_AIR" if self._reported_air else "ON_GROUND")
-            stamp = Time(sec=int(self.now_s), nanosec=int(self.now_s % 1.0 * 1e9))
+            stamp = self._stamp()
             state = None if self.vehicle.silent else self._state_message(stamp)
             watching = [name for name in self._obstacles if self.enabled.get(name) and name not in self.mute]
             mapping = self.enabled.get("lidar_mapping") and "lidar_mapping" not in self.mute
@@ -222,6 +232,9 @@ class FakeFunctional:
         if video is not None:
             video.header.stamp = stamp
             self._video.publish(video)
+
+    def _stamp(self) -> Time:
+        return Time(sec=int(self.now_s), nanosec=int(self.now_s % 1.0 * 1e9))
 
     def _state_message(self, stamp) -> GuidanceState:
         vehicle = self.vehicle

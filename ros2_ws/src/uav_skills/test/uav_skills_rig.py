@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import math
 import threading
 import time
 
-from uav_skills_functional_fake import FakeFunctional
+from uav_skills_functional_fake import LONG_WAY_STEP_M, FakeFunctional
 
 SKILLSETS = ("navigation", "perception", "mapping", "video")
 READY = {
@@ -29,10 +30,11 @@ class Rig:
 
         from skill_runtime.ros2 import SkillsetClient, SkillsetNode
 
-        self.functional = FakeFunctional()
+        self._ready = False
+        self.nodes = []
+        self.functional = FakeFunctional(heard_s=self._heard_s)
         self.executor = SingleThreadedExecutor()
         sim_time = [Parameter("use_sim_time", value=True)]
-        self.nodes = []
         self._hooks: list[object] = []
         for name in SKILLSETS:
             model = importlib.import_module(f"{name}_managers.model")
@@ -41,7 +43,7 @@ class Rig:
             self.nodes.append(
                 SkillsetNode(model.SKILLSET, interfaces, make_hooks, data_bindings=model.DATA_TOPICS, parameter_overrides=sim_time)
             )
-        self.caller = Node("uav_skills_test_caller")
+        self.caller = Node("uav_skills_test_caller", parameter_overrides=sim_time)
         self.nodes.append(self.caller)
         for node in self.nodes:
             self.executor.add_node(node)
@@ -49,6 +51,11 @@ class Rig:
         self._thread = threading.Thread(target=self.executor.spin, daemon=True)
         self._thread.start()
         assert all(client.wait_ready(20.0) for client in self.clients.values())
+        self._ready = True
+
+    def _heard_s(self) -> float:
+        """Return the clock of the slowest node that serves; it is 0.0 until that has heard it."""
+        return min(node.get_clock().now().nanoseconds for node in self.nodes) * 1e-9 if self._ready else math.inf
 
     def _kept(self, make_hooks):
         def make(node):
@@ -81,6 +88,12 @@ class Rig:
     def in_air(self) -> None:
         self.functional.fly_at(0.0, 0.0, 3.0)
         self.set("navigation", "flight_status", "IN_AIR")
+
+    def start_long_flight(self, skill: str):
+        """Start a flight that takes two minutes of wall clock: on a machine however busy, it is still under way when something happens."""
+        self.in_air()
+        self.functional.vehicle.step_m = LONG_WAY_STEP_M
+        return self.start("navigation", skill, target=(50.0, 0.0, 3.0), speed=1.0)
 
     @staticmethod
     def wait(condition, timeout_s: float = 10.0) -> None:
