@@ -10,6 +10,7 @@ const OUTCOMES = {
 };
 
 const APART_S = 0.1; // an event's stamp may be some ticks of the clock older than what caused it
+const DIED = "died"; // the way of failing of a process that ended without being told to
 const SAME_S = 1; // a fault of the radio and what the recordings tell of it are no farther apart
 const REACTION_S = 3; // how long after a failure the tree's reaction is looked for
 
@@ -62,12 +63,27 @@ function failures(run) {
     .sort((one, other) => one.end - other.end);
 }
 
-/** What was made to fail, as the recordings or the summary tell; of what neither tells, as the radio or while the flight goes on, what was asked for. */
+/** Every change of something that failed: [{sensor, mode, t, itself}], `ok` being the mode in which it works. */
 function faultsOf(run) {
+  const made = madeToFail(run);
+  return [...made, ...failedItself(run, made)].sort((one, other) => one.t - other.t);
+}
+
+/** What failed by itself: processes that died, and the radio that was lost. Only a summary knows of them. */
+function failedItself(run, made) {
+  const known = (run.facts["/summary"]?.answers ?? []).filter(({ t_s: since }) => since !== null).map(({ sensor, mode, t_s: since, until_s: until }) => ({ sensor, mode, t: origin(run) + since, until, itself: true }));
+  const own = known.filter((fault) => !made.some((one) => sameFault(one, fault)));
+  return own.flatMap((fault) => [fault, ...(fault.until == null ? [] : [{ ...fault, mode: "ok", t: origin(run) + fault.until }])]);
+}
+
+const sameFault = (one, other) => one.sensor === other.sensor && Math.abs(one.t - other.t) < SAME_S;
+
+/** What was made to fail, as the recordings or the summary tell; of what neither tells, as the radio or while the flight goes on, what was asked for. */
+function madeToFail(run) {
   const summed = (run.facts["/summary"]?.injected ?? []).filter(({ t_s: since }) => since !== null).map(({ sensor, mode, t_s: since }) => ({ sensor, mode, t: origin(run) + since }));
   const told = run.faults.length ? run.faults : summed;
   const asked = (run.facts["/run"]?.faults ?? []).flatMap((text) => requested(run, String(text))).filter(({ sensor }) => !told.some((one) => one.sensor === sensor));
-  return [...told, ...asked].sort((one, other) => one.t - other.t);
+  return [...told, ...asked];
 }
 
 /** What a request such as radio:critical@40-50 has come to by now: [{sensor, mode, t}]; the mode is empty where none was asked for. */
@@ -84,11 +100,14 @@ function requested(run, text) {
 /** The name of what fails, for a sentence. */
 const named = (sensor) => String(sensor).replaceAll("_", " ");
 
-/** A failure that was made, in words; mocks do not tell in which way something fails. */
-const faultWords = ({ sensor, mode }) => `${named(sensor)} failed (${mode && mode !== "mock" ? `${mode}, ` : ""}injected)`;
+/** What failed, in words; mocks do not tell in which way something fails. */
+function faultWords({ sensor, mode, itself }) {
+  if (itself) return mode === DIED ? `the process ${sensor} died` : `${named(sensor)} was lost`;
+  return `${named(sensor)} failed (${mode && mode !== "mock" ? `${mode}, ` : ""}injected)`;
+}
 
 /** What a summary tells of a fault: when it was detected, what failed because of it; undefined while there is no summary of it. */
-const answerTo = (run, fault) => run.facts["/summary"]?.answers?.find(({ sensor, t_s: since }) => sensor === fault.sensor && Math.abs(origin(run) + since - fault.t) < SAME_S);
+const answerTo = (run, fault) => run.facts["/summary"]?.answers?.find(({ sensor, t_s: since }) => sameFault({ sensor, t: origin(run) + since }, fault));
 
 /** The failure that was made behind an execution that ended badly, null without one: in a summary the one that it follows from (`sure`). Without a summary the one that it names (`sure`), else the last one before. */
 function faultBehind(run, failure) {
@@ -251,7 +270,11 @@ function story(run) {
   const recovery = run.facts["/summary"]?.recovery;
   const zero = origin(run);
   if (run.departure !== null) say(run.departure, "Lift-off.");
-  for (const fault of faultsOf(run)) say(fault.t, fault.mode === "ok" ? `The ${named(fault.sensor)} works again.` : `The ${named(fault.sensor)} was made to fail${fault.mode && fault.mode !== "mock" ? ` (${fault.mode})` : ""}.`, "bad");
+  for (const { sensor, mode, t, itself } of faultsOf(run)) {
+    if (mode === DIED) continue; // told with how it died, below
+    const failed = itself ? "was lost" : `was made to fail${mode && mode !== "mock" ? ` (${mode})` : ""}`;
+    say(t, `The ${named(sensor)} ${mode === "ok" ? "works again" : failed}.`, "bad");
+  }
   operatorTold(run, say);
   for (const { t, text } of noticed(run)) say(t, `${text}.`, "bad");
   for (const { t, text } of autopilotActs(run)) say(t, `The autopilot ${text}.`, "reaction");
@@ -384,7 +407,7 @@ function costs(run) {
 function marks(run) {
   const zero = origin(run);
   const recovery = run.facts["/summary"]?.recovery;
-  const found = faultsOf(run).filter(({ mode }) => mode !== "ok").map((fault) => ({ t: fault.t, kind: "failure", label: `${fault.sensor} fails` }));
+  const found = faultsOf(run).filter(({ mode }) => mode !== "ok").map(({ sensor, mode, t, itself }) => ({ t, kind: "failure", label: `${sensor} ${!itself ? "fails" : mode === DIED ? "died" : "lost"}` }));
   if (recovery) {
     const moments = { detected: "detected", fallback_running: "fallback runs", moving_again: "moves again" };
     if (!found.length && recovery.failure_s != null) found.push({ t: zero + recovery.failure_s, kind: "failure", label: "failure" });

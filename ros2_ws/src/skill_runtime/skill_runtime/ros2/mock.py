@@ -22,6 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from alula_common.faults import FaultError, FaultRequest, parse_fault
+from alula_common.robots import BEHAVIOUR
 from skill_language.errors import LanguageError
 from skill_language.load import load_robot
 from skill_language.robot import Robot
@@ -34,7 +35,6 @@ from skill_runtime.ros2.node import SkillsetNode
 from skill_runtime.ros2.spin import ros2_arguments, spin_until
 
 CANNOT_START = 2
-BEHAVIOUR_FILE = "mock.yaml"
 
 
 class MockRequestError(SkillRuntimeError):
@@ -93,7 +93,7 @@ def parse(words: Sequence[str], *, program: str, folder: bool) -> argparse.Names
     """Read the command line without its ROS arguments."""
     parser = argparse.ArgumentParser(prog=program, description="Serve skillsets by mocks: the same interface, scripted behaviour.")
     if folder:
-        parser.add_argument("robot", type=Path, help=f"a robot's folder: models, bindings, and {BEHAVIOUR_FILE} if there is one")
+        parser.add_argument("robot", type=Path, help=f"a robot's folder: models, bindings, and {BEHAVIOUR} if there is one")
         parser.add_argument("--skillset", action="append", default=[], metavar="NAME", help="only this one of the robot's (several)")
     parser.add_argument("--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what they do, on top of the robot's")
     parser.add_argument("--fail", action="append", default=[], metavar="WHAT[:HOW][@SECONDS[-SECONDS]]", help="a fault of the behaviour")
@@ -161,7 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.starter:
             sys.stdout.write(starter(robot.skillsets))
             return 0
-        shipped = options.robot / BEHAVIOUR_FILE
+        shipped = options.robot / BEHAVIOUR
         cast = make_cast(robot, options.skillset)
         return run(cast, [shipped] if shipped.exists() else [], robot.skillsets, options, words)
     except (LanguageError, SkillRuntimeError) as error:
