@@ -333,7 +333,7 @@ class FakeAutopilot(FakeVehicle):
         try:
             self._listener.settimeout(0.0)
             self._client, _ = self._listener.accept()
-        except OSError:  # nobody connects, or the port is closed
+        except OSError:  # no client connects, or the port is closed
             return
         self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._mav = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
