@@ -12,11 +12,11 @@ from pathlib import Path
 from alula_common.robots import behaviour_files
 from alula_common.scenarios import load_scenario
 from alula_common.signals import Interrupts
+from alula_flight.ending import CANNOT_START, GIVEN_UP
 from alula_flight.live import LiveEvents
 from alula_flight.spec import RunSpec
 from run_analysis.conformance import Monitor
 
-CANNOT_START = 2
 STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at once"
 
 
@@ -60,7 +60,7 @@ class MockFront:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     words, _ = flight.communicate(timeout=0.1)
         live.show_new()
-        return flight.returncode if flight.returncode in {0, 1, CANNOT_START} else 1, words
+        return flight.returncode if flight.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP, words
 
     def _land(self) -> None:
         if self._flight is not None and self._flight.poll() is None:

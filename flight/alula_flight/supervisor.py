@@ -23,10 +23,10 @@ from alula_common.scenarios import load_scenario
 from alula_common.signals import on_end_signal
 from alula_flight.album import Album
 from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
+from alula_flight.ending import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started
 from alula_flight.spec import RunSpec
 
-GIVEN_UP = 1
 LANDING_PATIENCE_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
 FOR_EVER_S = 2**31
 STATE_PATIENCE_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
@@ -265,8 +265,6 @@ def main(arguments: list[str]) -> int:
     supervisor = Supervisor(spec)
     code = supervisor.run()
     if supervisor.front_died:
-        from alula_flight.fly import finish
-
         end_run(spec.run_id)
         finish(spec, code)
     return code

@@ -17,8 +17,10 @@ from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula_common.record import EVENTS, RecordWriter
 from alula_common.record import FILE as RECORD
 from alula_flight.beside import page_beside
+from alula_flight.command_line import parse
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
-from alula_flight.fly import CANNOT_START, main, monitor_of, parse, sensors_words
+from alula_flight.ending import CANNOT_START
+from alula_flight.fly import main, monitor_of, sensors_words
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import command
 from alula_flight.spec import RequestError, RunSpec

@@ -1,0 +1,39 @@
+"""The end of a run: its report is made from what was recorded, and how it went is said."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from alula_flight.deaths import read_deaths
+from alula_flight.spec import RunSpec
+from run_analysis.conformance import Monitor
+
+GIVEN_UP, CANNOT_START = 1, 2
+"""Exit codes of a run that did not reach its goal, and of one that could not begin, as the mission's own; 0: accomplished."""
+
+
+def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = None) -> int:
+    """Make the report from the run's folder, say how it went, and return the exit code."""
+    # Late, because a wrong command line should not have to wait for matplotlib and Open3D.
+    from alula_flight.report.facts import RunFacts
+    from alula_flight.report.making import make_report
+    from alula_flight.verdict import verdict_lines
+
+    out = Path(spec.out_dir)
+    died = read_deaths(out / "deaths.jsonl")
+    summary = make_report(
+        RunFacts(
+            scenario=spec.scenario,
+            seed=spec.seed,
+            out_dir=out,
+            faults=list(spec.faults),
+            died=[{"name": d.name, "when_s": d.when_s, "how": d.how} for d in died],
+            mission_exit=mission_exit,
+            mock=spec.mock,
+            conformance=None if monitor is None else monitor.verdict.as_dict(),
+        )
+    )
+    for line in verdict_lines(summary, died, out):
+        sys.stdout.write(line + "\n")
+    return mission_exit if mission_exit is not None else GIVEN_UP
