@@ -49,6 +49,9 @@ class FakeVehicle:
         self.transcript: list[tuple[Any, ...]] = []
         self.now_s = start_s
         self.refuse_arming = ""
+        self.refuse_guided = False
+        self.lost_answers: dict[str, int] = {}
+        """How many answers to a command get lost from now on, by its name."""
         self.deaf = False
         self.stuck = False
         self.position_check_s: float | None = None
@@ -103,6 +106,11 @@ class FakeVehicle:
             self._hear_setpoint(message)
         elif kind == "COMMAND_LONG" and not self.deaf:
             result = self._obey(message)
+            name = mavlink.enums["MAV_CMD"][message.command].name
+            left = self.lost_answers.get(name, 0)
+            self.lost_answers[name] = max(left - 1, 0)
+            if left:
+                return
             self._send(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, 1, 191))
 
     def _note(self, *entry: Any) -> None:
@@ -134,7 +142,7 @@ class FakeVehicle:
     def _set_mode(self, use_custom: float, mode: float, _: float) -> int:
         if use_custom != 1.0:
             return mavlink.MAV_RESULT_DENIED
-        if int(mode) not in KNOWN_MODES:
+        if int(mode) not in KNOWN_MODES or (int(mode) == GUIDED and self.refuse_guided):
             return mavlink.MAV_RESULT_FAILED
         self._change_mode(int(mode))
         return mavlink.MAV_RESULT_ACCEPTED
@@ -163,7 +171,8 @@ class FakeVehicle:
     def _take_off(self, _: float, __: float, height: float) -> int:
         if not self.body.armed or self.body.mode != GUIDED or self.body.landed != 1:
             return mavlink.MAV_RESULT_FAILED
-        self._takeoff = (self.now_s + SPOOL_UP_S, height)
+        lift_off_s = self.now_s + SPOOL_UP_S if self._takeoff is None else self._takeoff[0]  # repeated: the motors go on spooling up
+        self._takeoff = (lift_off_s, height)
         return mavlink.MAV_RESULT_ACCEPTED
 
     # ---- what it does --------------------------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ def test_pilot_takes_over_while_it_arms(flight):
     assert not flight.vehicle.body.armed
 
 
-def test_deaf_autopilot_is_given_up_after_four_attempts(flight):
+def test_deaf_autopilot_is_given_up_after_all_attempts(flight):
     flight.until(lambda r: r.authority)
     flight.vehicle.deaf = True
     decision = flight.agreed(TakeoffRequest(3.0, 1.5))

@@ -39,6 +39,38 @@ def test_time_begins_when_place_and_attitude_are_known_and_goes_as_far_as_both_a
     assert track.newest_s == pytest.approx(0.05)
 
 
+def test_time_goes_on_without_a_place_which_an_autopilot_has_40_s_after_power_up():
+    track = LinkTrack((1.0, 2.0, 0.0))
+    for boot_ms in range(5000, 6000, 20):
+        track.take(angles(boot_ms))
+        assert track.newest_s is None, "where it flies already, its place comes within a second"
+    track.take(angles(6000))
+    assert track.newest_s == 0.0, "what is past is not made up for"
+    track.take(angles(6500, yaw=0.5))
+    assert track.newest_s == pytest.approx(0.5)
+    motion = track.at(0.5)
+    assert (motion.position, motion.velocity) == ((1.0, 2.0, 0.0), (0.0, 0.0, 0.0))
+    assert yaw_ned_from_enu(euler_zyx(motion.attitude)[2]) == pytest.approx(0.5)
+    for boot_ms in (6600, 6700):
+        track.take(angles(boot_ms))
+        track.take(place(boot_ms, 7.0))
+    assert track.newest_s == pytest.approx(0.7)
+    assert track.at(0.7).position == pytest.approx((0.0, 7.0, 2.0))
+
+
+def test_an_autopilot_that_restarts_leaves_the_body_where_it_was_until_it_has_a_place_again():
+    track = LinkTrack()
+    for boot_ms in (90_000, 90_100):
+        track.take(angles(boot_ms))
+        track.take(place(boot_ms, 7.0))
+    track.at(0.1)
+    for boot_ms in range(300, 2400, 100):
+        track.take(angles(boot_ms))
+    assert track.newest_s == pytest.approx(1.1)
+    assert track.at(1.1).position == pytest.approx((0.0, 7.0, 2.0))
+    assert track.at(1.1).velocity == (0.0, 0.0, 0.0)
+
+
 def test_between_two_messages_the_motion_is_linear_in_map_and_body_axes():
     track = LinkTrack()
     for message in (place(1000, 0.0), angles(1000, yaw=0.0), place(1100, 0.2), angles(1100, roll=0.1, pitch=0.2, yaw=0.1)):
@@ -128,6 +160,16 @@ def test_a_simulation_that_falls_behind_is_told_by_how_much():
 def command(number, *values):
     sender = mavlink.MAVLink(None, srcSystem=1, srcComponent=191)
     return mavlink.MAVLink_command_long_message(1, 1, number, 0, *values, *([0.0] * (7 - len(values)))).pack(sender)
+
+
+def test_an_estimate_below_the_ground_leaves_the_body_on_it():
+    followed = FollowedVehicle("tcp:127.0.0.1:1")
+    for boot_ms in (1000, 1020):
+        followed._track.take(place(boot_ms, 3.0, down_m=0.005))
+        followed._track.take(angles(boot_ms))
+    assert followed.tick(TICK_S, TICK_S)
+    assert followed.body.position == pytest.approx((0.0, 3.0, 0.0))
+    followed.close()
 
 
 def test_without_an_answer_time_stands_still():

@@ -372,7 +372,7 @@ def test_an_autopilot_that_is_followed_is_not_kept_waiting_by_a_node_that_hangs(
 @pytest.mark.usefixtures("ros_master")
 def test_a_wrong_parameter_ends_the_node_with_one_line():
     done = subprocess.run(
-        [sys.executable, str(NODE), "__name:=uav_simulator_wrong", "_faults:=sonar@3"],
+        [sys.executable, str(NODE), "__name:=uav_simulator_wrong", "_mavlink_port:=0", "_faults:=sonar@3"],
         capture_output=True,
         text=True,
         timeout=30,

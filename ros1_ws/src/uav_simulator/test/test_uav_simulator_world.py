@@ -218,3 +218,23 @@ def test_landing_is_no_contact_and_flying_into_the_ground_is():
     assert monitor.min_clearance_m == pytest.approx(2.15)
     monitor.step(body_at(0.0, 0.0, 0.3), LandedState.IN_AIR)
     assert monitor.collisions == 1
+
+
+@pytest.mark.parametrize(
+    ("height_m", "state", "collisions"),
+    [
+        (0.1, LandedState.LANDING, 0),
+        (3.0, LandedState.LANDING, 1),
+        (3.0, LandedState.ON_GROUND, 1),
+        (3.0, LandedState.IN_AIR, 1),
+    ],
+)
+def test_a_vehicle_that_falls_to_the_ground_has_crashed_whatever_its_autopilot_says(height_m, state, collisions):
+    monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.0)
+    body = RigidBody(Airframe(), (0.0, 0.0, height_m), ground_decel_m_s2=60.0)
+    for _ in range(100):
+        for _ in range(8):
+            body.step(0.0025, (0.0,) * 6)
+        monitor.step(body, LandedState.ON_GROUND if body.on_ground else state)
+    assert body.on_ground
+    assert monitor.collisions == collisions

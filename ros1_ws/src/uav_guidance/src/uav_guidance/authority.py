@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
 from uav_guidance.vehicle import Mode, Vehicle
+
+START_AGAIN_S = 5.0  # after GUIDED was refused at the start
 
 
 class Change(Enum):
@@ -21,34 +24,48 @@ class Authority:
     """The companion has authority in GUIDED, and in LAND if it asked for that itself; any other mode is the pilot's or a failsafe's."""
 
     held: bool = False
+    mode_told: bool = False
+    """Whether a heartbeat has told the mode since the link holds."""
     _land_asked: bool = False
     _land_seen: bool = False
     _start_settled: bool = False
+    _start_refused_s: float = -math.inf
     _flown: bool = False
 
     def ask_land(self) -> None:
-        """Note that the companion itself asks for LAND, before it does."""
-        self._land_asked = True
+        """Note that the companion itself asks for LAND, before it does; a LAND that was heard before is of another landing."""
+        self._land_asked, self._land_seen = True, False
 
-    def land_refused(self) -> None:
-        """Note that the autopilot did not agree to land."""
-        self._land_asked = False
+    @property
+    def landing_unseen(self) -> bool:
+        """Whether LAND was asked for, and no heartbeat has told it yet: the mode that was heard last may be past."""
+        return self._land_asked and not self._land_seen
+
+    def withdraw_land(self) -> None:
+        """Note that the autopilot did not agree to land, or was told otherwise since: a later LAND is the pilot's or a failsafe's."""
+        if self.landing_unseen:
+            self._land_asked = False
+
+    def hear_heartbeat(self, vehicle: Vehicle) -> None:
+        """Note that the vehicle's mode was told just now."""
+        self.mode_told = True
+        self._land_seen |= self._land_asked and vehicle.mode == Mode.LAND
 
     def update(self, vehicle: Vehicle, *, link: bool) -> Change:
-        """Judge by the mode of the last heartbeat; ``link``: it holds."""
+        """Judge by the mode of the last heartbeat; ``link``: it holds. One that is back tells nothing before the next heartbeat."""
+        self.mode_told &= link
         self._flown |= vehicle.off_ground
-        self._land_seen |= self._land_asked and vehicle.mode == Mode.LAND
         if vehicle.mode not in {Mode.GUIDED, Mode.LAND} or (self._land_seen and vehicle.mode != Mode.LAND):
             self._land_asked = self._land_seen = False
         before = self.held
-        self.held = link and (vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked))
+        self.held = self.mode_told and (vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked))
         if self.held == before:
             return Change.NONE
         return Change.GAINED if self.held else Change.LOST
 
-    def wants_start(self, vehicle: Vehicle, *, link: bool) -> bool:
+    def wants_start(self, vehicle: Vehicle, now_s: float) -> bool:
         """Return whether to take GUIDED now, once after a start of the node or the autopilot: ready, on the ground, not flown before."""
-        if self._start_settled or not link:
+        if self._start_settled or not self.mode_told or abs(now_s - self._start_refused_s) < START_AGAIN_S:
             return False
         if vehicle.armed or self.held or vehicle.off_ground:
             self._start_settled = True
@@ -59,5 +76,9 @@ class Authority:
         self._start_settled = self._flown
 
     def settle_start(self) -> None:
-        """Note that GUIDED was asked for, and answered."""
+        """Note that GUIDED was taken."""
         self._start_settled = True
+
+    def start_refused(self, now_s: float) -> None:
+        """Note that the autopilot refused GUIDED: it is asked again a little later."""
+        self._start_refused_s = now_s

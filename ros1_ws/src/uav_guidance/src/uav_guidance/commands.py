@@ -1,12 +1,16 @@
-"""MAVLink commands one after the other: sent, repeated when no answer comes, refused in the autopilot's own words."""
+"""MAVLink commands one after the other: sent, repeated when no answer comes, refused in the autopilot's own words.
+
+An answer may be lost, and the command that is repeated be refused, because it has been obeyed. So what the vehicle is seen to do counts
+more than any answer.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
-from uav_guidance.vehicle import Mode
+from uav_guidance.vehicle import Mode, Vehicle
 
 DO_SET_MODE = 176
 ARM_DISARM = 400
@@ -16,11 +20,27 @@ ACCEPTED = 0
 IN_PROGRESS = 5
 RESULT_NAMES = {1: "temporarily rejected", 2: "denied", 3: "unsupported", 4: "failed", 6: "cancelled"}
 
-ANSWER_S = 1.0  # the autopilot answers within some 10 ms; the rest is the link's
-ATTEMPTS = 4
+ANSWER_S = 0.5  # the autopilot answers within some 10 ms; the rest is the link's
+ATTEMPTS = 8
+PROGRESS_S = 1.0  # from an answer that says "in progress" to the next one
+LIFT_OFF_S = 6.0  # from the command to lift-off, spooling up included; 5.4 s were seen
 # The autopilot queues its texts: they may leave up to a few 100 ms after the answer that they explain.
 TEXT_GRACE_S = 0.4
 WORST_SEVERITY_TOLD = 4  # WARNING; notices and infos are no reasons
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How the vehicle shows that it has done what a command asks for."""
+
+    kind: str
+    """The MAVLink message that tells it."""
+    seen: Callable[[Vehicle], bool]
+    within_s: float = ANSWER_S
+    """From the last attempt until it is given up."""
+
+
+NO_EVIDENCE = Evidence("", lambda _vehicle: False)
 
 
 @dataclass(frozen=True)
@@ -31,26 +51,29 @@ class Command:
     number: int
     parameters: tuple[float, float, float, float, float, float, float] = (0.0,) * 7
     confirmation: int = 0
+    evidence: Evidence = NO_EVIDENCE
 
 
 def set_mode(mode: Mode) -> Command:
     """Ask for a flight mode."""
-    return Command(f"mode {mode.name}", DO_SET_MODE, (1.0, float(mode), 0.0, 0.0, 0.0, 0.0, 0.0))
+    evidence = Evidence("HEARTBEAT", lambda vehicle: vehicle.mode == mode)
+    return Command(f"mode {mode.name}", DO_SET_MODE, (1.0, float(mode), 0.0, 0.0, 0.0, 0.0, 0.0), evidence=evidence)
 
 
 def arm() -> Command:
     """Ask to arm."""
-    return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), evidence=Evidence("HEARTBEAT", lambda vehicle: vehicle.armed))
 
 
 def disarm() -> Command:
     """Ask to disarm; refused in the air."""
-    return Command("disarm", ARM_DISARM)
+    return Command("disarm", ARM_DISARM, evidence=Evidence("HEARTBEAT", lambda vehicle: not vehicle.armed))
 
 
 def take_off(height_above_home_m: float) -> Command:
     """Ask to climb to a height above home."""
-    return Command("take-off", NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_above_home_m))
+    evidence = Evidence("EXTENDED_SYS_STATE", lambda vehicle: vehicle.off_ground, within_s=LIFT_OFF_S)
+    return Command("take-off", NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height_above_home_m), evidence=evidence)
 
 
 @dataclass(frozen=True)
@@ -83,23 +106,27 @@ class Procedure:
             self.abort(f"{command.name}: the autopilot does not answer")
             return None
         self._attempts += 1
-        self._answer_until_s = now_s + ANSWER_S
-        return Command(command.name, command.number, command.parameters, confirmation=self._attempts - 1)
+        self._answer_until_s = now_s + (command.evidence.within_s if self._attempts == ATTEMPTS else ANSWER_S)
+        return replace(command, confirmation=self._attempts - 1)
 
     def on_answer(self, number: int, result: int, now_s: float) -> None:
         """Take a COMMAND_ACK; one of a command that is not under way is not meant."""
         if self.outcome is not None or self._refusal is not None or not self._attempts or number != self._commands[0].number:
             return
         if result == IN_PROGRESS:
-            self._answer_until_s = now_s + ANSWER_S
+            self._answer_until_s = now_s + PROGRESS_S
         elif result == ACCEPTED:
-            self._commands.popleft()
-            self._attempts = 0
-            self._texts.clear()
-            if not self._commands:
-                self.outcome = Outcome(accepted=True)
+            self._go_on()
         else:
             self._refusal = (now_s, RESULT_NAMES.get(result, f"result {result}"))
+
+    def on_vehicle(self, kind: str, vehicle: Vehicle) -> None:
+        """Take what a MAVLink message of this kind has just told of the vehicle: a command that is obeyed needs no answer."""
+        if self.outcome is not None or not self._attempts:
+            return
+        evidence = self._commands[0].evidence
+        if evidence.kind == kind and evidence.seen(vehicle):
+            self._go_on()
 
     def on_text(self, severity: int, text: str) -> None:
         """Take a STATUSTEXT: what comes while a command is under way may be the reason for its refusal."""
@@ -110,6 +137,15 @@ class Procedure:
         """End it as not accepted, if it has not ended."""
         if self.outcome is None:
             self.outcome = Outcome(accepted=False, reason=reason, answered=False)
+
+    def _go_on(self) -> None:
+        """Go on to the next command: this one was accepted, or the vehicle was seen to obey it."""
+        self._commands.popleft()
+        self._attempts = 0
+        self._refusal = None
+        self._texts.clear()
+        if not self._commands:
+            self.outcome = Outcome(accepted=True)
 
     def _refused(self, now_s: float) -> bool:
         """Return whether the command was refused; the outcome follows when the texts had time to arrive."""

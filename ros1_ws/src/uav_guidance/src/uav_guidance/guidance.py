@@ -18,6 +18,7 @@ from uav_guidance.follower import Course, Follower, Setpoint
 from uav_guidance.frames import wrap
 from uav_guidance.localization import Correction, Localization, Transform
 from uav_guidance.obstacles import Sighting
+from uav_guidance.readiness import Readiness
 from uav_guidance.references import Hold, Land, Reference, Takeoff, Travel, Turn
 from uav_guidance.requests import (
     AuthorityRequest,
@@ -38,12 +39,11 @@ from uav_guidance.requests import (
 )
 from uav_guidance.settings import Settings
 from uav_guidance.vectors import Vec3
-from uav_guidance.vehicle import Landed, Mode, Vehicle, in_map, mode_name, updated
+from uav_guidance.vehicle import Landed, Mode, Vehicle, in_map, leapt, mode_name, updated
 
 log = logging.getLogger(__name__)
 
 PREARM_PREFIX = "PreArm: "
-CHECKS_S = 1.5  # from a change of mode until SYS_STATUS tells what it did to the autopilot's checks, which run once a second
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ class Report:
 
     vehicle: Vehicle
     link: bool
+    """Whether the vehicle's mode counts: a heartbeat has told it since the link holds."""
     authority: bool
     reference_id: int
     course: Course
@@ -68,13 +69,10 @@ class Guidance:
         self._settings = settings
         self._localization = Localization(settings)
         self._home_map_m: Vec3 | None = None
+        self._leapt = False
         self._authority = Authority()
         self._heard_s: float | None = None
-        self._mode_told = False
-        self._gained_s = 0.0
-        self._checks_passed = False
-        self._been_ready = False
-        self._restarted = False
+        self._readiness = Readiness()
         self._begun_s: float | None = None
         self._introduced = False
         self._follower = Follower(settings)
@@ -113,15 +111,18 @@ class Guidance:
                 self._procedure.on_answer(message.command, message.result, now_s)
             return
         before, self.odometry = self.odometry, updated(self.odometry, message, now_s)
+        self._leapt |= leapt(before, self.odometry, self._settings.map_jump_m)
         self._keep_home(before)
         self.vehicle = in_map(self.odometry, self.correction, self._home_map_m)
         if self.vehicle.boots > before.boots:
             self._start_over(now_s)
         if kind == "HEARTBEAT":
-            self._mode_told = True
+            self._authority.hear_heartbeat(self.vehicle)
             self._check_authority(now_s)
         elif kind == "SYS_STATUS":
-            self._note_checks(now_s)
+            self._readiness.hear_checks(self.vehicle, now_s, held=self._authority.held)
+        if self._procedure is not None:
+            self._procedure.on_vehicle(kind, self.vehicle)
 
     def on_text(self, severity: int, text: str) -> None:
         """Take a whole STATUSTEXT of the autopilot."""
@@ -164,7 +165,7 @@ class Guidance:
         self._localize(now_s)
         self._check_authority(now_s)
         self._introduce(now_s)
-        self._take_authority_at_start()
+        self._take_authority_at_start(now_s)
         command = self._procedure.due(now_s) if self._procedure is not None else None
         self._drop_what_ended(now_s)
         self._adopt_hover(now_s)
@@ -179,15 +180,13 @@ class Guidance:
     def resources(self) -> dict[str, str]:
         """Return the states of navigation's resources that the hardware decides; what is not known is left out.
 
-        The authority is of use once the autopilot can fly: with a position, and its checks passed in GUIDED, or armed already. It is not
-        taken away when these checks fail again on the ground, but when the autopilot restarts in flight. Nothing is known before the
-        vehicle has introduced itself: a guidance that was started again in flight must not take away from the skills what they rightly
-        have, only because it has not heard of it yet.
+        Nothing is known before the vehicle has introduced itself: a guidance that was started again in flight must not take away from the
+        skills what they rightly have, only because it has not heard of it yet.
         """
         if not self._introduced:
             return {}
         states = {
-            "SDK_authority": "AVAILABLE" if self._authority.held and self._been_ready and not self._restarted else "UNAVAILABLE",
+            "SDK_authority": "AVAILABLE" if self._authority.held and self._readiness.usable else "UNAVAILABLE",
             "homepoint_status": "VALID" if self.vehicle.home is not None else "INVALID",
         }
         if self.vehicle.landed is not Landed.UNDEFINED:
@@ -198,7 +197,7 @@ class Guidance:
         """Return what the guidance knows and does."""
         return Report(
             vehicle=self.vehicle,
-            link=self.link(now_s),
+            link=self.link(now_s) and self._authority.mode_told,
             authority=self._authority.held,
             reference_id=self._reference_id,
             course=self._follower.course(self.vehicle, now_s),
@@ -261,11 +260,11 @@ class Guidance:
         require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._follower.reference, Takeoff), "on the ground already")
         self._authority.ask_land()
         self._follower.heading.locked = False
-        return self._accept(Land(), [] if self.vehicle.mode == Mode.LAND else [set_mode(Mode.LAND)], now_s)
+        return self._accept(Land(), [set_mode(Mode.LAND)], now_s)
 
     def _take_authority(self, _request: AuthorityRequest, now_s: float) -> Decision:
         require(self.link(now_s), "no link to the autopilot")
-        self._restarted = False
+        self._readiness.restarted = False
         if self._authority.held:
             return Decision(accepted=True, reference_id=self._reference_id)
         self._run(Procedure([set_mode(Mode.GUIDED)]))
@@ -277,7 +276,8 @@ class Guidance:
         require(self._authority.held, f"no authority: {self._lost_reason(now_s)}")
 
     def _to_guided(self) -> list[Command]:
-        return [] if self.vehicle.mode == Mode.GUIDED else [set_mode(Mode.GUIDED)]
+        in_guided = self.vehicle.mode == Mode.GUIDED and not self._authority.landing_unseen
+        return [] if in_guided else [set_mode(Mode.GUIDED)]
 
     def _accept(self, reference: Reference, commands: Sequence[Command], now_s: float) -> Decision:
         """Follow another reference from now on."""
@@ -295,12 +295,21 @@ class Guidance:
     # ---- at each step --------------------------------------------------------------------------------------------------
 
     def _localize(self, now_s: float) -> None:
-        """Correct where the vehicle is in `map`; where that jumps in flight, the reference begins again from there."""
+        """Correct where the vehicle is in `map`; where that jumps in flight, the reference begins again from there.
+
+        It jumps when the correction does, and when the autopilot's own estimate does, which the correction follows a sweep later: the
+        vehicle must not be sent back, at the autopilot's own top speed, to a place that was wrong before or is wrong now.
+        """
         place = self.odometry.position_enu_m
         if place is None:
             return
-        jumped = self._localization.step(place, now_s, flying=self.vehicle.armed or not self.vehicle.on_ground)
-        if jumped and self._restarted:  # home, too, counts from the other origin
+        flying = self.vehicle.armed or not self.vehicle.on_ground
+        jumped = self._localization.step(place, now_s, flying=flying)
+        if self._leapt and flying:
+            log.warning("the autopilot's estimate of its place has jumped")
+            jumped = True
+        self._leapt = False
+        if jumped and self._readiness.restarted:  # home, too, counts from the other origin
             self._set_home()
         self.vehicle = in_map(self.odometry, self.correction, self._home_map_m)
         if jumped:
@@ -327,8 +336,7 @@ class Guidance:
         Where it comes back in GUIDED and in the air, the vehicle is held where it is, and can be landed; another mode is not ours. The
         skills get the authority back only when the pilot or the operator gives it: their places may be others now.
         """
-        self._restarted = True
-        self._been_ready = self._checks_passed = False
+        self._readiness.start_over()
         self._authority.start_over()
         log.warning("the autopilot has restarted, in %s", mode_name(self.vehicle.mode))
         if self._procedure is not None:
@@ -338,14 +346,10 @@ class Guidance:
 
     def _check_authority(self, now_s: float) -> None:
         """Drop everything when the pilot, a failsafe or a broken link takes the authority away; nothing is taken back."""
-        self._mode_told &= self.link(now_s)
-        change = self._authority.update(self.vehicle, link=self._mode_told)
+        change = self._authority.update(self.vehicle, link=self.link(now_s))
         if change is not Change.NONE:
-            self._gained_s, self._checks_passed = now_s, False
-        vehicle = self.vehicle
-        able = vehicle.located and (self._checks_passed or vehicle.armed or vehicle.off_ground)
-        self._been_ready = self._authority.held and (self._been_ready or able)
-        self._restarted &= not (vehicle.on_ground and not vehicle.armed)
+            self._readiness.authority_changed(now_s)
+        self._readiness.update(self.vehicle, held=self._authority.held)
         if change is not Change.LOST:
             return
         why = self._lost_reason(now_s)
@@ -355,19 +359,15 @@ class Guidance:
         self._follower.heading.locked = False
         self._follower.take(None, self.vehicle, now_s)
 
-    def _note_checks(self, now_s: float) -> None:
-        """Note whether the autopilot is ready: said before GUIDED, or just after, it is no promise, for GUIDED alone needs a position."""
-        self._checks_passed = self.vehicle.ready and self._authority.held and abs(now_s - self._gained_s) >= CHECKS_S
-
     def _lost_reason(self, now_s: float) -> str:
         """Return why there is no authority: nothing comes over the link, or the vehicle is in another mode than ours."""
         if not self.link(now_s):
             silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
             return f"the link is lost, nothing was heard of the autopilot for {silent_s:.1f} s"
-        if not self._mode_told:
+        if not self._authority.mode_told:
             return "the link is back, the autopilot has not told its mode yet"
         mode = mode_name(self.vehicle.mode)
-        if self._restarted:
+        if self._readiness.restarted:
             return f"the autopilot has restarted, in {mode}"
         return f"the vehicle is in {mode}: the pilot or a failsafe has it"
 
@@ -379,14 +379,17 @@ class Guidance:
         complete = self.link(now_s) and vehicle.landed is not Landed.UNDEFINED and vehicle.home is not None and vehicle.located
         self._introduced |= complete or now_s - self._begun_s > self._settings.link_lost_s
 
-    def _take_authority_at_start(self) -> None:
-        """Take GUIDED once, when the vehicle stands ready on the ground; try again only if no answer came."""
+    def _take_authority_at_start(self, now_s: float) -> None:
+        """Take GUIDED once, when the vehicle stands ready on the ground; try again if no answer came, and later if it was refused."""
         running = self._start_procedure
         if running is not None and running.outcome is not None:
-            if running.outcome.answered:
+            if running.outcome.accepted:
                 self._authority.settle_start()
+            elif running.outcome.answered:
+                log.warning("GUIDED at the start: %s", running.outcome.reason)
+                self._authority.start_refused(now_s)
             self._start_procedure = None
-        elif running is None and self._authority.wants_start(self.vehicle, link=self._mode_told):
+        elif running is None and self._authority.wants_start(self.vehicle, now_s):
             self._start_procedure = Procedure([set_mode(Mode.GUIDED)])
             self._run(self._start_procedure)
 
@@ -396,11 +399,13 @@ class Guidance:
         if outcome is not None and not outcome.accepted:
             self._procedure = None
             if isinstance(self._follower.reference, Land):
-                self._authority.land_refused()
+                self._authority.withdraw_land()
             if self._follower.reference is not None and not self._follower.streaming:
                 self._follower.take(None, self.vehicle, now_s)
         elif outcome is not None:
             self._procedure = None
+            if not isinstance(self._follower.reference, Land):
+                self._authority.withdraw_land()
         if self._procedure is None and self._follower.over(self.vehicle):
             self._follower.take(None, self.vehicle, now_s)
 

@@ -89,8 +89,8 @@ class Localization:
     def hear_state(self, *, running: bool, problem: str, scans: int, now_s: float) -> None:
         """Take the mapping's state, told with each sweep; ``problem`` says why its pose is not to be trusted.
 
-        The last transform counts from the first state after it that is sound. A mapping that begins is given time to settle: one that
-        was started again (it counts its scans from zero) publishes the identity until it has found itself in its saved map.
+        The last transform counts from the first state after it that is sound. A mapping that begins is given time to settle, and so is one
+        that was started again (it counts its scans from zero): it has to find itself in its saved map.
         """
         since_s, again = self._sound_since_s, scans < self._scans
         self._well, self._scans = not problem, scans

@@ -23,6 +23,7 @@ from uav_guidance.vectors import ZERO, Vec3
 
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 PREARM_CHECK = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
+MOST_ACCEL_M_S2 = 5.0  # of a multicopter in guided flight
 REBOOT_MS = 1000  # the autopilot's clock may step back by less (messages out of order)
 
 GlobalPlace = tuple[int, int, int]
@@ -122,6 +123,15 @@ def in_map(vehicle: Vehicle, correction: Correction, home_map_m: Vec3 | None) ->
         yaw_rad=wrap(vehicle.yaw_rad + correction.yaw_rad),
         home_enu_m=home_map_m,
     )
+
+
+def leapt(before: Vehicle, after: Vehicle, most_m: float) -> bool:
+    """Tell whether the place differs by more than ``most_m`` from what the motion explains: the autopilot's estimator was reset."""
+    if before.position_enu_m is None or after.position_enu_m is None or after.boots != before.boots:
+        return False
+    gap_s = max(after.boot_ms - before.boot_ms, 0) * 1e-3
+    expected = before.position_enu_m + before.velocity_enu_m_s * gap_s
+    return (after.position_enu_m - expected).norm > most_m + 0.5 * MOST_ACCEL_M_S2 * gap_s**2
 
 
 def _heartbeat(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:

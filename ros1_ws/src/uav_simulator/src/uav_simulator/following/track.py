@@ -9,7 +9,9 @@ from typing import Any
 
 from uav_simulator.frames import Quat, Vec3, enu_from_ned, frd_from_flu, yaw_enu_from_ned
 from uav_simulator.vehicle.quaternion import from_yaw, multiply
+from uav_simulator.vehicle.rigid_body import ZERO
 
+PLACE_MS = 1000  # an autopilot that knows its place tells it within so long; one that has been switched on has none for 40 s
 REBOOT_MS = 1000  # messages may come out of order by less
 KEPT = 500  # of each kind: ten seconds at 50 Hz
 
@@ -25,11 +27,15 @@ class Motion:
 
 
 class LinkTrack:
-    """Time is counted in seconds from the first moment at which position and attitude were told; an autopilot that restarts goes on."""
+    """Time is counted in seconds from the first moment at which position and attitude were told; an autopilot that restarts goes on.
 
-    def __init__(self) -> None:
+    One that has no position yet counts as standing where it was last known to be, first at ``home`` (map, metres).
+    """
+
+    def __init__(self, home: Vec3 = ZERO) -> None:
         self._places: list[tuple[int, Vec3, Vec3]] = []
         self._attitudes: list[tuple[int, Quat, Vec3]] = []
+        self._stands_at = home
         self._zero_ms: float | None = None
         self._asked_s = 0.0
 
@@ -42,28 +48,39 @@ class LinkTrack:
         elif kind == "ATTITUDE":
             rates = frd_from_flu((message.rollspeed, message.pitchspeed, message.yawspeed))
             self._append(self._attitudes, (message.time_boot_ms, _attitude(message.roll, message.pitch, message.yaw), rates))
-        if self._zero_ms is None and self._places and self._attitudes:
-            self._zero_ms = max(self._places[0][0], self._attitudes[0][0]) - 1e3 * self._asked_s
+        if self._zero_ms is None and self._attitudes:
+            self._begin()
 
     @property
     def newest_s(self) -> float | None:
         """The last moment that is known; None before the first."""
         if self._zero_ms is None:
             return None
-        return (min(self._places[-1][0], self._attitudes[-1][0]) - self._zero_ms) * 1e-3
+        newest_ms = min(told[-1][0] for told in (self._places, self._attitudes) if told)
+        return (newest_ms - self._zero_ms) * 1e-3
 
     def at(self, now_s: float) -> Motion:
         """Return the motion at a moment up to `newest_s`, linear between two messages."""
         self._asked_s = now_s
         boot_ms = (self._zero_ms or 0.0) + 1e3 * now_s
-        before, after, share = _around(self._places, boot_ms)
-        position, velocity = _between(before[1], after[1], share), _between(before[2], after[2], share)
+        position, velocity = self._stands_at, ZERO
+        if self._places:
+            before, after, share = _around(self._places, boot_ms)
+            position, velocity = _between(before[1], after[1], share), _between(before[2], after[2], share)
         early, late, part = _around(self._attitudes, boot_ms)
         return Motion(position, velocity, _turned(early[1], late[1], part), _between(early[2], late[2], part))
+
+    def _begin(self) -> None:
+        first_ms, newest_ms = self._attitudes[0][0], self._attitudes[-1][0]
+        if self._places:
+            self._zero_ms = max(self._places[0][0], first_ms) - 1e3 * self._asked_s
+        elif newest_ms - first_ms >= PLACE_MS:
+            self._zero_ms = newest_ms - 1e3 * self._asked_s
 
     def _append(self, told: list[Any], item: tuple[int, Any, Any]) -> None:
         last_ms = told[-1][0] if told else -1
         if item[0] + REBOOT_MS < last_ms:
+            self._stands_at = self._places[-1][1] if self._places else self._stands_at
             self._places.clear()
             self._attitudes.clear()
             self._zero_ms = None

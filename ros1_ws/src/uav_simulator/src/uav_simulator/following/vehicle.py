@@ -28,7 +28,7 @@ class FollowedVehicle:
         self.landed_state = LandedState.ON_GROUND
         self._url = url
         self._link = ListeningLink(url)
-        self._track = LinkTrack()
+        self._track = LinkTrack(home)
         self._velocity: Vec3 | None = None
         self._tell_wall_s = time.monotonic() + SILENCE_S
 
@@ -80,7 +80,9 @@ class FollowedVehicle:
         ax, ay, az = ((after - then) / dt_s for after, then in zip(motion.velocity, before, strict=True))
         w, x, y, z = motion.attitude
         body.specific_force = rotate((w, -x, -y, -z), (ax, ay, az + GRAVITY_M_S2))
-        body.position, body.velocity, body.attitude, body.rates = motion.position, motion.velocity, motion.attitude, motion.rates
+        x, y, z = motion.position
+        body.position = (x, y, max(z, 0.0))  # an estimate may be centimetres below the ground, which carries the body
+        body.velocity, body.attitude, body.rates = motion.velocity, motion.attitude, motion.rates
         body.on_ground = self.landed_state is LandedState.ON_GROUND
 
     def _tell_silence(self) -> None:
