@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospy
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Vector3
+from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Imu, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
+from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
 from alula_testing.ros1 import end_process, wait_until
@@ -19,6 +22,7 @@ from perception_core.testing import FakeFlight, framed, send_raw
 
 NODE = str(Path(__file__).parents[1] / "scripts" / "lidar_mapping_node")
 LIDAR_HEIGHT_M = 0.1
+NODE_UP_S = 120.0  # wall clock; a deadline of failure, for a machine under load
 
 
 class Walls:
@@ -43,7 +47,7 @@ class Walls:
 def flight(ros_master, start_node, tmp_path):
     with FakeFlight("lidar_mapping") as fake:
         fake.process = start_node([NODE, "_enabled:=false", f"_map_path:={tmp_path / 'map.ply'}"])
-        wait_until(fake.listens, timeout_s=15.0, what="/lidar_mapping is up")
+        wait_until(fake.listens, timeout_s=NODE_UP_S, what="/lidar_mapping is up")
         rospy.wait_for_service("/lidar_mapping/save", timeout=10.0)
         yield fake
 
@@ -113,16 +117,107 @@ def test_started_again_after_a_crash_it_goes_on_with_map_and_work(flight, states
     before = len(read_ply(tmp_path / "map.ply"))
     states.clear()
     start_node([NODE])
-    wait_until(flight.listens, timeout_s=15.0, what="/lidar_mapping is up again")
+    wait_until(flight.listens, timeout_s=NODE_UP_S, what="/lidar_mapping is up again")
     assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 1)
     assert states[-1].running
     assert states[-1].points >= before
 
 
+FLOWN_M = (3.0, -2.0, 0.5)
+"""T_map_odom, a shift: what the autopilot has drifted since the take-off."""
+
+
+@pytest.fixture
+def guidance(flight):
+    """What the guidance says of `map` on /tf, and all that is said there of `map -> odom`."""
+    tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
+    heard: list[float] = []
+
+    def on_transforms(message: TFMessage) -> None:
+        heard.extend(t.transform.translation.x for t in message.transforms if t.child_frame_id == "odom")
+
+    listener = rospy.Subscriber("/tf", TFMessage, on_transforms)
+
+    def say(stamp_ns: int) -> None:
+        item = TransformStamped(
+            header=Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="odom"), child_frame_id="guidance_map"
+        )
+        item.transform.translation, item.transform.rotation = Vector3(*(-x for x in FLOWN_M)), Quaternion(0.0, 0.0, 0.0, 1.0)
+        tf.publish(TFMessage(transforms=[item]))
+
+    yield say, heard, tf
+    listener.unregister()
+    tf.unregister()
+
+
+@pytest.mark.parametrize("saved", [False, True], ids=["with no map", "with the saved map"])
+def test_started_again_after_a_crash_it_begins_where_the_guidance_flies(flight, states, guidance, start_node, tmp_path, saved) -> None:
+    say, heard, tf = guidance
+    walls = Walls(flight)
+
+    def measure(stamp_ns: int) -> None:
+        say(stamp_ns)
+        walls(stamp_ns)
+
+    flight.at_10_hz = measure
+    poses: list[PoseWithCovarianceStamped] = []
+    listener = rospy.Subscriber("/lidar_mapping/pose", PoseWithCovarianceStamped, poses.append)
+    wait_until(lambda: tf.get_num_connections() == 2, timeout_s=NODE_UP_S, what="node and test listen to /tf")
+    assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 3 and len(poses) >= 3)
+    if saved:
+        assert rospy.ServiceProxy("/lidar_mapping/save", Trigger)().success
+    flight.process.kill()
+    flight.process.wait()
+    wait_until(lambda: not flight.listens(), timeout_s=10.0, what="/lidar_mapping's connections are gone")
+    wait_until(lambda: tf.get_num_connections() == 1, timeout_s=NODE_UP_S, what="only the test listens to /tf")
+    assert (tmp_path / "map.ply").exists() == saved
+    there = np.add(flight.position, FLOWN_M)
+    states.clear()
+    poses.clear()
+    heard.clear()
+    start_node([NODE])
+    wait_until(lambda: flight.listens() and tf.get_num_connections() == 2, timeout_s=NODE_UP_S, what="/lidar_mapping is up again")
+    assert flight.run(20.0, until=lambda: bool(states) and states[-1].scans >= 3 and len(poses) >= 3 and len(heard) >= 3)
+    listener.unregister()
+    told = np.array([[p.pose.pose.position.x, p.pose.pose.position.y, p.pose.pose.position.z] for p in poses])
+    assert np.linalg.norm(told - there, axis=1).max() < 0.05
+    assert heard == pytest.approx([FLOWN_M[0]] * len(heard), abs=0.05), "never the identity"
+    assert not states[-1].problem
+
+
+def test_readings_of_an_imu_that_is_mounted_turned_are_turned_into_the_body(flight, states) -> None:
+    walls = Walls(flight)
+    static, imu = (rospy.Publisher(name, kind, queue_size=10, latch=True) for name, kind in (("/tf_static", TFMessage), ("/imu/data", Imu)))
+    mount = TransformStamped(header=Header(frame_id="base_link"), child_frame_id="imu")
+    mount.transform.rotation = Quaternion(*Rotation.from_euler("x", 90, degrees=True).as_quat())
+    static.publish(TFMessage(transforms=[mount]))
+    wait_until(lambda: imu.get_num_connections() and static.get_num_connections(), timeout_s=NODE_UP_S, what="it listens to IMU and mounts")
+
+    def measure(stamp_ns: int) -> None:
+        reading = Imu(header=Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="imu"))
+        reading.linear_acceleration.y = 9.81  # up, in the axes of the IMU
+        imu.publish(reading)
+        walls(stamp_ns)
+
+    flight.at_10_hz = measure
+    poses: list[PoseWithCovarianceStamped] = []
+    listener = rospy.Subscriber("/lidar_mapping/pose", PoseWithCovarianceStamped, poses.append)
+    flight.run(0.5)
+    assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 12 and len(poses) >= 12)
+    assert states[-1].rejected == 0
+    assert (
+        np.linalg.norm([[p.pose.pose.position.x, p.pose.pose.position.y, p.pose.pose.position.z - 2.0] for p in poses], axis=1).max() < 0.03
+    )
+    for end in (listener, static, imu):
+        end.unregister()
+
+
 def test_garbage_on_its_inputs_is_left_out_and_it_maps_on(flight, states) -> None:
     walls = Walls(flight)
     imu = rospy.Publisher("/imu/data", Imu, queue_size=10)
-    wait_until(imu.get_num_connections, timeout_s=15.0, what="it listens to the IMU")
+    wait_until(imu.get_num_connections, timeout_s=NODE_UP_S, what="it listens to the IMU")
     assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
     assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 3)
     scans = states[-1].scans

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from threading import Timer
 
 import numpy as np
@@ -92,6 +93,21 @@ def test_the_autopilots_drift_is_learned_where_surfaces_hold_the_scan() -> None:
     assert slam._odometry.state.autopilot_drift == pytest.approx([0.05, 0.0, 0.0], abs=0.015)
 
 
+def test_a_vehicle_that_is_shaken_is_followed_by_its_scans() -> None:
+    path, slam, rng = Path(leg, across_deg=17.0), Slam(SlamSettings()), np.random.default_rng(7)
+    for k in range(40):
+        end_s = (k + 1) / 10
+        readings = [
+            replace(reading, rates=reading.rates + rng.normal(0.0, 0.3, 3), specific_force=reading.specific_force + rng.normal(0.0, 3.0, 3))
+            for reading in path.readings(k / 10, end_s, rng)
+        ]
+        slam.add(path.sweep(k / 10, seed=k, count=2500), readings, path.autopilot(end_s), np.eye(4))
+        turn = slam.pose()[0][:3, :3] @ path.pose(end_s)[:3, :3].T
+        assert np.degrees(Rotation.from_matrix(turn).magnitude()) < 2.0
+        assert np.linalg.norm(slam.pose()[0][:3, 3] - path.position(end_s)) < 0.1
+    assert slam.count.rejected == 0
+
+
 def begin(t):
     """Stand for a second, then 1.2 m/s within a second."""
     faster = np.clip(t - 1.0, 0.0, 1.0)
@@ -107,6 +123,14 @@ def test_a_jump_of_the_autopilots_position_moves_odom_and_not_the_map() -> None:
     path, slam = Path(lap), Slam(SlamSettings())
     assert fly(path, slam, 4.0, jump_m=2.0, jump_s=2.5) < 0.1
     assert slam.T_map_odom[0, 3] == pytest.approx(-2.0, abs=0.15)
+
+
+def test_a_jump_of_the_autopilots_heading_turns_odom_and_not_the_map() -> None:
+    path, slam, jumped = Path(lap), Slam(SlamSettings()), np.radians([0.0, 0.0, 20.0])
+    assert fly(path, slam, 4.0, count=2500, turned=lambda t: jumped * (t >= 2.5)) < 0.05
+    assert Rotation.from_matrix(slam.pose()[0][:3, :3]).magnitude() < np.radians(0.5)
+    assert Rotation.from_matrix(slam.T_map_odom[:3, :3]).as_rotvec() == pytest.approx(-jumped, abs=0.01)
+    assert slam.count.rejected == 0
 
 
 def test_a_loop_is_closed_and_the_correction_carried_on_to_the_map() -> None:
@@ -163,6 +187,15 @@ def test_a_saved_map_is_gone_on_with() -> None:
     assert len(second.map) < 1.3 * len(first.map)
 
 
+def test_a_saved_map_is_gone_on_with_from_a_place_that_is_half_a_metre_off() -> None:
+    path, first, second = Path(lap), Slam(SlamSettings()), Slam(SlamSettings())
+    fly(path, first, 3.0)
+    second.resume(first.map.points)
+    second.T_map_odom[:2, 3] = [0.4, -0.3]
+    assert fly(path, second, 0.1) < 0.05, "the first scan is laid onto the map at once"
+    assert len(second.map) < 1.3 * len(first.map)
+
+
 def test_a_sweep_without_pose_changes_nothing() -> None:
     slam = Slam(SlamSettings())
     with pytest.raises(PoseUnavailableError):
@@ -197,6 +230,14 @@ def test_readings_that_can_not_be_any_are_left_out() -> None:
     assert [reading.stamp_ns for reading in queue.take_until(NS + 2)] == [NS, NS + 2]
     assert [reading.stamp_ns for reading in queue.take_until(2 * NS)] == [NS + 3]
     assert queue.add(ImuReading(2, still, up), 8), "the clock was set back"
+
+
+def test_readings_in_g_are_left_out_and_a_moment_without_weight_is_not() -> None:
+    queue = ReadingQueue()
+    strengths = [9.81] * 50 + [0.5] * 25 + [9.81] * 50
+    assert all(queue.add(ImuReading(k * NS // 50, np.zeros(3), np.array([0.0, 0.0, f])), 9 * NS) for k, f in enumerate(strengths))
+    in_g = ReadingQueue()
+    assert not any(in_g.add(ImuReading(k * NS // 50, np.zeros(3), np.array([0.0, 0.0, 1.0])), 9 * NS) for k in range(100))
 
 
 def test_a_sweep_gets_the_reading_of_its_end_from_those_around_it() -> None:

@@ -31,6 +31,7 @@ HEADING = 2  # of the attitude, while the vehicle is level
 TERMS = 21
 HISTORY = 64
 """States kept for the deskewing of one sweep."""
+SHAKING_S = 0.3
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class ImuReading:
 @dataclass(frozen=True)
 class InertialNoise:
     """Densities of the noise (per root hertz) and what is known at the start (standard deviations).
+
+    Readings that spread more than by ``gyro`` and ``accel`` are believed less (`Shaking`).
 
     Without inertial readings the vehicle is assumed to keep its velocity and attitude; ``free_m_s2`` and ``free_rad_s`` say how badly
     (root mean square over one second). The autopilot's attitude is off by ``autopilot_tilt_rad`` about each horizontal axis and by
@@ -122,6 +125,37 @@ class State:
         return np.concatenate([turn, *shifts])
 
 
+class Shaking:
+    """The noise of inertial readings by themselves: how far each one lies off the line between its neighbours.
+
+    A vehicle that is shaken, or whose frame vibrates, feels much more than the sensor's noise. A motion that it is worth to follow hardly
+    bends within two periods: at 50 Hz a turn of 1 rad/s that begins within 0.5 s lies 0.002 rad/s off the line.
+    """
+
+    def __init__(self) -> None:
+        self._newest: deque[ImuReading] = deque(maxlen=3)
+        self._variances: Floats = np.zeros(2)
+
+    def densities(self, reading: ImuReading) -> tuple[float, float]:
+        """Take the next reading; return the densities per root hertz of rates and specific force over the last `SHAKING_S`."""
+        self._newest.append(reading)
+        if len(self._newest) < 3:
+            return 0.0, 0.0
+        first, middle, last = self._newest
+        long_s, short_s = ((each.stamp_ns - first.stamp_ns) / NS for each in (last, middle))
+        share = short_s / long_s
+        spread = 3.0 * (1.0 + share**2 + (1.0 - share) ** 2)  # of white noise of one reading, three axes
+        off = [
+            (1.0 - share) * first.rates + share * last.rates - middle.rates,
+            (1.0 - share) * first.specific_force + share * last.specific_force - middle.specific_force,
+        ]
+        fading = np.exp(-(long_s - short_s) / SHAKING_S)
+        seen = np.array([float(each @ each) for each in off]) * 0.5 * long_s / spread
+        self._variances = fading * self._variances + (1.0 - fading) * seen
+        gyro, accel = np.sqrt(self._variances)
+        return float(gyro), float(accel)
+
+
 class InertialFilter:
     """Propagates and corrects a `State`; not thread-safe."""
 
@@ -132,6 +166,7 @@ class InertialFilter:
         sigmas = (noise.start_attitude_rad, noise.start_velocity_m_s, 1e-3, noise.start_gyro_bias, noise.start_accel_bias)
         self.covariance: Floats = np.diag(np.square([*np.repeat(sigmas, 3), *noise.autopilot_rad, *np.full(3, noise.autopilot_drift)]))
         self._last: ImuReading | None = None
+        self._shaking = Shaking()
         self.history: deque[tuple[int, State]] = deque([(stamp_ns, start)], maxlen=HISTORY)
 
     def propagate(self, reading: ImuReading) -> None:
@@ -144,10 +179,11 @@ class InertialFilter:
         if duration_s > 0.0:
             before = self._last if self._last is not None and self._last.stamp_ns == self.stamp_ns else reading
             self._last = reading
+            gyro, accel = self._shaking.densities(reading)
             rates = 0.5 * (before.rates + reading.rates) - self.state.gyro_bias
             force = 0.5 * (before.specific_force + reading.specific_force) - self.state.accel_bias
             noise = self._noise
-            densities = np.square([noise.gyro, noise.accel, 0.0, noise.gyro_walk, noise.accel_walk])
+            densities = np.square([max(noise.gyro, gyro), max(noise.accel, accel), 0.0, noise.gyro_walk, noise.accel_walk])
             self._move(reading.stamp_ns, rates, self.state.rotation @ force + GRAVITY, force, densities)
 
     def coast(self, stamp_ns: int) -> None:

@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
+from lidar_mapping.flown_map import FlownMap
 from lidar_mapping.inertial import ImuReading
 from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.readings import ReadingQueue
@@ -35,12 +36,16 @@ from perception_core.ros import (
 from resource_reporter import ResourceReporter, ToldService
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from std_srvs.srv import TriggerRequest
 
     from lidar_mapping.registration import Registration
 
+    Floats = NDArray[np.float64]
+
 CLOUD, CLOUD_BYTES = "/lidar/points", 1 << 23
 IMU, IMU_BYTES, IMU_QUEUE = "/imu/data", 1 << 16, 100
+BASE_LINK = "base_link"
 READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it, over a connection of their own
 TF_PERIOD_S = 0.1
 
@@ -65,6 +70,7 @@ class LidarMappingNode:
         self._reporter = ResourceReporter("mapping")
         self._done = DoneReporter()
         self._vehicle = Vehicle()
+        self._flown_map = FlownMap()
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=self._on_switch)
         self._save_service = ToldService("~save", Trigger, self._on_save)
@@ -112,24 +118,44 @@ class LidarMappingNode:
 
     def _on_imu(self, message: Imu) -> None:
         rates, force = message.angular_velocity, message.linear_acceleration
-        reading = ImuReading(message.header.stamp.to_nsec(), np.array([rates.x, rates.y, rates.z]), np.array([force.x, force.y, force.z]))
+        turn = self._imu_turn(message.header.frame_id.lstrip("/"))
+        measured = (turn @ [rates.x, rates.y, rates.z], turn @ [force.x, force.y, force.z])
+        reading = ImuReading(message.header.stamp.to_nsec(), *measured)
         if not self._readings.add(reading, rospy.Time.now().to_nsec()):
             self._on_garbage(
                 f"a reading of {IMU} can't be one: stamp {reading.stamp_ns}, {reading.rates} rad/s, {reading.specific_force} m/s2"
             )
 
+    def _imu_turn(self, frame: str) -> Floats:
+        """Return R_base_imu (3, 3); an IMU of which ``/tf_static`` says nothing is taken to lie in the body's axes."""
+        if frame in {"", BASE_LINK}:
+            return np.eye(3)
+        try:
+            return self._vehicle.mount(frame)[:3, :3]
+        except LookupError as error:
+            rospy.logwarn_throttle(10.0, f"{IMU} is taken to be in the axes of {BASE_LINK}: {error}")
+            return np.eye(3)
+
     def _register(self, frame: str, sweep: Sweep) -> None:
         poses = self._vehicle.poses_at(sweep.end_ns)
         self._readings.wait_for(sweep.end_ns, READING_WAIT_S)
+        self._flown_map.wait_for()
         with self._lock:
             if not self._switch.enabled:
                 return
+            self._begin_as_flown()
             registration = self._slam.add(sweep, self._readings.take_until(sweep.end_ns), poses, self._vehicle.mount(frame))
             self._publish_state(sweep.stamp_ns, registration)
             self._publish_pose(sweep.end_ns)
         self._report()
         if self._slam.full:
             rospy.logwarn_throttle(10.0, f"the map is full ({len(self._slam.map)} voxels): new surfaces are left out")
+
+    def _begin_as_flown(self) -> None:
+        """Let a mapping that has not begun take the place of `map` from the guidance, which flew on by it if this node has crashed."""
+        flown = self._flown_map.T_map_odom
+        if flown is not None and not self._slam.begun:
+            self._slam.T_map_odom = flown
 
     def _report(self) -> None:
         """Tell the skillset whether pose and map are to be trusted."""
@@ -161,7 +187,10 @@ class LidarMappingNode:
     def _publish_tf(self, _event: object) -> None:
         """Publish map -> odom; odom -> base_link is the guidance's, from the autopilot."""
         with self._lock:
-            place = self._slam.T_map_odom
+            self._begin_as_flown()
+            place, known = self._slam.T_map_odom, self._slam.begun or self._flown_map.T_map_odom is not None
+        if not known:
+            return  # the identity would be a jump of the pose in flight
         transform = TransformStamped(header=Header(stamp=rospy.Time.now(), frame_id="map"), child_frame_id="odom")
         transform.transform.translation = Vector3(*place[:3, 3])
         transform.transform.rotation = Quaternion(*Rotation.from_matrix(place[:3, :3]).as_quat())

@@ -8,7 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lidar_mapping.inertial import ATTITUDE, AUTOPILOT, DRIFT, HEADING, TERMS, VELOCITY, ImuReading, InertialFilter, InertialNoise, State
+from lidar_mapping.inertial import (
+    ATTITUDE,
+    AUTOPILOT,
+    DRIFT,
+    HEADING,
+    POSITION,
+    TERMS,
+    VELOCITY,
+    ImuReading,
+    InertialFilter,
+    InertialNoise,
+    State,
+)
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.registration import Registration, RegistrationSettings, refused, register
 from lidar_mapping.voxel_map import downsample
@@ -30,8 +42,11 @@ KNOT_NS = 10_000_000
 VELOCITY_BASE_NS = 100_000_000
 FIRST_SWEEPS = 3
 FIRST_HEADING_RAD = 0.001  # a new map's heading is what the start says, by definition
+ANY_M_S = 10.0
+CLEARLY = 0.05  # of fitness
+KNOWN_MAP_M = 0.3  # how well a known map's place is known at the start: the autopilot has drifted since it was seen last
 AUTOPILOT_RAD = 0.003  # what its attitude is off without the slow error, which is a part of the state
-JUMP_SIGMAS = 3.0  # velocities that are off by more count less: a position that jumps by 0.1 m looks like 1 m/s for one sweep
+JUMP_SIGMAS = 3.0  # what is off by more counts less: a position that jumps by 0.1 m looks like 1 m/s for one sweep
 
 
 @dataclass(frozen=True)
@@ -86,6 +101,8 @@ class LidarInertialOdometry:
         self.filter = InertialFilter(settings.noise, stamp_ns, start)
         if not keyframes.all:
             self.filter.covariance[HEADING, HEADING] = FIRST_HEADING_RAD**2
+        else:
+            self.filter.covariance[POSITION, POSITION] = np.eye(3) * KNOWN_MAP_M**2
         self._surface: Surface | None = keyframes.surface(start.position, settings.reach_m)
         self._since: list[Floats] = []
         self._last_pose: Floats | None = None
@@ -150,7 +167,8 @@ class LidarInertialOdometry:
     def _locate(self, points: Floats, autopilot: AutopilotMotion | None) -> Registration:
         """Register from where the autopilot's motion leads; where that fits badly, from other starts too, and take the best.
 
-        The others are one's own motion, and none at all since the last sweep: what the autopilot said before may have misled that, too.
+        The others are one's own motion, none at all since the last sweep (what the autopilot said before may have misled that, too), and
+        any motion, without the autopilot's attitude either. The last one has to fit clearly better: it gives up what is known.
         """
         if autopilot is None:
             return self._register(points)
@@ -170,9 +188,22 @@ class LidarInertialOdometry:
             if found.fitness >= best.fitness:
                 best, back_to_best = found, self.filter.keep()
             if best.believed and best.fitness > self._settings.good_fitness:
-                break
+                back_to_best()
+                return best
+        take_back()
+        self._forget_motion()
+        found = self._register(points)
+        if found.believed and found.fitness > best.fitness + CLEARLY:
+            self._learn_anew(autopilot)
+            return found
         back_to_best()
         return best
+
+    def _forget_motion(self) -> None:
+        """Take the velocity since the last sweep for one of up to `ANY_M_S`, and the attitude for what the readings say."""
+        moves = np.zeros((TERMS, 3))
+        moves[VELOCITY], moves[POSITION] = np.eye(3), np.eye(3) * (self.filter.stamp_ns - self.filter.history[0][0]) / NS
+        self.filter.covariance = self.filter.covariance + ANY_M_S**2 * moves @ moves.T
 
     def _at_the_end(self, autopilot: AutopilotMotion) -> AutopilotMotion:
         """Return the motion with the velocity of the sweep's end: as it has changed since the mean, by the IMU."""
@@ -190,17 +221,32 @@ class LidarInertialOdometry:
         def off_m_s(state: State) -> Floats:
             return state.velocity + moves[:, DRIFT] @ state.autopilot_drift - autopilot.velocity
 
-        weight = _weight(off_m_s(self.filter.state), moves @ self.filter.covariance @ moves.T, velocity_m_s)
-
-        def linearise(state: State) -> tuple[Floats, Floats]:
+        def off_rad(state: State) -> tuple[Floats, Floats]:
             said = Rotation.from_rotvec(state.autopilot_error).as_matrix() @ state.rotation
             rows = np.zeros((3, TERMS))
             rows[:, ATTITUDE], rows[:, AUTOPILOT] = np.eye(3), said.T
-            information = rows.T @ rows / AUTOPILOT_RAD**2
-            gradient: Floats = rows.T @ Rotation.from_matrix(autopilot.rotation.T @ said).as_rotvec() / AUTOPILOT_RAD**2
-            return information + weight * moves.T @ moves, gradient + weight * moves.T @ off_m_s(state)
+            return Rotation.from_matrix(autopilot.rotation.T @ said).as_rotvec(), rows
+
+        covariance = self.filter.covariance
+        off, turns = off_rad(self.filter.state)
+        attitude_weight = _weight(off, turns @ covariance @ turns.T, AUTOPILOT_RAD)
+        weight = _weight(off_m_s(self.filter.state), moves @ covariance @ moves.T, velocity_m_s)
+
+        def linearise(state: State) -> tuple[Floats, Floats]:
+            off, rows = off_rad(state)
+            gradient: Floats = attitude_weight * rows.T @ off + weight * moves.T @ off_m_s(state)
+            return attitude_weight * rows.T @ rows + weight * moves.T @ moves, gradient
 
         self.filter.correct(linearise)
+
+    def _learn_anew(self, autopilot: AutopilotMotion) -> None:
+        """Take the autopilot's attitude for as wrong as the scan says: what was known of its error is over."""
+        state, covariance = self.filter.state, self.filter.covariance.copy()
+        covariance[AUTOPILOT, :], covariance[:, AUTOPILOT] = 0.0, 0.0
+        covariance[AUTOPILOT, AUTOPILOT] = np.diag(self._settings.noise.autopilot_rad**2)
+        error = Rotation.from_matrix(autopilot.rotation @ state.rotation.T).as_rotvec()
+        self.filter.state, self.filter.covariance = replace(state, autopilot_error=error), covariance
+        self.filter.history[-1] = (self.filter.stamp_ns, self.filter.state)
 
     def _register(self, points: Floats) -> Registration:
         if self._surface is None:
@@ -230,9 +276,9 @@ class LidarInertialOdometry:
         return frame
 
 
-def _weight(off_m_s: Floats, covariance: Floats, sigma_m_s: float) -> float:
-    """Return the information of each axis of a velocity that is off its prediction (3,) with that covariance (3, 3); 0 for no sigma."""
-    if not np.isfinite(sigma_m_s):
+def _weight(off: Floats, covariance: Floats, sigma: float) -> float:
+    """Return the information of each axis of what is off its prediction (3,) with that covariance (3, 3); 0 for no sigma."""
+    if not np.isfinite(sigma):
         return 0.0
-    squared = float(off_m_s @ np.linalg.solve(covariance + sigma_m_s**2 * np.eye(3), off_m_s))
-    return min(1.0, JUMP_SIGMAS**2 / max(squared, 1e-9)) / sigma_m_s**2
+    squared = float(off @ np.linalg.solve(covariance + sigma**2 * np.eye(3), off))
+    return min(1.0, JUMP_SIGMAS**2 / max(squared, 1e-9)) / sigma**2

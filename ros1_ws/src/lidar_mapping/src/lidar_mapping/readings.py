@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 KEPT = 2000
 FASTEST_RAD_S, STRONGEST_M_S2 = 70.0, 320.0  # 4000 degrees/s and 32 g: beyond the range of what flies on a drone
+WEAKEST_M_S2, WEAKEST_S = 3.0, 1.0  # the mean over so long: nothing that flies falls on; a driver that counts in g tells of 1.0
 AHEAD_NS = NS  # of the clock, which a busy machine hears late; a reading of the future would hold back all after it
 SET_BACK_NS = NS  # a stamp earlier by more tells of a clock that was set back
 
@@ -29,23 +30,37 @@ class ReadingQueue:
         self._readings: deque[ImuReading] = deque(maxlen=KEPT)
         self._last_ns = -1
         self._taken: ImuReading | None = None
+        self._heard_ns, self._mean_m_s2 = -NS, 0.0
         self._arrived = Condition()
         self._silent = False
         """The last wait was in vain, and nothing has come since."""
 
     def add(self, reading: ImuReading, now_ns: int) -> bool:
-        """Keep a reading that has just arrived; return whether it can be one: of now, later than the last one, within an IMU's range."""
+        """Keep a reading that has just arrived; return whether it can be one.
+
+        It can where it is of now, later than the last one, within an IMU's range, and where the vehicle has felt a weight of late.
+        """
         if not _within(reading.rates, FASTEST_RAD_S) or not _within(reading.specific_force, STRONGEST_M_S2):
             return False
         if reading.stamp_ns < self._last_ns - SET_BACK_NS:
             self.clear()
         if not self._last_ns < reading.stamp_ns <= now_ns + AHEAD_NS:
             return False
+        if self._mean_force(reading) < WEAKEST_M_S2:
+            return False
         self._readings.append(reading)
         with self._arrived:
             self._last_ns, self._silent = reading.stamp_ns, False
             self._arrived.notify_all()
         return True
+
+    def _mean_force(self, reading: ImuReading) -> float:
+        """Return the mean of the specific force's strength over the last `WEAKEST_S`, m/s2."""
+        strength = float(np.linalg.norm(reading.specific_force))
+        passed_s = (reading.stamp_ns - self._heard_ns) / NS
+        fading = np.exp(-passed_s / WEAKEST_S) if 0.0 < passed_s < WEAKEST_S else 0.0
+        self._heard_ns, self._mean_m_s2 = reading.stamp_ns, float(fading * self._mean_m_s2 + (1.0 - fading) * strength)
+        return self._mean_m_s2
 
     def wait_for(self, stamp_ns: int, timeout_s: float) -> None:
         """Wait (wall clock) until the readings reach a moment; not where the last wait was in vain and none has come since."""

@@ -71,6 +71,11 @@ class Slam:
         return self._graph.loops
 
     @property
+    def begun(self) -> bool:
+        """Whether a sweep was followed: from then on ``T_map_odom`` is what the scans say, before it may be set."""
+        return self.count.scans > 0
+
+    @property
     def full(self) -> bool:
         """Whether new places are left out."""
         return self.map.full or self.keyframes.full
