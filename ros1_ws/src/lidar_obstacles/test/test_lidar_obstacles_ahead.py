@@ -50,6 +50,17 @@ def test_sideways_flight_sees_what_is_beside_the_nose_whatever_the_yaw(yaw, dist
     assert look(sweep(cloud), crab(yaw), right) is None
 
 
+@pytest.mark.parametrize("timeless", [0, 60, None])
+def test_what_has_no_time_is_an_obstacle_all_the_same(timeless) -> None:
+    cloud = box_cloud((6.0, 0.0, 0.0), seed=1)
+    cloud[:, [1, 2]] = cloud[:, [2, 1]]
+    times = np.linspace(-0.02, 0.02, len(cloud))
+    times[:timeless] = np.nan  # none, the box's, or all
+    found = look(sweep(cloud, times), crab(), Motion(velocity_enu_m_s=(0.0, 1.0, 0.0)))
+    assert found is not None
+    assert found.distance_m == pytest.approx(5.75, abs=0.15)
+
+
 def test_own_returns_and_ground_are_no_obstacle() -> None:
     cloud = box_cloud((99.0, 0.0, 0.0), seed=3)[60:]
     cloud[:, [1, 2]] = cloud[:, [2, 1]]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -73,6 +75,26 @@ def test_broken_within_0_45_s_of_the_last_good_one_and_ok_after_1_s(fault) -> No
 def test_one_glitch_breaks_nothing() -> None:
     run = Run(lambda t: "black" if 2.05 < t < 2.25 else True).go(4)
     assert run.changes == [(0.1, Verdict.OK)]
+
+
+def slow(lost, *, hz, seconds=6.0) -> list[tuple[float, Verdict]]:
+    """Return when the verdict of a sensor of few measurements a second changed; ``lost`` says which of them do not come."""
+    watch, changes = HealthWatch(HealthLimits()), []
+    for k in range(round(seconds * 50)):
+        if k % (50 // hz) == 0 and not lost(k // (50 // hz)):
+            watch.take(FINE, NS + k * TICK)
+        before = watch.verdict
+        if watch.tick(NS + k * TICK) is not before:
+            changes.append((k / 50, watch.verdict))
+    return changes
+
+
+def test_a_slow_sensor_may_lose_one_measurement_too_and_is_silent_within_a_second() -> None:
+    assert slow(lambda k: k == 17, hz=5) == [(0.0, Verdict.OK)]
+    went = slow(lambda k: k > 15, hz=5)
+    assert [verdict for _, verdict in went] == [Verdict.OK, Verdict.BROKEN]
+    assert 3.5 < went[1][0] <= 3.55
+    assert [verdict for _, verdict in slow(lambda _k: False, hz=1)] == [Verdict.OK, Verdict.BROKEN]  # too slow, and never flapping
 
 
 def test_recovery_starts_again_at_each_bad_measurement() -> None:
@@ -150,6 +172,8 @@ def test_a_stamp_that_does_not_advance() -> None:
     judge = StampJudge(StampLimits())
     assert judge.finding(NS, NS).ok
     assert judge.finding(NS, NS + NS // 10).reason == "the stamp does not advance"
+    assert [judge.finding(NS - k * NS // 50, NS + NS // 10).fault for k in range(1, 6)] == [FaultKind.STAMP] * 5  # it goes back
+    assert judge.finding(NS, NS + NS // 10).ok
 
 
 @given(st.floats(0.0, 0.6), st.floats(0.0, 0.03), st.integers(0, 1000))
@@ -182,13 +206,21 @@ def test_future_stamps_then_silence_is_noticed_at_once() -> None:
 @given(st.lists(st.sampled_from([True, None, "bad", "unsure?"]), min_size=1, max_size=80))
 @settings(max_examples=60, deadline=None)
 def test_never_ok_on_old_and_never_broken_on_fresh_measurements(said) -> None:
-    run = Run(lambda t: said[min(round(t * 10) - 1, len(said) - 1)])
+    came: list[float] = []
+
+    def source(t):
+        what = said[min(round(t * 10) - 1, len(said) - 1)]
+        came.extend([] if what is None else [t])
+        return what
+
+    run = Run(source)
     for _ in range(5 * len(said)):
         before = run.watch.verdict
         run.go(0.02)
         age_s = run.watch.age_s(run.now)
         if run.watch.verdict is Verdict.OK:
-            assert age_s <= 0.35
+            slow = len(came) > 5 and min(later - earlier for earlier, later in pairwise(came[-6:])) > 0.15
+            assert age_s <= (0.75 if slow else 0.35)
         if run.watch.verdict is not Verdict.OK and before is Verdict.OK:
             assert age_s > 0.35
         if run.watch.verdict is Verdict.BROKEN and before is not Verdict.BROKEN:

@@ -53,6 +53,13 @@ def test_a_camera_of_12_bits_is_not_dark_and_does_not_flicker() -> None:
     assert converter.gray(message(GRAY.astype(np.uint16) << 2, "mono16")).max() == GRAY.max() >> 2
 
 
+def test_a_hot_pixel_makes_no_camera_of_12_bits_dark() -> None:
+    converter, deep = GrayConverter(), GRAY.astype(np.uint16) << 4
+    deep[1, 2] = 65535
+    assert np.array_equal(converter.gray(message(deep, "mono16"))[4:], GRAY[4:])
+    assert converter.gray(message(deep, "mono16"))[1, 2] == 255
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [

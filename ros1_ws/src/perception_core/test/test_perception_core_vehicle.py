@@ -42,6 +42,18 @@ def test_motion_is_turned_from_the_guidances_map_into_the_frame_of_the_poses(veh
     assert vehicle.motion.target_enu_m is None
 
 
+def test_a_sensor_is_found_through_all_frames_between_and_with_a_slash_before_its_name(vehicle: Vehicle) -> None:
+    vehicle._on_static(transform("camera", "zed_left", 0.0, 0.1, 0.0))
+    with pytest.raises(LookupError, match="no transform from base_link to 'zed_left'"):
+        vehicle.mount("zed_left")
+    vehicle._on_static(transform("/base_link", "/camera", math.pi / 2, 2.0, 0.0))
+    for name in ("zed_left", "/zed_left"):
+        assert vehicle.mount(name)[:3, 3] == pytest.approx((2.0, 0.1, 0.0))
+    vehicle._on_static(transform("zed_left", "camera", 0.0, 0.0, 0.0))  # a loop
+    with pytest.raises(LookupError):
+        vehicle.mount("zed_left")
+
+
 def test_without_a_correction_as_in_recordings_of_before_the_motion_is_what_the_guidance_says(vehicle: Vehicle) -> None:
     vehicle._on_state(state())
     assert vehicle.motion.velocity_enu_m_s == (1.0, 0.0, 0.5)

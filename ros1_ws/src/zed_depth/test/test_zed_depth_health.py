@@ -47,6 +47,13 @@ def flickering(image, seed) -> np.ndarray:
     return again
 
 
+def covered(image, begin, end) -> np.ndarray:
+    """Return the image of a lens that a finger covers between two shares of its width."""
+    columns = np.linspace(0.0, 1.0, image.shape[1])
+    free = 1.0 - 1.0 / (1.0 + np.exp((begin - columns) / 0.02)) / (1.0 + np.exp((columns - end) / 0.02))
+    return image * free + 40.0 * (1.0 - free)
+
+
 BROKEN, UNKNOWN = Verdict.BROKEN, Verdict.UNKNOWN
 # name: (what becomes of the pair, with a seed for each; verdict; fault; words of the sentence)
 BREAKS = {
@@ -72,6 +79,24 @@ BREAKS = {
     "dark, with noise": (lambda a, b, s: (noisy(a * 0.02, s, 5), noisy(b * 0.02, s + 1, 5)), BROKEN, FaultKind.EXPOSURE, "is dark"),
     "black": (lambda a, b, s: (a * 0, b * 0), BROKEN, FaultKind.EXPOSURE, "left image is dark"),
     "blank": (lambda a, b, s: (noisy(a, s), noisy(b * 0 + 128, s + 1)), BROKEN, FaultKind.EXPOSURE, "right image is blank"),
+    "both blank": (
+        lambda a, b, s: (noisy(a * 0 + 128, s), noisy(b * 0 + 128, s + 1)),
+        UNKNOWN,
+        FaultKind.EXPOSURE,
+        "both images are blank: a surface without texture",
+    ),
+    "half of a lens covered": (
+        lambda a, b, s: (noisy(a, s), noisy(covered(b, -1.0, 0.5), s + 1)),
+        BROKEN,
+        FaultKind.VIEW,
+        "the right camera sees nothing where the other one does",
+    ),
+    "the middle of a lens covered": (
+        lambda a, b, s: (noisy(covered(a, 0.25, 0.75), s), noisy(b, s + 1)),
+        BROKEN,
+        FaultKind.VIEW,
+        "the left camera sees nothing where the other one does",
+    ),
     "overexposed": (lambda a, b, s: (noisy(a * 8.0, s), noisy(b * 8.0, s + 1)), BROKEN, FaultKind.EXPOSURE, "overexposed"),
     "frozen": (lambda a, b, s: (a, b), BROKEN, FaultKind.FROZEN, "left image is frozen"),
     "frozen but for a pixel": (lambda a, b, s: (noisy(a, s), flickering(b, s)), BROKEN, FaultKind.FROZEN, "right image is frozen"),

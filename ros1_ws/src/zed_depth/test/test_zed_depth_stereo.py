@@ -106,9 +106,11 @@ def test_obstacle_is_where_the_wall_stands_in_the_map() -> None:
     assert (back.nearest, back.unknown) == (None, "the camera does not look where the vehicle goes")
     depth[:] = np.nan
     blind = look(NS)
-    assert (blind.nearest, blind.unknown) == (None, "only 0% of the view ahead has a depth")
+    assert (blind.nearest, blind.unknown) == (None, "only 0% of a part of the view ahead has a depth")
     depth[:] = 30.0
     assert (look(NS).nearest, look(NS).unknown) == (None, "")
+    depth[:, : depth.shape[1] // 2] = np.nan  # as where both lenses are covered alike
+    assert (look(NS).nearest, look(NS).unknown) == (None, "only 0% of a part of the view ahead has a depth")
     with pytest.raises(PoseUnavailableError):
         look(3 * NS)
     assert ahead.corridor == Corridor(length_m=8.0)
@@ -127,6 +129,21 @@ def test_pairs_are_of_one_moment_and_images_used_once() -> None:
     assert pair is not None
     assert pair.stamp_ns == NS
     assert pairing.add("right", NS, grey(3)) is None
+
+
+@pytest.mark.parametrize("images_late", [1, 5])
+def test_images_of_one_side_that_come_later_than_the_others_next_ones_find_their_partners(images_late) -> None:
+    pairing = Pairing(tolerance_s=0.005)
+    pairs = []
+    for k in range(20):
+        pairs.append(pairing.add("left", NS + k * NS // 60, grey(k)))
+        late = k - images_late
+        if late >= 0:
+            pairs.append(pairing.add("right", NS + late * NS // 60 + 1_000_000, grey(100 + late)))
+        assert pairing.apart_s() == 0.0
+    made = [pair for pair in pairs if pair is not None]
+    assert [pair.stamp_ns for pair in made] == [NS + k * NS // 60 for k in range(20 - images_late)]
+    assert all(np.array_equal(pair.left, grey(k)) and np.array_equal(pair.right, grey(100 + k)) for k, pair in enumerate(made))
 
 
 @pytest.mark.parametrize("disparity_px", [70.0, 90.0, 120.0, 180.0])

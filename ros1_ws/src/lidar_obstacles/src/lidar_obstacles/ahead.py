@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidar_obstacles.ground import ASIDE_M, BEHIND_M, GroundModel, GroundSettings
-from perception_core import Ahead, Corridor, Motion, PoseBuffer, Support, Sweep, deskew, direction_of_motion, nearest_obstacle
+from perception_core import NS, Ahead, Corridor, Motion, PoseBuffer, Support, Sweep, deskew, direction_of_motion, nearest_obstacle
 from perception_core.corridor import corridor_coordinates
 
 Floats = NDArray[np.float64]
@@ -61,6 +61,7 @@ class LidarAhead:
         ``gone`` are the sectors that have just lost their returns, as of ``CloudJudge``.
         """
         settings = self._settings
+        sweep = _timed(sweep)
         pose = poses.at([sweep.end_ns]).matrix()
         position = pose[:3, 3]
         direction = direction_of_motion(position, pose[:3, 0], motion)
@@ -89,6 +90,15 @@ class LidarAhead:
         length_m = self._settings.corridor.length_m
         near = (ahead >= -BEHIND_M - BLUR_M) & (ahead <= length_m + BLUR_M) & (np.abs(left) <= ASIDE_M + BLUR_M) & ~own
         return _Around(near=usable.select(near), ahead=int(np.count_nonzero(towards)))
+
+
+def _timed(sweep: Sweep) -> Sweep:
+    """Return the sweep with the moment of its end for points without a time: not straightened, they are still in the way."""
+    known = np.isfinite(sweep.times_s)
+    if known.all():
+        return sweep
+    end_s = np.float32((sweep.end_ns - sweep.stamp_ns) / NS)
+    return Sweep(sweep.stamp_ns, sweep.points, np.where(known, sweep.times_s, end_s))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lidar_obstacles.range_noise import range_noise_m
 from lidar_obstacles.range_steps import RangeSteps
 from perception_core import FINE, NS, FaultKind, Finding, Sweep, broken, unsure
 
@@ -35,7 +36,8 @@ class CloudLimits:
 
     Fewer than ``min_returns`` are nothing; fewer than ``thin_share`` of what came just before is a broken sensor; more than ``far_share``
     of the returns beyond ``max_range_m`` are coordinates in another unit. A sector is lost with less than ``sector_share`` of what it had.
-    Ranges on all sides that change faster than ``max_speed_m_s`` are no motion.
+    Ranges on all sides that change faster than ``max_speed_m_s`` are no motion. Where surfaces are smooth, ranges scatter by
+    ``max_noise_m`` at most.
     """
 
     min_returns: int = 100
@@ -44,6 +46,7 @@ class CloudLimits:
     far_share: float = 0.05
     sector_share: float = 0.3
     max_speed_m_s: float = 3.0
+    max_noise_m: float = 0.12
 
 
 class CloudJudge:
@@ -51,7 +54,8 @@ class CloudJudge:
 
     A sector whose surfaces came nearer than the sensor sees, as the ground does at a landing, is hidden: it may be lost or not, and is not
     missed before it has returns again. One or two neighbouring sectors may lose their returns at the edge of a wall: that is no fault, but
-    ``gone`` tells of them. So may more of them where the returns became fewer from sweep to sweep before, as beside a wall that ends.
+    ``gone`` tells of them. So may more of them where the returns became fewer from sweep to sweep before, as beside a wall that ends. Where
+    such a gap is empty and has returns on both sides it is no edge: ``gone`` tells of it until returns come from there again.
 
     What is lost stays so until the returns are back, or the vehicle is `LEFT_BEHIND_M` away from where they were lost: the sensor is then
     judged as one that was just started, but ``gone`` tells of the lost sectors until returns come from them.
@@ -64,6 +68,7 @@ class CloudJudge:
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._blind: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._lost_at_m: Floats | None = None
+        self._looks = 0
         self._steps = RangeSteps(limits.max_speed_m_s)
         self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
         self.gone: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
@@ -91,7 +96,12 @@ class CloudJudge:
             return broken(FaultKind.RANGE, far)
         if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
-        off_m = self._steps.offset_m(sample[outside], ranges[outside], sweep.stamp_ns, least_m=NEAR * self_m)
+        self._looks += 1
+        noise_m = range_noise_m(sweep, self._looks, self_m=self_m)
+        if noise_m > self._limits.max_noise_m:
+            return broken(FaultKind.RANGE, f"the ranges scatter by {noise_m:.2f} m where they are smoothest")
+        least_m = NEAR * self_m
+        off_m = self._steps.offset_m(sample[outside], ranges[outside], sweep.stamp_ns, least_m=least_m, position_m=position_m)
         if off_m:
             became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
             return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
@@ -159,7 +169,8 @@ class CloudJudge:
         self._recent.append(sectors)
         self._gone_ns[counts >= SECTOR_RETURNS * stride] = LONG_AGO_NS
         self._gone_ns[gone] = stamp_ns
-        self._blind &= counts < BLIND_RETURNS * stride
+        empty = counts < BLIND_RETURNS * stride
+        self._blind = (self._blind | _holes(gone & empty, counts >= SECTOR_RETURNS * stride)) & empty
         self.gone = (np.abs(stamp_ns - self._gone_ns) < GONE_S * NS) | self._blind  # a clock may have gone back
         return FINE
 
@@ -179,6 +190,17 @@ def _sectors(sample: NDArray[np.float32], ranges: NDArray[np.float32], stride: i
     sector = ((azimuth + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
     counts, near = (np.bincount(sector[which], minlength=SECTORS) for which in (ranges > self_m, ranges <= NEAR * self_m))
     return _Sectors(counts.astype(np.float64) * stride, 2 * near > np.bincount(sector, minlength=SECTORS))
+
+
+def _holes(gone: NDArray[np.bool_], seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the sectors that are gone between two that are seen: beside the edge of a wall, one side would be empty, too."""
+    holes = np.zeros_like(gone)
+    for length in range(1, LOST_TOGETHER):
+        for start in np.flatnonzero(gone):
+            run = np.arange(start, start + length) % SECTORS
+            if gone[run].all() and seen[start - 1] and seen[(start + length) % SECTORS]:
+                holes[run] = True
+    return holes
 
 
 def _together(gone: NDArray[np.bool_]) -> NDArray[np.bool_]:

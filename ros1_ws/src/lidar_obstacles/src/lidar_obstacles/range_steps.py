@@ -26,6 +26,9 @@ LONGEST_PAUSE_S = 1.0  # after which sweeps aren't compared, and an error that w
 QUARTILES = (25.0, 75.0)
 NEAREST = 10.0  # percent of the cells
 FEW = 1.0  # percent of the returns: specks of dust or rain
+ALIKE_M = 0.3  # by which the changes of an error may differ over the view, with the vehicle's own motion
+LEAST_HEIGHT_M = 1.0  # above the ground, or from another surface that is all there is to see
+STEP_M = 0.15  # that hovering may make of most ranges, with the vehicle's own tilting
 OBLIQUE = 1.2  # by which the range along a ray changes faster than the distance of a surface that the ray meets at 56 degrees
 
 
@@ -34,31 +37,47 @@ class RangeSteps:
 
     def __init__(self, max_speed_m_s: float) -> None:
         self._max_speed_m_s = max_speed_m_s
-        self._before: tuple[int, Floats] | None = None
+        self._before: tuple[int, Floats, Floats | None] | None = None
         self._offset_m = 0.0
 
-    def offset_m(self, points: NDArray[np.float32], ranges_m: NDArray[np.float32], stamp_ns: int, *, least_m: float) -> float:
+    def offset_m(
+        self,
+        points: NDArray[np.float32],
+        ranges_m: NDArray[np.float32],
+        stamp_ns: int,
+        *,
+        least_m: float,
+        position_m: Floats | None = None,
+    ) -> float:
         """Return by how much the ranges (N,) of the points (N, 3) are too long; 0 where no step was seen, or it was taken back.
 
         Where the nearest surfaces are nearer than ``least_m``, as on the ground, the sensor may not see the very nearest, and small motions
-        change all ranges along the rays by much: nothing new is found there.
+        change all ranges along the rays by much: nothing new is found there. By the vehicle's position (3,) where it is known, else by
+        its speed at most, ranges may change.
         """
         now = _mean_ranges(points, ranges_m)
         if np.count_nonzero(np.isfinite(now)) < CELLS:
             return self._offset_m
-        before, self._before = self._before, (stamp_ns, now)
+        before, self._before = self._before, (stamp_ns, now, position_m)
         if before is None or not 0 < stamp_ns - before[0] <= LONGEST_PAUSE_S * NS:
             self._offset_m = 0.0
             return 0.0
-        step_m, limit_m = _step(before[1], now), OBLIQUE * self._max_speed_m_s * (stamp_ns - before[0]) / NS
+        limit_m = OBLIQUE * self._max_speed_m_s * (stamp_ns - before[0]) / NS
+        if position_m is not None and before[2] is not None:
+            limit_m = min(limit_m, OBLIQUE * float(np.linalg.norm(position_m - before[2])) + STEP_M)
+        step_m = _step(before[1], now, most_share=limit_m / LEAST_HEIGHT_M)
         if abs(step_m) > limit_m and np.percentile(ranges_m, FEW) > least_m:
             offset_m = self._offset_m + step_m
             self._offset_m = offset_m if abs(offset_m) > limit_m / 2.0 else 0.0
         return self._offset_m
 
 
-def _step(before_m: Floats, now_m: Floats) -> float:
-    """Return by how much three quarters of the ranges and half of the nearest ones grew at least; negative: shrank; 0 if neither."""
+def _step(before_m: Floats, now_m: Floats, *, most_share: float) -> float:
+    """Return by how much three quarters of the ranges and half of the nearest ones grew at least; negative: shrank; 0 if neither.
+
+    An error of the sensor adds the same to all, or multiplies them by more than a share of ``most_share``. A climb over open ground, seen
+    by beams that are nearly level, multiplies them by less.
+    """
     both = np.isfinite(before_m) & np.isfinite(now_m)
     if np.count_nonzero(both) < CELLS:
         return 0.0
@@ -66,7 +85,10 @@ def _step(before_m: Floats, now_m: Floats) -> float:
     change_m = now_m - before_m
     of_nearest_m = float(np.median(change_m[before_m <= np.percentile(before_m, NEAREST)]))
     low_m, high_m = (float(value) for value in np.percentile(change_m, QUARTILES))
-    return max(0.0, min(low_m, of_nearest_m)) + min(0.0, max(high_m, of_nearest_m))
+    step_m = max(0.0, min(low_m, of_nearest_m)) + min(0.0, max(high_m, of_nearest_m))
+    low, high = (float(value) for value in np.percentile(change_m / before_m, QUARTILES))
+    alike = high_m - low_m <= max(abs(step_m), ALIKE_M)
+    return step_m if alike or max(low, -high) > most_share else 0.0
 
 
 def _mean_ranges(points: NDArray[np.float32], ranges_m: NDArray[np.float32]) -> Floats:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 
 from perception_core.poses import NS
 
 RATE_OVER_S = 2.0
+INTERVALS = 5  # between the last measurements, good or bad: the shortest tells how often they come
+PATIENCE = 2.5  # of this interval: one measurement of a slow sensor may be lost, as one of a fast one may
+MOST_PATIENCE_S = 0.75
 LATE_TICK_S = 0.1
 
 
@@ -87,8 +91,9 @@ class HealthWatch:
     """Judge a stream of measurements by when the last good one arrived.
 
     A bad measurement (black, frozen, empty) never breaks the sensor by itself: it does not count as good, so that one glitch passes and a
-    lasting fault shows within ``timeout_s`` of the last good measurement. When that time is over, the verdict is that of what came
-    meanwhile: UNKNOWN if it only could not be judged, else BROKEN. Not thread-safe: the caller serialises.
+    lasting fault shows within ``timeout_s`` of the last good measurement, of a slow sensor within 2.5 of its intervals. When that time is
+    over, the verdict is that of what came meanwhile: UNKNOWN if it only could not be judged, else BROKEN. Not thread-safe: the caller
+    serialises.
     """
 
     def __init__(self, limits: HealthLimits) -> None:
@@ -108,9 +113,11 @@ class HealthWatch:
         self._trouble: Finding | None = None
         self._trouble_ns = 0
         self._good_ns: deque[int] = deque()
+        self._arrived_ns: deque[int] = deque(maxlen=INTERVALS + 1)
 
     def take(self, finding: Finding, arrived_ns: int) -> None:
         """Tell of a measurement that arrived at this moment."""
+        self._arrived_ns.append(arrived_ns)
         if finding.ok:
             self._good(arrived_ns)
         else:
@@ -119,7 +126,7 @@ class HealthWatch:
 
     def _good(self, arrived_ns: int) -> None:
         last = self._last_good_ns
-        if self._good_since_ns is None or last is None or arrived_ns - last > self.limits.timeout_s * NS:
+        if self._good_since_ns is None or last is None or arrived_ns - last > self._patience_ns():
             self._good_since_ns = arrived_ns
         self._last_good_ns = arrived_ns
         self._trouble = None
@@ -158,18 +165,24 @@ class HealthWatch:
         span_ns = recent[-1] - recent[0] if recent else 0
         return (len(recent) - 1) * NS / span_ns if span_ns > 0 else 0.0
 
+    def _patience_ns(self) -> float:
+        """Return how long the sensor may be without a good measurement."""
+        known = len(self._arrived_ns) > INTERVALS
+        usual_ns = min(later - earlier for earlier, later in pairwise(self._arrived_ns)) if known else 0
+        return max(self.limits.timeout_s * NS, min(PATIENCE * usual_ns, MOST_PATIENCE_S * NS))
+
     def _verdict_without_good(self, now_ns: int) -> Verdict:
         trouble = self._fresh_trouble(now_ns)
         return Verdict.BROKEN if trouble is None else trouble.verdict
 
     def _fresh_trouble(self, now_ns: int) -> Finding | None:
         """Return what the last measurement complained about; None when none came within the time-out: then the sensor is silent."""
-        fresh = self._trouble is not None and now_ns - self._trouble_ns <= self.limits.timeout_s * NS
+        fresh = self._trouble is not None and now_ns - self._trouble_ns <= self._patience_ns()
         return self._trouble if fresh else None
 
     def _overdue(self, now_ns: int) -> bool:
         if self._last_good_ns is not None:
-            return now_ns - self._last_good_ns > self.limits.timeout_s * NS
+            return now_ns - self._last_good_ns > self._patience_ns()
         return self._started_ns is not None and now_ns - self._started_ns > self.limits.start_s * NS
 
     def _is_good(self) -> bool:
@@ -189,5 +202,5 @@ class HealthWatch:
         if self._last_good_ns is None:
             return FaultKind.SILENT, self._missing or "nothing received yet"
         if self._overdue(now_ns):
-            return FaultKind.SILENT, f"no measurement for {self.limits.timeout_s:g} s"
+            return FaultKind.SILENT, f"no measurement for {self._patience_ns() / NS:.2g} s"
         return self.fault, "recovering"

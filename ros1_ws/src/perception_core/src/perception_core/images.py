@@ -58,12 +58,14 @@ ENCODINGS = {
     "yuv422_yuy2": Encoding(2, 8, cv2.COLOR_YUV2GRAY_YUY2),
 }
 SHORT_BITS = (16, 14, 12, 10, 8)
+SAMPLED = 4  # every so many pixels of so many rows tell how bright an image is
+BRIGHTEST = 99.5  # percentile: a few hot pixels do not say how many bits there are
 
 
 class GrayConverter:
     """Turn the images of one camera into grey ones; not thread-safe.
 
-    A camera of 10, 12 or 14 bits sends 16 of them, filled from below: how many it uses is told by the brightest pixel seen so far.
+    A camera of 10, 12 or 14 bits sends 16 of them, filled from below: how many it uses is told by the brightest pixels seen so far.
     """
 
     def __init__(self) -> None:
@@ -80,9 +82,9 @@ class GrayConverter:
         return shallow if encoding.to_gray is None else convert(shallow, encoding.to_gray)
 
     def _to_8_bits(self, pixels: NDArray[np.integer]) -> NDArray[np.uint8]:
-        needed = int(pixels.max()).bit_length()
+        needed = int(np.percentile(pixels[::SAMPLED, ::SAMPLED], BRIGHTEST)).bit_length()
         self._bits = max(self._bits, min(bits for bits in SHORT_BITS if bits >= needed))
-        return (pixels >> (self._bits - 8)).astype(np.uint8)
+        return np.asarray(np.minimum(pixels >> (self._bits - 8), 255), dtype=np.uint8)
 
 
 def _pixels(message: ImageLike, encoding: Encoding) -> NDArray[np.integer]:

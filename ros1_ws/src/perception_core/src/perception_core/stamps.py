@@ -43,6 +43,6 @@ class StampJudge:
         if self._late:
             told = f", {self.limits.latency_s:g} s of which are its known latency" if self.limits.latency_s else ""
             return broken(FaultKind.STAMP, f"the measurement is {delay_s + self.limits.latency_s:.2f} s old when it arrives{told}")
-        if stamp_ns == previous_ns:
+        if stamp_ns <= previous_ns:
             return broken(FaultKind.STAMP, "the stamp does not advance")
         return FINE

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 VIEW_M = 3.0  # how far ahead the corridor's cross-section must be in view: farther than the vehicle needs to stop
 VIEW_SHARE = 0.5  # of the cross-section
 GRID = (9, 5)
+PARTS = 3  # side by side, of the corridor's view: each must have depths, or half a covered lens would pass for a free way
 UPWARDS = np.array([0.0, 0.0, 1.0])
 
 
@@ -23,7 +24,7 @@ class AheadSettings:
     """Where to look, and what to believe.
 
     The range ends where a disparity error of one pixel makes the depth useless: with fx 240 px and 0.12 m between the cameras one pixel is
-    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of the corridor's view it is unknown what is there.
+    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of a third of the corridor's view it is unknown what is there.
     """
 
     corridor: Corridor
@@ -99,5 +100,6 @@ def _unknown(
         return "the camera does not look where the vehicle goes"
     low_row, low_column = int(rows[visible].min()), int(columns[visible].min())
     window = depth_m[low_row : int(rows[visible].max()) + 1, low_column : int(columns[visible].max()) + 1]
-    known = float(np.mean(np.isfinite(window)))
-    return "" if known >= settings.min_known else f"only {known:.0%} of the view ahead has a depth"
+    parts = [part for part in np.array_split(np.isfinite(window), PARTS, axis=1) if part.size]
+    known = min(float(np.mean(part)) for part in parts)
+    return "" if known >= settings.min_known else f"only {known:.0%} of a part of the view ahead has a depth"

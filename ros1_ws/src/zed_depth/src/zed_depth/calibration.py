@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 ROW_TOLERANCE_PX = 1.0  # by which the rows of both projections may disagree
 FOCAL_LIMITS = (0.2, 10.0)  # of the width: views of 136 and of 6 degrees
 BASELINE_LIMITS_M = (0.005, 3.0)
+SIZE_LIMITS_PX = (32, 16_384)
+CENTRE_LIMITS = (0.3, 0.7)  # of the size, of the principal point: with half of its P, or twice, a camera_info is of other images
 FISHEYE = "equidistant"
 
 
@@ -97,6 +99,9 @@ class Camera:
             raise CalibrationError(f"the {side} camera_info holds values that are not finite")
         bins = np.array([max(1, int(info.binning_x)), max(1, int(info.binning_y))])
         width, height = info.width // int(bins[0]), info.height // int(bins[1])
+        least, most = SIZE_LIMITS_PX
+        if not (least <= width <= most and least <= height <= most):
+            raise CalibrationError(f"the {side} camera_info is for {width}x{height} images, expected {least} to {most} pixels each way")
         scale = np.diag([1.0 / bins[0], 1.0 / bins[1], 1.0])
         if not R.any():
             if D.any():
@@ -116,9 +121,10 @@ class Camera:
         low, high = (limit * self.width for limit in FOCAL_LIMITS)
         if not low <= fx <= high:
             raise CalibrationError(f"the {side} camera_info's fx of {fx:g} px is not that of images {self.width} px wide")
-        if not (0.0 < cx < self.width and 0.0 < cy < self.height):
+        low, high = CENTRE_LIMITS
+        if not (low <= cx / self.width <= high and low <= cy / self.height <= high):
             raise CalibrationError(
-                f"the {side} camera_info's principal point ({cx:.0f}, {cy:.0f}) is outside of its {self.width}x{self.height} image"
+                f"the {side} camera_info's principal point ({cx:.0f}, {cy:.0f}) is far from the middle of {self.width}x{self.height} images"
             )
 
     @property
@@ -132,10 +138,15 @@ class Camera:
     def maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
         """Return OpenCV's maps from the rectified image to the raw one."""
         size = (self.width, self.height)
-        if self.fisheye:
-            first, second = cv2.fisheye.initUndistortRectifyMap(self.K, self.D[:4], self.R, self.P[:, :3], size, cv2.CV_16SC2)
-        else:
-            first, second = cv2.initUndistortRectifyMap(self.K, self.D, self.R, self.P[:, :3], size, cv2.CV_16SC2)
+        if not (self.K[0, 0] > 0.0 and self.K[1, 1] > 0.0):
+            raise CalibrationError(f"the camera_info's K has the focal lengths {self.K[0, 0]:g} and {self.K[1, 1]:g} px")
+        try:
+            if self.fisheye:
+                first, second = cv2.fisheye.initUndistortRectifyMap(self.K, self.D[:4], self.R, self.P[:, :3], size, cv2.CV_16SC2)
+            else:
+                first, second = cv2.initUndistortRectifyMap(self.K, self.D, self.R, self.P[:, :3], size, cv2.CV_16SC2)
+        except cv2.error as error:
+            raise CalibrationError(f"the camera_info's K, D ({len(self.D)} numbers), R, P rectify no image: {error.err}") from error
         return first, second
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from perception_core import FINE, FaultKind, Finding, broken
+from perception_core import FINE, FaultKind, Finding, broken, unsure
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,6 +43,7 @@ class ImageJudge:
     def __init__(self, limits: ImageLimits) -> None:
         self._limits = limits
         self._previous: dict[str, Gray] = {}
+        self._blank: set[str] = set()  # the sides of the last pair that are lit, but show nothing
         self.sharpness = 0.0
         """Mean second derivative of the less sharp image of the last pair, grey levels; to be compared among images of one scene only."""
 
@@ -50,7 +51,10 @@ class ImageJudge:
         """Return what the images of this pair tell; call it once for each pair."""
         sides = (("left", pair.left), ("right", pair.right))
         self.sharpness = min(_sharpness(image) for _, image in sides)
+        self._blank.clear()
         findings = [self._one(side, image) for side, image in sides]
+        if len(self._blank) == len(sides):
+            return unsure(FaultKind.EXPOSURE, "both images are blank: a surface without texture, or covered lenses")
         return next((finding for finding in findings if not finding.ok), FINE)
 
     def _one(self, side: str, image: Gray) -> Finding:
@@ -64,10 +68,13 @@ class ImageJudge:
         told = f"mean {mean:.0f}, contrast {contrast:.1f} of 255"
         if saturated > limits.max_saturated:
             return broken(FaultKind.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
-        if contrast < limits.min_contrast or (mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast):
-            return broken(FaultKind.EXPOSURE, f"{side} image is {'dark' if mean < limits.dark_mean else 'blank'} ({told})")
+        if mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast:
+            return broken(FaultKind.EXPOSURE, f"{side} image is dark ({told})")
         if previous is not None and previous.shape == sample.shape and np.mean(previous != sample) < limits.min_changed:
             return broken(FaultKind.FROZEN, f"{side} image is frozen")
+        if contrast < limits.min_contrast:
+            self._blank.add(side)
+            return broken(FaultKind.EXPOSURE, f"{side} image is blank ({told})")
         return FINE
 
 

@@ -49,7 +49,7 @@ class ZedDepthNode:
 
     def __init__(self, settings: ZedSettings) -> None:
         self._settings = settings
-        self._gray = {side: GrayConverter() for side in SIDES}
+        self._gray = GrayConverter()  # of both: cameras of 10 or 12 bits must be taken for the same kind
         self._infos: dict[str, CameraInfo] = {}
         self._pairing = Pairing(tolerance_s=settings.sync_tolerance_s)
         self._vehicle = Vehicle()
@@ -102,7 +102,8 @@ class ZedDepthNode:
     def _on_image(self, message: Image, side: str) -> None:
         stamp_ns = message.header.stamp.to_nsec()
         try:
-            image = self._gray[side].gray(message)
+            with self._lock:
+                image = self._gray.gray(message)
         except ValueError as error:
             self._trouble(broken(FaultKind.FORMAT, f"{side} image: {error}"), stamp_ns)
             self._done.done(stamp_ns)

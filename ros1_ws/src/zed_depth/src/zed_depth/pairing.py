@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Gray = NDArray[np.uint8]
+
+WAITING = 8  # images of one side that may come before their partners: the two topics come on two connections
 
 
 @dataclass(frozen=True)
@@ -24,25 +27,26 @@ class StereoPair:
 
 
 class Pairing:
-    """Join the newest left with the newest right image when their stamps agree; not thread-safe."""
+    """Join left and right images whose stamps agree, also when one side comes some images later; not thread-safe."""
 
     def __init__(self, *, tolerance_s: float) -> None:
         self._tolerance_ns = int(tolerance_s * NS)
-        self._newest: dict[str, tuple[int, Gray]] = {}
+        self._waiting: dict[str, deque[tuple[int, Gray]]] = {side: deque(maxlen=WAITING) for side in ("left", "right")}
 
     def add(self, side: str, stamp_ns: int, image: Gray) -> StereoPair | None:
-        """Take an image of the side ``left`` or ``right``; return the pair that it completes. Each image is used once."""
-        self._newest[side] = (stamp_ns, image)
-        if len(self._newest) < 2:
+        """Take an image of the side ``left`` or ``right``; return the pair that it completes. Each image is used once, in order."""
+        mine, others = self._waiting[side], self._waiting["right" if side == "left" else "left"]
+        mine.append((stamp_ns, image))
+        partner = min(others, key=lambda other: abs(other[0] - stamp_ns), default=None)
+        if partner is None or abs(partner[0] - stamp_ns) > self._tolerance_ns:
             return None
-        (left_ns, left), (right_ns, right) = self._newest["left"], self._newest["right"]
-        if abs(left_ns - right_ns) > self._tolerance_ns:
-            return None
-        self._newest.clear()
-        return StereoPair(stamp_ns=left_ns, left=left, right=right)
+        while others.popleft() is not partner:
+            pass
+        mine.clear()
+        left, right = ((stamp_ns, image), partner) if side == "left" else (partner, (stamp_ns, image))
+        return StereoPair(stamp_ns=left[0], left=left[1], right=right[1])
 
     def apart_s(self) -> float:
-        """Return by how much the stamps of two images that wait for each other differ; 0 when fewer than two wait."""
-        if len(self._newest) < 2:
-            return 0.0
-        return abs(self._newest["left"][0] - self._newest["right"][0]) / NS
+        """Return by how much the stamps of images that wait for each other differ at least; 0 while one side has none waiting."""
+        left, right = ([stamp_ns for stamp_ns, _ in waiting] for waiting in self._waiting.values())
+        return min((abs(one - other) for one in left for other in right), default=0) / NS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from zed_depth.confidence import confidence_of
 from zed_depth.depth_scale import ScaleJudge
 from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
 from zed_depth.stereo import DisparityRange, StereoMatcher, depth_of
-from zed_depth.view_health import view_of
+from zed_depth.view_health import ViewLimits, view_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from zed_depth.settings import ZedSettings
 
 
+MEND_SHARE = 0.6  # of max_vertical_px
 SHARE_FELL = 0.92  # of the pixels that had a depth, or a parallax, in the pair before; with less, it is in doubt
 
 
@@ -108,7 +109,7 @@ class StereoRig:
                 prepared = calibration.prepared(pair.left, pair.right)
             except CalibrationError as error:
                 return broken(FaultKind.INFO, str(error))
-            view = view_of(*prepared, offset_px=calibration.geometry.offset_px, limits=self._settings.view)
+            view = view_of(*prepared, offset_px=calibration.geometry.offset_px, limits=self._view_limits())
             self._view = view.finding
             if view.landmarks is not None:
                 self._scale.take(pair.stamp_ns, view.landmarks, calibration.geometry, self._camera_pose)
@@ -116,6 +117,12 @@ class StereoRig:
             with self._lock:
                 self._view_ns = pair.stamp_ns
         return first_trouble(self._view, self._scale.finding, valid)
+
+    def _view_limits(self) -> ViewLimits:
+        """Return the limits; once found off, the rows must be clearly right again, or what is at the limit would flap."""
+        limits = self._settings.view
+        found = self._view.fault is FaultKind.CALIBRATION
+        return replace(limits, max_vertical_px=MEND_SHARE * limits.max_vertical_px) if found else limits
 
     def _due(self, pair: StereoPair) -> bool:
         """Return whether both images must be held against each other now."""

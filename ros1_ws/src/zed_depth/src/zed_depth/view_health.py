@@ -14,6 +14,7 @@ import numpy as np
 
 from perception_core import FINE, FaultKind, Finding, broken, unsure
 from zed_depth.depth_scale import Landmarks, landmarks_of
+from zed_depth.stereo import noise_level
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 FEATURES = 400
 FAST_THRESHOLDS = ((60, 300), (25, 120), (7, 0))  # contrast of the corners, and how many are enough not to look for fainter ones
+ABOVE_NOISE = 2.5  # deviations of the noise: fainter corners are made by it, and match by chance
 FEW_FEATURES = 60
 ENOUGH_FEATURES = 120
 ENOUGH_MATCHES = 20
@@ -32,6 +34,11 @@ AGREE_PX = 2.0
 FIRST_GUESS_SHARE = 0.03  # of the height: by as much the rows of a camera that is off may differ over the image
 FITS = 4
 EDGE_PX = 9
+TILES = (8, 20)  # rows and columns in which both images are compared for a lens that is partly covered,
+TILE_CELLS = 5  # each cut into 5 x 5 averages, which have a third of the pixels' noise or less
+CONTENT, NO_CONTENT = 6.0, 2.0  # grey levels, deviation within a tile
+REACH = 0.2  # of the width: the farthest that content is looked for
+COVERED = 0.08  # of the tiles
 STRONGEST = 99.5  # percentile of the gradient: the edges that are looked at
 
 
@@ -75,13 +82,20 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
         return View(broken(FaultKind.VIEW, "both cameras deliver the same image"))
     matches = match(left, right)
     fit = fit_rows(matches, FIRST_GUESS_SHARE * left.shape[0])
-    finding = _finding(matches, fit, left.shape, offset_px, limits)
-    if not finding.ok:
-        return View(finding)
-    return View(finding, landmarks_of(left, right, matches.places[fit.agree], matches.disparity_px[fit.agree]))
+    disparity_px = matches.disparity_px[fit.agree]
+    # A lens that is partly covered leaves few features, which may seem to be turned: it is looked for first.
+    trouble = (
+        _scene_finding(matches, fit, limits)
+        or _covered_finding(left, right, offset_px)
+        or _rows_finding(fit, left.shape, limits)
+        or _disparity_finding(disparity_px - offset_px, limits)
+    )
+    if trouble is not None:
+        return View(trouble)
+    return View(FINE, landmarks_of(left, right, matches.places[fit.agree], disparity_px))
 
 
-def _finding(matches: Matches, fit: RowFit, shape: tuple[int, ...], offset_px: float, limits: ViewLimits) -> Finding:
+def _scene_finding(matches: Matches, fit: RowFit, limits: ViewLimits) -> Finding | None:
     fewest = min(matches.count_left, matches.count_right)
     if fewest < FEW_FEATURES:
         return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {fewest} features")
@@ -91,7 +105,7 @@ def _finding(matches: Matches, fit: RowFit, shape: tuple[int, ...], offset_px: f
         if fewest < ENOUGH_FEATURES:
             return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {told}")
         return broken(FaultKind.VIEW, f"the cameras do not see the same scene: {told}")
-    return _rows_finding(fit, shape, limits) or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
+    return None
 
 
 def match(left: Gray, right: Gray) -> Matches:
@@ -107,8 +121,9 @@ def match(left: Gray, right: Gray) -> Matches:
 
 def _features(image: Gray) -> tuple[Sequence[cv2.KeyPoint], Gray | None]:
     """Return the corners and their descriptors, (N, 32) or None."""
+    least = ABOVE_NOISE * noise_level(image)
     for threshold, enough in FAST_THRESHOLDS:
-        keys, words = cv2.ORB_create(FEATURES, fastThreshold=threshold).detectAndCompute(image, None)
+        keys, words = cv2.ORB_create(FEATURES, fastThreshold=max(threshold, round(least))).detectAndCompute(image, None)
         if len(keys) >= enough:
             break
     return keys, words
@@ -176,13 +191,47 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
     return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
 
 
-def _disparity_finding(disparity_px: Floats, limits: ViewLimits) -> Finding:
+def _disparity_finding(disparity_px: Floats, limits: ViewLimits) -> Finding | None:
     negative = float(np.mean(disparity_px < -1.0))
     if negative > limits.max_negative:
         return broken(FaultKind.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
     if float(np.percentile(np.abs(disparity_px), 95.0)) < limits.min_parallax_px:
         return unsure(FaultKind.VIEW, "no parallax: everything is far away, or both cameras show the same")
-    return FINE
+    return None
+
+
+def _covered_finding(left: Gray, right: Gray, offset_px: float) -> Finding | None:
+    """Return that a part of one lens is covered: one image has nothing there, where the other one shows content in the same rows.
+
+    A surface at a disparity from infinity's to `REACH` of the width beyond it must be in both, unless it is out of one's view. Both lenses
+    covered alike look like a wall without texture.
+    """
+    content_left, content_right = _content(left), _content(right)
+    first = int(np.floor(offset_px * TILES[1] / left.shape[1])) - 1
+    disparities = range(first, first + int(np.ceil(REACH * TILES[1])) + 2)
+    for side, mine, other, step in (("left", content_left, content_right, 1), ("right", content_right, content_left, -1)):
+        # What the left camera sees is as far to the left, or farther, in the right image.
+        nothing = np.all([_moved(mine, step * tiles) < NO_CONTENT for tiles in disparities], axis=0)
+        share = float(np.mean(nothing & (other >= CONTENT)))
+        if share > COVERED:
+            return broken(FaultKind.VIEW, f"the {side} camera sees nothing where the other one does: {share:.0%} of its view is covered")
+    return None
+
+
+def _content(image: Gray) -> Floats:
+    """Return the deviation of the grey levels in each tile, noise left out, (rows, columns)."""
+    rows, columns = TILES
+    size = (columns * TILE_CELLS, rows * TILE_CELLS)
+    cells = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float64)
+    return np.asarray(cells.reshape(rows, TILE_CELLS, columns, TILE_CELLS).std(axis=(1, 3)))
+
+
+def _moved(tiles: Floats, columns: int) -> Floats:
+    """Return the content so many tiles to the right of each, negative: to the left; beyond the image any."""
+    count = tiles.shape[1]
+    wide = np.pad(tiles, ((0, 0), (count, count)), constant_values=np.inf)
+    moved: Floats = wide[:, count + columns : 2 * count + columns]
+    return moved
 
 
 def edge_width_px(image: Gray) -> float:

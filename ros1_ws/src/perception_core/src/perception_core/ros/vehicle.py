@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 BUFFER_BYTES = 1 << 16
 TRANSFORMS_WAITING = 50  # the vehicle's pose comes on the same topic, at 50 Hz
 POSES_KEPT_S = 3.0
+BASE = "base_link"
+LONGEST_CHAIN = 16  # of frames between a sensor and base_link; longer is a loop
 POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
 
@@ -33,7 +35,7 @@ class Vehicle:
         self.poses = PoseBuffer(keep_s=POSES_KEPT_S)
         self.motion = Motion()
         self._T_odom_map = np.eye(4)
-        self._mounts: dict[str, NDArray[np.float64]] = {}
+        self._mounts: dict[str, tuple[str, NDArray[np.float64]]] = {}  # of each frame its parent and T_parent_frame
         self._subscribers = [
             RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, buffer_bytes=BUFFER_BYTES, queue_size=50),
             RawSubscriber("/uav_guidance/state", GuidanceState, self._on_state, buffer_bytes=BUFFER_BYTES),
@@ -48,9 +50,15 @@ class Vehicle:
 
     def mount(self, frame: str) -> NDArray[np.float64]:
         """Return T_base_sensor, (4, 4); raise LookupError while ``/tf_static`` has not told it."""
-        if frame not in self._mounts:
-            raise LookupError(f"/tf_static has no transform from base_link to {frame!r} (known: {sorted(self._mounts)})")
-        return self._mounts[frame]
+        name, T_base_sensor = frame.lstrip("/"), np.eye(4)  # noqa: N806 -- T_target_source
+        for _ in range(LONGEST_CHAIN):
+            if name == BASE:
+                return T_base_sensor
+            if name not in self._mounts:
+                break
+            name, T_parent_child = self._mounts[name]  # noqa: N806
+            T_base_sensor = T_parent_child @ T_base_sensor  # noqa: N806
+        raise LookupError(f"/tf_static has no transform from base_link to {frame!r} (known: {sorted(self._mounts)})")
 
     def _on_pose(self, message: PoseStamped) -> None:
         p, q = message.pose.position, message.pose.orientation
@@ -69,5 +77,4 @@ class Vehicle:
 
     def _on_static(self, message: TFMessage) -> None:
         for item in message.transforms:
-            if item.header.frame_id.lstrip("/") == "base_link":
-                self._mounts[item.child_frame_id.lstrip("/")] = matrix_of_transform(item.transform)
+            self._mounts[item.child_frame_id.lstrip("/")] = item.header.frame_id.lstrip("/"), matrix_of_transform(item.transform)
