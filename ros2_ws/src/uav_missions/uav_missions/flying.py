@@ -36,7 +36,7 @@ class FlightSettings:
     hover_s: float = 2.0
     settle_s: float = 3.0
     landing_chances: int = 10
-    others_landing_s: float = 0.0
+    others_landing_s: float = 180.0
     """How long to wait for the pilot, or the autopilot's own failsafe, to land what we may not command."""
 
 
@@ -87,11 +87,10 @@ class Flying:
         down = Selector("come down", memory=True, children=[on_ground, land])
         stop = Sequence("stop and land", memory=True, children=[FailureIsSuccess("if it can", hover), down])
         # For a while: a navigation that was restarted does not know yet that the vehicle is ours.
-        pilot: Behaviour = Stays("the pilot has control", lambda: not self.obeys(), settings.settle_s, blackboard=self._blackboard)
-        if settings.others_landing_s > 0.0:
-            lands = Awaits("the pilot or the autopilot lands it", self.on_ground, settings.others_landing_s, blackboard=self._blackboard)
-            pilot = Sequence("leave it to them", memory=True, children=[pilot, FailureIsSuccess("or not", lands)])
-        return Selector("land where it is", memory=True, children=[pilot, stop])
+        taken = Stays("the pilot has control", lambda: not self.obeys(), settings.settle_s, blackboard=self._blackboard)
+        lands = Awaits("the pilot or the autopilot lands it", self.on_ground, settings.others_landing_s, blackboard=self._blackboard)
+        leave = Sequence("leave it to them", memory=True, children=[taken, FailureIsSuccess("or not", lands)])
+        return Selector("land where it is", memory=True, children=[leave, stop])
 
     # --- legs --------------------------------------------------------------------------------------------------------
 

@@ -68,7 +68,6 @@ class Settings(FlightSettings):
     min_quality: float = 0.4
     patience_s: float = 3.0
     hover_s: float = 4.0
-    others_landing_s: float = 180.0
 
 
 @dataclass(frozen=True)
