@@ -20,6 +20,10 @@ END_WITH_PARENT = ("setpriv", "--pdeathsig", "TERM")
 """Of util-linux: the command ends with the thread that started it, also where tests are killed."""
 
 
+NODE_UP_S = 120.0
+"""Wall clock, until a node that a test has started is up: on a busy machine its imports alone take half a minute."""
+
+
 def wait_until(condition: Callable[[], bool], *, timeout_s: float, what: str) -> None:
     """Return as soon as the condition holds; fail, naming ``what``, when it does not within the time (wall clock)."""
     end = time.monotonic() + timeout_s

@@ -15,14 +15,13 @@ from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
-from alula_testing.ros1 import end_process, wait_until
+from alula_testing.ros1 import NODE_UP_S, end_process, wait_until
 from lidar_mapping import read_ply
 from perception_core import NS
 from perception_core.testing import FakeFlight, framed, send_raw
 
 NODE = str(Path(__file__).parents[1] / "scripts" / "lidar_mapping_node")
 LIDAR_HEIGHT_M = 0.1
-NODE_UP_S = 120.0  # wall clock; a deadline of failure, for a machine under load
 
 
 class Walls:

@@ -14,7 +14,7 @@ from dynamic_reconfigure.srv import Reconfigure
 from std_srvs.srv import SetBool
 from uav_msgs.msg import Obstacle
 
-from alula_testing.ros1 import wait_until
+from alula_testing.ros1 import NODE_UP_S, wait_until
 from perception_core import NS
 from perception_core.testing import Expected, FakeFlight, box_cloud, check_fault
 
@@ -58,8 +58,8 @@ class Scanner:
 def flight(ros_master, start_node):
     with FakeFlight("lidar_obstacles") as fake:
         start_node([NODE, "_enabled:=false"])
-        wait_until(fake.connected, timeout_s=15.0, what="/lidar_obstacles is up")
-        rospy.wait_for_service("/lidar_obstacles/enable", timeout=10.0)
+        wait_until(fake.connected, timeout_s=NODE_UP_S, what="/lidar_obstacles is up")
+        rospy.wait_for_service("/lidar_obstacles/enable", timeout=NODE_UP_S)
         yield fake
 
 

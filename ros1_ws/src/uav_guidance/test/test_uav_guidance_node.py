@@ -34,7 +34,7 @@ from uav_msgs.srv import (  # noqa: E402
     Takeoff,
 )
 
-from alula_testing.ros1 import StartNode, end_process, wait_until  # noqa: E402
+from alula_testing.ros1 import NODE_UP_S, StartNode, end_process, wait_until  # noqa: E402
 from perception_core.testing import framed, send_raw  # noqa: E402
 
 SOURCES = Path(__file__).resolve().parents[2]
@@ -68,7 +68,7 @@ class Bench:
         rospy.set_param("/uav_guidance", {"url": self.autopilot.url})
         self.node = self.run_node()
         # The clock starts late, as it does when the simulator takes longer to come up than the node.
-        rospy.wait_for_service("/uav_guidance/check_fence", timeout=20.0)
+        rospy.wait_for_service("/uav_guidance/check_fence", timeout=NODE_UP_S)
         self.autopilot.start()
 
     def run_node(self) -> subprocess.Popen[bytes]:
@@ -86,7 +86,7 @@ class Bench:
         wait_until(lambda: bool(self.states) and condition(self.state), timeout_s=timeout_s, what=what)
 
     def call(self, name: str, kind: type, *arguments: object) -> object:
-        rospy.wait_for_service(f"/uav_guidance/{name}", timeout=10.0)
+        rospy.wait_for_service(f"/uav_guidance/{name}", timeout=NODE_UP_S)
         return rospy.ServiceProxy(f"/uav_guidance/{name}", kind)(*arguments)
 
     def take_off(self, height_m: float = 3.0) -> None:
