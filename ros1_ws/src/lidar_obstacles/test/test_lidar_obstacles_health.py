@@ -91,6 +91,24 @@ def test_a_broken_lidar_is_broken_from_the_first_sweep_on_and_for_as_long(name) 
     assert findings[-1].ok
 
 
+def test_surfaces_that_become_rough_on_the_way_are_no_noise_of_the_sensor() -> None:
+    meadow = [scattered(room(k), 0.3 * k / 60) for k in range(60)]
+    assert all(finding.ok for finding in judge_all(meadow))
+
+
+def test_noise_stays_a_fault_until_it_ends_or_the_vehicle_has_gone_away() -> None:
+    def verdicts(metres_a_sweep: float) -> list[Verdict]:
+        judge, found = CloudJudge(LidarSettings().cloud), []
+        for k in range(40):
+            points = room(k % 8) if k < 6 else scattered(room(k % 8), 0.3)
+            sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
+            found.append(judge.finding(sweep, self_m=1.0, position_m=np.array([metres_a_sweep * k, 0.0, 2.0])).verdict)
+        return found
+
+    assert verdicts(0.0) == [Verdict.OK] * 6 + [Verdict.BROKEN] * 34
+    assert verdicts(0.3) == [Verdict.OK] * 6 + [Verdict.BROKEN] * 17 + [Verdict.OK] * 17
+
+
 def test_turning_at_90_degrees_a_second_and_flying_out_of_the_hall_is_no_fault() -> None:
     turning = [room(k, yaw=np.radians(9.0 * k)) for k in range(41)]  # once around, and on
     assert all(finding.ok for finding in judge_all(turning))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lidar_obstacles.range_noise import range_noise_m
+from lidar_obstacles.range_noise import RangeNoise
 from lidar_obstacles.range_steps import RangeSteps
 from perception_core import FINE, NS, FaultKind, Finding, Sweep, broken, unsure
 
@@ -36,8 +36,8 @@ class CloudLimits:
 
     Fewer than ``min_returns`` are nothing; fewer than ``thin_share`` of what came just before is a broken sensor; more than ``far_share``
     of the returns beyond ``max_range_m`` are coordinates in another unit. A sector is lost with less than ``sector_share`` of what it had.
-    Ranges on all sides that change faster than ``max_speed_m_s`` are no motion. Where surfaces are smooth, ranges scatter by
-    ``max_noise_m`` at most.
+    Ranges on all sides that change faster than ``max_speed_m_s`` are no motion. Where surfaces are smooth, ranges do not begin to scatter
+    by more than ``max_noise_m`` from one sweep to the next.
     """
 
     min_returns: int = 100
@@ -57,8 +57,8 @@ class CloudJudge:
     ``gone`` tells of them. So may more of them where the returns became fewer from sweep to sweep before, as beside a wall that ends. Where
     such a gap is empty and has returns on both sides it is no edge: ``gone`` tells of it until returns come from there again.
 
-    What is lost stays so until the returns are back, or the vehicle is `LEFT_BEHIND_M` away from where they were lost: the sensor is then
-    judged as one that was just started, but ``gone`` tells of the lost sectors until returns come from them.
+    What is lost, or scatters, stays so until the returns are back, or the vehicle is `LEFT_BEHIND_M` away from where it began: the sensor
+    is then judged as one that was just started, but ``gone`` tells of the lost sectors until returns come from them.
     """
 
     def __init__(self, limits: CloudLimits) -> None:
@@ -68,7 +68,7 @@ class CloudJudge:
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._blind: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._lost_at_m: Floats | None = None
-        self._looks = 0
+        self._noise = RangeNoise(limits.max_noise_m)
         self._steps = RangeSteps(limits.max_speed_m_s)
         self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
         self.gone: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
@@ -96,9 +96,9 @@ class CloudJudge:
             return broken(FaultKind.RANGE, far)
         if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
-        self._looks += 1
-        noise_m = range_noise_m(sweep, self._looks, self_m=self_m)
-        if noise_m > self._limits.max_noise_m:
+        noise_m = self._noise.risen_m(sweep, self_m=self_m)
+        if noise_m:
+            self._lost_at_m = position_m if self._lost_at_m is None else self._lost_at_m
             return broken(FaultKind.RANGE, f"the ranges scatter by {noise_m:.2f} m where they are smoothest")
         least_m = NEAR * self_m
         off_m = self._steps.offset_m(sample[outside], ranges[outside], sweep.stamp_ns, least_m=least_m, position_m=position_m)
@@ -113,7 +113,7 @@ class CloudJudge:
         return finding
 
     def _left_behind(self, position_m: Floats | None) -> bool:
-        """Return whether the vehicle has gone away from where returns were lost; at a position (3,) that is not known it has not."""
+        """Return whether the vehicle has gone away from where the fault began; at a position (3,) that is not known it has not."""
         if self._lost_at_m is None or position_m is None:
             return False
         return bool(np.linalg.norm(position_m - self._lost_at_m) > LEFT_BEHIND_M)
@@ -122,6 +122,7 @@ class CloudJudge:
         self._blind |= self._lost
         self._lost[:] = False
         self._recent.clear()
+        self._noise.forget()
         self._lost_at_m = None
 
     def _lately(self) -> Floats:

@@ -2,11 +2,13 @@
 
 In the directions of a plane the inverse range is linear: n * x = d with x = r * u gives 1 / r = (n * u) / d. So the inverse ranges of a
 return's nearest neighbours in direction are fitted by such a function, and what is left over is noise, or a rough surface. Of all
-neighbourhoods the smoothest quarter counts: trunks, walls, and ground are smooth, foliage and edges are not.
+neighbourhoods the smoothest quarter counts: trunks, walls, and ground are smooth, foliage and edges are not. High grass all around is
+not smooth either, but a vehicle comes there gradually: a fault of the sensor begins from one sweep to the next.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +29,31 @@ NEIGHBOURS = 10
 PARAMETERS = 3
 TIME_RAD_S = 4.0  # so far apart in direction counts a second: a turning sensor sees the same direction twice, and another place
 SMOOTHEST = 25.0  # percentile
+LATELY = 30  # sweeps of which the usual noise is known
+KNOWN = 5  # of them are enough
+RISE = 3.0  # by which it is a fault's, above the usual one
+
+
+class RangeNoise:
+    """Hold the noise of each sweep's ranges against what it was lately; not thread-safe."""
+
+    def __init__(self, most_m: float) -> None:
+        self._most_m = most_m
+        self._lately_m: deque[float] = deque(maxlen=LATELY)
+        self._looks = 0
+
+    def risen_m(self, sweep: Sweep, *, self_m: float) -> float:
+        """Return the noise, metres, where it is more than ever is good and has risen at once; 0 where it is not."""
+        self._looks += 1
+        noise_m = range_noise_m(sweep, self._looks, self_m=self_m)
+        if noise_m > self._most_m and len(self._lately_m) >= KNOWN and noise_m > RISE * float(np.median(self._lately_m)):
+            return noise_m
+        self._lately_m.append(noise_m)
+        return 0.0
+
+    def forget(self) -> None:
+        """Begin anew, as with a sensor that was just started."""
+        self._lately_m.clear()
 
 
 def range_noise_m(sweep: Sweep, look: int, *, self_m: float) -> float:

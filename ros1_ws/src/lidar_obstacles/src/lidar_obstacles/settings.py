@@ -24,7 +24,7 @@ class LidarSettings:
     min_returns: int = tunable(100, 1, 1_000_000, "returns of a sweep; fewer are none")
     thin_share: float = tunable(0.6, 0.0, 0.9, "of the returns just before; fewer are a broken sensor")
     max_range_m: float = tunable(250.0, 1.0, 2000.0, "by the sensor's specification")
-    max_noise_m: float = tunable(0.12, 0.02, 10.0, "by which ranges may scatter where surfaces are smooth")
+    max_noise_m: float = tunable(0.12, 0.02, 10.0, "by which ranges may begin to scatter at once, where surfaces are smooth")
     max_speed_m_s: float = tunable(3.0, 0.5, 100.0, "of the vehicle; ranges on all sides that change faster are wrong")
     # corridor
     body_radius_m: float = tunable(1.0, 0.0, 5.0, "of the vehicle with propellers: returns from inside are its own")
