@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from functools import cache
 
@@ -25,3 +26,9 @@ def flight():
 @pytest.fixture
 def flying():
     return deepcopy(in_the_air())
+
+
+@pytest.fixture
+def said(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
+    """Return a function that returns what the guidance has logged; rospy's threads of earlier tests may log meanwhile."""
+    return lambda: [record.getMessage() for record in caplog.records if record.name.startswith("uav_guidance.")]

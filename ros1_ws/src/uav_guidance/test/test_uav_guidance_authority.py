@@ -53,7 +53,7 @@ def test_life_is_any_message(flying):
     assert lost_s == pytest.approx(Settings().link_lost_s, abs=0.1)
 
 
-def test_a_link_lost_is_told_from_a_take_over(flying, caplog):
+def test_a_link_lost_is_told_from_a_take_over(flying, said):
     flying.vehicle.pilot(LOITER)
     flying.until(lambda r: not r.authority, 2.0)
     assert "the vehicle is in LOITER: the pilot or a failsafe has it" in flying.ask(HoverRequest()).reason
@@ -62,7 +62,7 @@ def test_a_link_lost_is_told_from_a_take_over(flying, caplog):
     flying.cut = True
     flying.until(lambda r: not r.authority, 4.0)
     assert "the link is lost, nothing was heard of the autopilot for 2." in flying.ask(HoverRequest()).reason
-    assert [record.getMessage().split(":")[0] for record in caplog.records] == ["authority lost"] * 2
+    assert [words.split(":")[0] for words in said()] == ["authority lost"] * 2
 
 
 def test_spooling_up_is_no_lack_of_progress(flight):
@@ -155,12 +155,12 @@ def test_lost_link_takes_the_authority_and_a_new_one_makes_it_hover(flying):
     assert flying.report.course.reference == "hover"
 
 
-def test_an_autopilot_that_restarts_in_guided_is_told_held_in_place_and_can_be_landed(flying, caplog):
+def test_an_autopilot_that_restarts_in_guided_is_told_held_in_place_and_can_be_landed(flying, said):
     flying.go(20.0, 0.0)
     flying.run(3.0)
     flying.vehicle.restart(GUIDED)
     flying.until(lambda r: r.vehicle.boots == 2, 4.0)
-    assert [record.getMessage() for record in caplog.records] == ["the autopilot has restarted, in GUIDED"]
+    assert said() == ["the autopilot has restarted, in GUIDED"]
     flying.until(lambda r: r.course.reference == "hover", 3.0)
     place = flying.report.vehicle.position_enu_m
     flying.run(3.0)

@@ -33,7 +33,7 @@ def test_readiness_told_before_guided_was_taken_does_not_count(flight):
     assert flight.vehicle.ready
 
 
-def test_an_autopilot_that_restarts_before_the_flight_is_noticed_without_a_position_and_taken_again(flight, caplog):
+def test_an_autopilot_that_restarts_before_the_flight_is_noticed_without_a_position_and_taken_again(flight, said):
     flight.until(lambda _: available(flight), 10.0)
     flight.vehicle.restart(STABILIZE)
     flight.withheld = POSITION
@@ -44,7 +44,7 @@ def test_an_autopilot_that_restarts_before_the_flight_is_noticed_without_a_posit
     flight.withheld = set()
     flight.until(lambda _: available(flight), 4.0)
     assert flight.commands == [TAKE_GUIDED, TAKE_GUIDED]
-    assert "the autopilot has restarted" in " ".join(record.getMessage() for record in caplog.records)
+    assert "the autopilot has restarted" in " ".join(said())
 
 
 def test_after_a_flight_a_restart_is_left_to_the_operator(flying):
