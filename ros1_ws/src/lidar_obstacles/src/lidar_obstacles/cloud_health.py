@@ -185,8 +185,8 @@ class _Sectors:
 
 
 def _sectors(sample: NDArray[np.float32], ranges: NDArray[np.float32], stride: int, self_m: float) -> _Sectors:
-    known = np.isfinite(ranges)
-    points, ranges = sample[known], ranges[known]
+    known = np.flatnonzero(np.isfinite(ranges))
+    points, ranges = sample.take(known, axis=0), ranges.take(known)
     azimuth = np.arctan2(points[:, 1], points[:, 0])
     sector = ((azimuth + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
     counts, near = (np.bincount(sector[which], minlength=SECTORS) for which in (ranges > self_m, ranges <= NEAR * self_m))

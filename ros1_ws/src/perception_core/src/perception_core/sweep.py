@@ -39,7 +39,9 @@ class Sweep:
         """Return the sweep with only these points."""
         if mask.dtype == np.bool_ and mask.all():
             return self
-        return Sweep(stamp_ns=self.stamp_ns, points=self.points[mask], times_s=self.times_s[mask])
+        # Taken by numbers: numpy is three times as slow with a mask on rows of three.
+        kept = np.flatnonzero(mask) if mask.dtype == np.bool_ else mask
+        return Sweep(stamp_ns=self.stamp_ns, points=self.points.take(kept, axis=0), times_s=self.times_s.take(kept))
 
     def within(self, min_range_m: float, max_range_m: float) -> Sweep:
         """Return the sweep without points nearer, farther, or not finite; their times go with them, and points without a time go, too."""
@@ -67,7 +69,7 @@ def straighten(points: Floats, times_s: Floats | Floats32, knots_s: Floats, at_k
         only: Floats = points @ at_knots.rotation[0].T + at_knots.position[0]
         return only
     order = None if np.all(times_s[1:] >= times_s[:-1]) else np.argsort(times_s, kind="stable")
-    points, times_s = (points, times_s) if order is None else (points[order], times_s[order])
+    points, times_s = (points, times_s) if order is None else (points.take(order, axis=0), times_s.take(order))
     # In the order of time, what lies between two knots is one slice.
     ends = [0, *np.searchsorted(times_s, knots_s[1:-1]), len(points)]
     moved = np.empty((len(points), 3))
