@@ -54,6 +54,16 @@ def test_a_sensor_is_found_through_all_frames_between_and_with_a_slash_before_it
         vehicle.mount("zed_left")
 
 
+def test_a_transform_that_is_no_motion_moves_nothing(vehicle: Vehicle) -> None:
+    vehicle._on_transforms(transform("odom", "guidance_map", math.pi / 2, 1.0, 2.0))
+    told = vehicle.T_odom_map()
+    vehicle._on_transforms(transform("odom", "guidance_map", 0.0, math.nan, 0.0))
+    broken = transform("odom", "guidance_map", 0.0, 0.0, 0.0)
+    broken.transforms[0].transform.rotation.w = 0.0
+    vehicle._on_transforms(broken)
+    assert vehicle.T_odom_map() is told
+
+
 def test_without_a_correction_as_in_recordings_of_before_the_motion_is_what_the_guidance_says(vehicle: Vehicle) -> None:
     vehicle._on_state(state())
     assert vehicle.motion.velocity_enu_m_s == (1.0, 0.0, 0.5)

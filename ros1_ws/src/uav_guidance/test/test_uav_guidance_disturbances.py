@@ -96,6 +96,8 @@ def test_whatever_mode_it_wakes_up_in_guided_is_taken_once_it_is_ready(flight, m
     flight.vehicle.body.mode = mode
     flight.until(lambda r: r.authority and r.vehicle.mode == GUIDED, 5.0)
     flight.take_off()
+    assert flight.vehicle.body.mode == GUIDED
+    assert flight.vehicle.enu[2] > 2.5
 
 
 def test_an_autopilot_that_is_ready_late_gets_its_take_off_late(flight):

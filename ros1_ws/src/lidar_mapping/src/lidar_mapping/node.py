@@ -16,7 +16,6 @@ from std_srvs.srv import Trigger, TriggerResponse
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import MappingState
 
-from lidar_mapping.flown_map import FlownMap
 from lidar_mapping.inertial import ImuReading
 from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.readings import ReadingQueue
@@ -47,6 +46,7 @@ CLOUD, CLOUD_BYTES = "/lidar/points", 1 << 23
 IMU, IMU_BYTES, IMU_QUEUE = "/imu/data", 1 << 16, 100
 BASE_LINK = "base_link"
 READING_WAIT_S = 0.3  # wall clock; the readings of a sweep may arrive after it, over a connection of their own
+MAP_WAIT_S = 1.0  # wall clock; a guidance that runs tells of its map at 20 Hz
 TF_PERIOD_S = 0.1
 
 
@@ -70,7 +70,6 @@ class LidarMappingNode:
         self._reporter = ResourceReporter("mapping")
         self._done = DoneReporter()
         self._vehicle = Vehicle()
-        self._flown_map = FlownMap()
         self._worker = NewestWorker[tuple[str, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=self._on_switch)
         self._save_service = ToldService("~save", Trigger, self._on_save)
@@ -139,7 +138,8 @@ class LidarMappingNode:
     def _register(self, frame: str, sweep: Sweep) -> None:
         poses = self._vehicle.poses_at(sweep.end_ns)
         self._readings.wait_for(sweep.end_ns, READING_WAIT_S)
-        self._flown_map.wait_for()
+        if not self._slam.begun:
+            self._vehicle.T_odom_map(wait_s=MAP_WAIT_S)
         with self._lock:
             if not self._switch.enabled:
                 return
@@ -153,9 +153,9 @@ class LidarMappingNode:
 
     def _begin_as_flown(self) -> None:
         """Let a mapping that has not begun take the place of `map` from the guidance, which flew on by it if this node has crashed."""
-        flown = self._flown_map.T_map_odom
+        flown = self._vehicle.T_odom_map()
         if flown is not None and not self._slam.begun:
-            self._slam.T_map_odom = flown
+            self._slam.T_map_odom = np.linalg.inv(flown)
 
     def _report(self) -> None:
         """Tell the skillset whether pose and map are to be trusted."""
@@ -188,7 +188,7 @@ class LidarMappingNode:
         """Publish map -> odom; odom -> base_link is the guidance's, from the autopilot."""
         with self._lock:
             self._begin_as_flown()
-            place, known = self._slam.T_map_odom, self._slam.begun or self._flown_map.T_map_odom is not None
+            place, known = self._slam.T_map_odom, self._slam.begun or self._vehicle.T_odom_map() is not None
         if not known:
             return  # the identity would be a jump of the pose in flight
         transform = TransformStamped(header=Header(stamp=rospy.Time.now(), frame_id="map"), child_frame_id="odom")

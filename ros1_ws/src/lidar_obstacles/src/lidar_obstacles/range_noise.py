@@ -52,7 +52,7 @@ class RangeNoise:
         return 0.0
 
     def forget(self) -> None:
-        """Begin anew, as with a sensor that was just started."""
+        """Forget the noise of the sweeps so far: the next ones are judged as those of a sensor that was just started."""
         self._lately_m.clear()
 
 

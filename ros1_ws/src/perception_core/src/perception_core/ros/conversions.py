@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from perception_core.corridor import Nearest
 
+UNIT_TOLERANCE = 1e-3
 MAP, ODOMETRY = "map", "odom"
 GUIDANCE_MAP = "guidance_map"
 """The map as the guidance flies by it: a child of `odom`, which follows the mapping's `map` at a bounded rate."""
@@ -52,6 +53,12 @@ def matrix_of_transform(transform: Transform) -> NDArray[np.float64]:
     matrix[:3, :3] = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
     matrix[:3, 3] = [t.x, t.y, t.z]
     return matrix
+
+
+def is_rigid(transform: Transform) -> bool:
+    """Tell whether it is a motion: a finite shift, a quaternion of unit length."""
+    q, t = transform.rotation, transform.translation
+    return bool(np.isfinite([t.x, t.y, t.z]).all() and abs(np.linalg.norm([q.x, q.y, q.z, q.w]) - 1.0) < UNIT_TOLERANCE)
 
 
 def obstacle_message(stamp_ns: int, source: str, nearest: Nearest | None, unknown: str = "") -> Obstacle:

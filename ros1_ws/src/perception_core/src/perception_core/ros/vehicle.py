@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import Condition
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ from uav_msgs.msg import GuidanceState
 
 from perception_core.corridor import Motion
 from perception_core.poses import PoseBuffer
-from perception_core.ros.conversions import GUIDANCE_MAP, matrix_of_transform
+from perception_core.ros.conversions import GUIDANCE_MAP, is_rigid, matrix_of_transform
 from perception_core.ros.subscription import RawSubscriber
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ class Vehicle:
     def __init__(self) -> None:
         self.poses = PoseBuffer(keep_s=POSES_KEPT_S)
         self.motion = Motion()
-        self._T_odom_map = np.eye(4)
+        self._T_odom_map: NDArray[np.float64] | None = None
+        self._map_told = Condition()
         self._mounts: dict[str, tuple[str, NDArray[np.float64]]] = {}  # of each frame its parent and T_parent_frame
         self._subscribers = [
             RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, buffer_bytes=BUFFER_BYTES, queue_size=50),
@@ -47,6 +49,12 @@ class Vehicle:
         """Return the poses, those up to ``stamp_ns`` included unless they are later than `POSE_WAIT_S`; may block for that long."""
         self.poses.wait_for(stamp_ns, timeout_s=POSE_WAIT_S)
         return self.poses
+
+    def T_odom_map(self, *, wait_s: float = 0.0) -> NDArray[np.float64] | None:  # noqa: N802 -- T_target_source
+        """Return where the guidance has `map`, by which it flies, (4, 4); None where it has not told it within ``wait_s`` (wall clock)."""
+        with self._map_told:
+            self._map_told.wait_for(lambda: self._T_odom_map is not None, wait_s)
+            return self._T_odom_map
 
     def mount(self, frame: str) -> NDArray[np.float64]:
         """Return T_base_sensor, (4, 4); raise LookupError while ``/tf_static`` has not told it."""
@@ -65,15 +73,18 @@ class Vehicle:
         self.poses.add(message.header.stamp.to_nsec(), (p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
     def _on_state(self, message: GuidanceState) -> None:
-        v, t, T_odom_map = message.velocity_enu_m_s, message.target_enu_m, self._T_odom_map  # noqa: N806 -- T_target_source
+        v, t, told = message.velocity_enu_m_s, message.target_enu_m, self.T_odom_map()
+        T_odom_map = np.eye(4) if told is None else told  # noqa: N806 -- T_target_source
         vx, vy, vz = (float(part) for part in T_odom_map[:3, :3] @ (v.x, v.y, v.z))
         tx, ty, tz = (float(part) for part in (T_odom_map @ (t.x, t.y, t.z, 1.0))[:3])
         self.motion = Motion(velocity_enu_m_s=(vx, vy, vz), target_enu_m=(tx, ty, tz) if message.reference == "position" else None)
 
     def _on_transforms(self, message: TFMessage) -> None:
         for item in message.transforms:
-            if item.child_frame_id.lstrip("/") == GUIDANCE_MAP:
-                self._T_odom_map = matrix_of_transform(item.transform)
+            if item.child_frame_id.lstrip("/") == GUIDANCE_MAP and is_rigid(item.transform):
+                with self._map_told:
+                    self._T_odom_map = matrix_of_transform(item.transform)
+                    self._map_told.notify_all()
 
     def _on_static(self, message: TFMessage) -> None:
         for item in message.transforms:
