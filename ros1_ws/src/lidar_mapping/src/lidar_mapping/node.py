@@ -155,7 +155,7 @@ class LidarMappingNode:
         """Let a mapping that has not begun take the place of `map` from the guidance, which flew on by it if this node has crashed."""
         flown = self._vehicle.T_odom_map()
         if flown is not None and not self._slam.begun:
-            self._slam.T_map_odom = np.linalg.inv(flown)
+            self._slam.T_map_odom = np.asarray(np.linalg.inv(flown), float)
 
     def _report(self) -> None:
         """Tell the skillset whether pose and map are to be trusted."""
