@@ -9,6 +9,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from rclpy.action import ActionClient
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
@@ -40,7 +41,7 @@ def follow_skills(connection: Connection, case: Case) -> None:
 
 def follow_bare(connection: Connection, _: object) -> None:
     """Be the client of the bare action and topic."""
-    session = Session("bench_bare_client")
+    session = Session("bench_bare_client", executor=SingleThreadedExecutor)
     requests = BareRequests(session.node)
     follow(connection, {"ready": requests.ready, "goals": requests.goals, "topic": requests.topic})
     session.close()

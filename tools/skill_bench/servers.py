@@ -12,6 +12,7 @@ from typing import Any
 import rclpy
 from navigation_interfaces.action import Hover
 from rclpy.action import ActionServer
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
@@ -62,7 +63,7 @@ def serve_managers(connection: Connection, case: Case) -> None:
 
 def serve_bare(connection: Connection, _: object) -> None:
     """Be a bare action, whose goals succeed at once, and a bare topic of the type and qualities of the skillsets' events."""
-    session = Session("bench_bare_server")
+    session = Session("bench_bare_server", executor=SingleThreadedExecutor)
     server = ActionServer(session.node, ACTION, BARE_ACTION, execute_callback=_succeed)
     topic = session.node.create_publisher(Event, BARE_TOPIC, EVENTS)
 

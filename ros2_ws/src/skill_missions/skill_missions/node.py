@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -29,7 +28,7 @@ from skill_missions.plan import MissionPlan
 from skill_missions.record import MissionRecord
 from skill_missions.skillset import MissionClient
 from skill_runtime.codecs import event_of
-from skill_runtime.ros2 import SkillsetClient
+from skill_runtime.ros2 import SkillsetClient, StaticSingleThreadedExecutor
 
 TICK_PERIOD_S = 0.1
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
@@ -173,7 +172,7 @@ class Standstill:
 
 def tick_to_the_end(node: MissionNode, signals: Sequence[int]) -> End:
     """Tick until the mission is over; ``signals`` grows when the process is told to end."""
-    executor = SingleThreadedExecutor()
+    executor = StaticSingleThreadedExecutor()
     executor.add_node(node)
     standstill = Standstill(patience_s=60.0)
     obeyed = 0

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -30,6 +30,7 @@ from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.managers import DataBindings
 from skill_runtime.mock import Behaviour, MockRobot, load_behaviour, starter
+from skill_runtime.ros2.executor import StaticSingleThreadedExecutor
 from skill_runtime.ros2.mock_host import RosMockHost
 from skill_runtime.ros2.node import SkillsetNode
 from skill_runtime.ros2.spin import ros2_arguments, spin_until
@@ -72,7 +73,7 @@ class MockNodes:
 
     def spin(self, stop: threading.Event) -> None:
         """Serve until ``stop``, each skillset in a thread of its own; then end what runs and tell its callers."""
-        executor = SingleThreadedExecutor()
+        executor = StaticSingleThreadedExecutor()
         executor.add_node(self.helper)
         threads = [threading.Thread(target=spin_until, args=(node, stop), name=name) for name, node in self.host.nodes.items()]
         for thread in threads:

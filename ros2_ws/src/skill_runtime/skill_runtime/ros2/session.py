@@ -9,10 +9,12 @@ import traceback
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, ShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+
+from skill_runtime.ros2.executor import StaticSingleThreadedExecutor
 
 JOIN_S = 5.0
 
@@ -23,13 +25,14 @@ class Session:
     Args:
         name: begins the node's name.
         domain: the DDS domain; by default the environment's ROS_DOMAIN_ID.
+        executor: what spins the node.
     """
 
-    def __init__(self, name: str, *, domain: int | None = None) -> None:
+    def __init__(self, name: str, *, domain: int | None = None, executor: type[Executor] = StaticSingleThreadedExecutor) -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
         self.node = Node(f"{name}_{os.getpid():x}_{threading.get_native_id():x}", context=self._context, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = executor(context=self._context)
         self._executor.add_node(self.node)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._spin, name=f"{name}_spin", daemon=True)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from types import FrameType, ModuleType
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, ShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -25,6 +25,7 @@ from skill_model.model import Skillset
 from skill_runtime.core.errors import SkillRuntimeError
 from skill_runtime.hook_processes import RemoteHooks, pipe_address
 from skill_runtime.managers import DataBindings
+from skill_runtime.ros2.executor import StaticSingleThreadedExecutor
 from skill_runtime.ros2.names import latched
 from skill_runtime.ros2.node import HooksFactory, HooksNode, SkillsetNode
 from skill_runtime.ros2.processes import RESOURCES, end_with, supervise, wait_for
@@ -109,7 +110,7 @@ def rivals_there(skillset: str) -> bool:
     node = Node(skillset, enable_rosout=False)
     heard: list[object] = []
     node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
-    executor = SingleThreadedExecutor()
+    executor = StaticSingleThreadedExecutor()
     executor.add_node(node)
     end_s = time.monotonic() + LISTEN_FIRST_S
     while not heard and (left_s := end_s - time.monotonic()) > 0:
@@ -170,8 +171,7 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
     A callback that raises (most are of hooks) fails what runs, as it is not known whose function is without its watch now;
     the managers live on.
     """
-    # rclpy 7.1.6's EventsExecutor should be lighter, but knows no guard conditions and idles at 60 % of a core with action servers.
-    executor = SingleThreadedExecutor()
+    executor = StaticSingleThreadedExecutor()
     executor.add_node(node)
     over = threading.Event()
 

@@ -8,9 +8,9 @@ import threading
 import time
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from skill_runtime.ros2.executor import StaticSingleThreadedExecutor
 from skill_runtime.waiting import CannotWaitError
 
 LOOK_S = 0.5
@@ -72,7 +72,7 @@ class NodeWaiter:
 
     def _spin(self, event: threading.Event, time_s: float) -> None:
         """Spin the node in an executor of its own until the event, the time, or until another executor takes the node."""
-        executor = SingleThreadedExecutor(context=self._node.context)
+        executor = StaticSingleThreadedExecutor(context=self._node.context)
         executor.add_node(self._node)
         end = time.monotonic() + time_s
         try:
