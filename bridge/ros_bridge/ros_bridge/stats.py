@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
 
 # Durations fall into bins that grow by 5 %: any percentile of a run of any length, to 5 %, in constant memory.
 BIN_GROWTH = 1.05
@@ -18,15 +21,15 @@ class Durations:
     """A histogram of durations."""
 
     def __init__(self) -> None:
-        self._bins = [0] * BINS
+        self._bins: npt.NDArray[np.int64] = np.zeros(BINS, np.int64)
         self.count = 0
 
     @classmethod
-    def of(cls, bins: Iterable[int]) -> Durations:
+    def of(cls, bins: Sequence[int]) -> Durations:
         """Return the histogram of what the data plane has counted, in the same bins."""
         durations = cls()
-        durations._bins = list(bins)
-        durations.count = sum(durations._bins)
+        durations._bins = np.array(bins, np.int64)
+        durations.count = int(durations._bins.sum())
         return durations
 
     def add(self, duration_ns: int) -> None:
@@ -36,13 +39,11 @@ class Durations:
         self.count += 1
 
     def percentile_ms(self, fraction: float) -> float | None:
-        """Return the duration that the fraction 0..1 stays below, in ms to 5 %; None when nothing was counted."""
-        remaining = fraction * self.count
-        for position, number in enumerate(self._bins):
-            remaining -= number
-            if number and remaining <= 0:
-                return float(round(SHORTEST_NS * BIN_GROWTH ** (position + 0.5) / 1e6, 4))
-        return None
+        """Return the duration that the fraction (above 0, at most 1) stays below, in ms to 5 %; None when nothing was counted."""
+        if not self.count:
+            return None
+        position = int(np.searchsorted(np.cumsum(self._bins), fraction * self.count))
+        return float(round(SHORTEST_NS * BIN_GROWTH ** (min(position, BINS - 1) + 0.5) / 1e6, 4))
 
 
 @dataclass(frozen=True)
