@@ -9,7 +9,7 @@ from uav_missions_fakes import World, make_blackboard
 
 from skill_missions.blackboard import Failure
 from skill_model.execution_state import ExecutionState
-from uav_missions.remarks import note_authority, note_health
+from uav_missions.remarks import AuthorityRemarks, note_health
 
 LOST = Failure("fly", "navigation.goto", ExecutionState.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority", "")
 
@@ -28,8 +28,9 @@ def state(**changes: object) -> SimpleNamespace:
 )
 def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, words):
     blackboard = make_blackboard(World())
-    note_authority(blackboard, told)
-    note_authority(blackboard, state(authority=True))
+    authority = AuthorityRemarks(blackboard)
+    authority.note(told)
+    authority.note(state(authority=True))
     blackboard.failures.append(LOST)
     blackboard.note_reason()
     assert blackboard.explained() == f"navigation.goto: RESOURCE_INVARIANT_VIOLATED keep_sdk_authority ({words})"
@@ -37,17 +38,44 @@ def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, w
 
 def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
     blackboard = make_blackboard(World())
-    note_authority(blackboard, state(landed_state=1, ready=False, mode="STABILIZE"))
-    note_authority(blackboard, state(landed_state=1, authority=True, mode="GUIDED"))
-    note_authority(blackboard, state(authority=True, mode="GUIDED"))
+    authority = AuthorityRemarks(blackboard)
+    authority.note(state(landed_state=1, ready=False, mode="STABILIZE"))
+    authority.note(state(landed_state=1, authority=True, mode="GUIDED"))
+    authority.note(state(authority=True, mode="GUIDED"))
     blackboard.failures.append(LOST)
     blackboard.note_reason()
     assert blackboard.explained().endswith("keep_sdk_authority (the autopilot has restarted)")
 
 
+@pytest.mark.parametrize("silent", [False, True])
+def test_an_autopilot_that_restarts_in_the_air_is_not_told_as_one_that_stands(silent):
+    blackboard = make_blackboard(World())
+    authority = AuthorityRemarks(blackboard)
+    authority.note(state(landed_state=1, authority=True, mode="GUIDED"))
+    authority.note(state(authority=True, mode="GUIDED"))
+    if silent:
+        authority.note(state(link=False, mode="GUIDED"))
+    authority.note(state(landed_state=1, ready=False, mode="STABILIZE"))
+    blackboard.failures.append(LOST)
+    blackboard.note_reason()
+    assert blackboard.explained().endswith("keep_sdk_authority (the autopilot has restarted)")
+
+
+@pytest.mark.parametrize("pilot", [False, True])
+def test_after_a_landing_a_vehicle_that_stands_is_told_as_one(pilot):
+    blackboard = make_blackboard(World())
+    authority = AuthorityRemarks(blackboard)
+    authority.note(state(authority=True, mode="GUIDED"))
+    authority.note(state(landed_state=1, authority=not pilot, mode="LAND"))
+    authority.note(state(landed_state=1, ready=False, mode="STABILIZE"))
+    blackboard.failures.append(LOST)
+    blackboard.note_reason()
+    assert blackboard.explained().endswith("(the vehicle stands in STABILIZE, its own checks are not passed)")
+
+
 def test_other_failures_are_told_without_it():
     blackboard = make_blackboard(World())
-    note_authority(blackboard, state())
+    AuthorityRemarks(blackboard).note(state())
     note_health(blackboard, "perception.zed_status", SimpleNamespace(reason="no images"))
     blackboard.failures.append(Failure("watch", "perception.zed_depthmap", ExecutionState.TERMINATED, "LOST", ""))
     blackboard.note_reason()

@@ -16,6 +16,7 @@ AUTHORITY = "navigation.SDK_authority"
 AUTHORITY_INVARIANT = "keep_sdk_authority"
 DEPTH = 5
 ON_GROUND = 1  # GuidanceState.ON_GROUND
+RESTARTED = "the autopilot has restarted"
 
 
 def listen(node: Node, blackboard: Blackboard) -> None:
@@ -24,7 +25,7 @@ def listen(node: Node, blackboard: Blackboard) -> None:
 
     for resource, topic in SENSORS.items():
         node.create_subscription(SensorHealth, topic, partial(note_health, blackboard, resource), DEPTH)
-    node.create_subscription(GuidanceState, "/uav_guidance/state", partial(note_authority, blackboard), DEPTH)
+    node.create_subscription(GuidanceState, "/uav_guidance/state", AuthorityRemarks(blackboard).note, DEPTH)
 
 
 def note_health(blackboard: Blackboard, resource: str, health: SensorHealth | Any) -> None:
@@ -32,20 +33,31 @@ def note_health(blackboard: Blackboard, resource: str, health: SensorHealth | An
     blackboard.remarks[resource] = str(health.reason)
 
 
-def note_authority(blackboard: Blackboard, state: GuidanceState | Any) -> None:
-    """Remark why the companion does not command: no link is another matter than a pilot. What was remarked in flight stays."""
-    if state.authority:
-        remark = "" if state.landed_state == ON_GROUND else blackboard.remarks.get(AUTHORITY, "")
-    elif not state.link:
-        remark = "the link to the autopilot is lost"
-    elif state.landed_state == ON_GROUND and not state.ready:
-        remark = f"the vehicle stands in {state.mode}, its own checks are not passed"
-    else:
-        remark = f"the vehicle is in {state.mode}: the pilot or a failsafe has it"
-    blackboard.remarks[AUTHORITY] = remark
+class AuthorityRemarks:
+    """Remarks why the companion does not command: no link is another matter than a pilot, or an autopilot that has begun anew."""
+
+    def __init__(self, blackboard: Blackboard) -> None:
+        self._remarks = blackboard.remarks
+        self._flying = False
+
+    def note(self, state: GuidanceState | Any) -> None:
+        """Take a state of the guidance. What was remarked in flight stays."""
+        standing = state.landed_state == ON_GROUND
+        if state.authority:
+            remark = "" if standing else self._remarks.get(AUTHORITY, "")
+        elif not state.link:
+            remark = "the link to the autopilot is lost"
+        elif standing and not state.ready:
+            # One that restarts in the air says that it stands, before it has looked.
+            remark = RESTARTED if self._flying else f"the vehicle stands in {state.mode}, its own checks are not passed"
+        else:
+            remark = f"the vehicle is in {state.mode}: the pilot or a failsafe has it"
+        if state.link and (state.ready or not standing):
+            self._flying = not standing
+        self._remarks[AUTHORITY] = remark
 
 
 def holder_of_the_vehicle(blackboard: Blackboard) -> str:
     """Return what has a vehicle whose authority was lost; empty where the guidance was not listened to."""
     # The guidance takes it from the skills and keeps it in one case only.
-    return (blackboard.remarks[AUTHORITY] or "the autopilot has restarted") if AUTHORITY in blackboard.remarks else ""
+    return (blackboard.remarks[AUTHORITY] or RESTARTED) if AUTHORITY in blackboard.remarks else ""
