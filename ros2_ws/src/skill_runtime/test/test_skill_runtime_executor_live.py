@@ -183,6 +183,21 @@ def test_what_awaits_holds_its_callback_group_and_no_other(node, other, spun):
     assert [word for word in heard if not word.startswith("fast")] == ["begin 1", "end 1", "begin 2", "end 2"]
 
 
+def test_a_task_goes_on_with_what_an_older_task_brings(spun):
+    brought, ended = Future(), threading.Event()
+
+    async def wait():
+        await brought
+        ended.set()
+
+    def make_both():
+        spun[0].create_task(lambda: brought.set_result(None))
+        spun[0].create_task(wait)  # the newest is run first
+
+    spun[0].create_task(make_both)
+    assert ended.wait(SOON_S)
+
+
 @pytest.mark.parametrize("kind", [SingleThreadedExecutor, StaticSingleThreadedExecutor])
 def test_what_is_ready_at_once_is_dealt_with_in_rclpys_order(context, node, other, kind):
     order: list[str] = []

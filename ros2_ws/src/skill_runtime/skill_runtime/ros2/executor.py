@@ -44,6 +44,17 @@ class _Member(NamedTuple):
     """Adds it to the wait set."""
 
 
+class _Collection(NamedTuple):
+    """All entities of the nodes, and a wait set that has room for them."""
+
+    wait_set: Any
+    members: list[_Member]
+    known: dict[str, dict[int, Any]]
+    """The entities of each kind by the address of their handles, which is how a wait set names them."""
+    nodes: dict[Any, Node]
+    """The node of each entity."""
+
+
 class _Call:
     """The work of one ready entity, in the shape that rclpy's ``spin_once`` runs: what it raises, is raised by the call."""
 
@@ -65,11 +76,7 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
 
     def __init__(self, *, context: Any = None) -> None:
         self._changed = True
-        self._members: list[_Member] = []
-        self._nodes_of: dict[Any, Node] = {}
-        self._known: dict[str, dict[int, Any]] = {}
-        """The entities of each kind by the address of their handles, which is how a wait set names them."""
-        self._wait_set: Any = None
+        self._collection: _Collection | None = None
         super().__init__(context=context)
         self._takes: dict[str, Take] = {
             "timer": self._take_timer,
@@ -98,8 +105,7 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Spin no more; False: what runs did not end in time."""
         ended = bool(super().shutdown(timeout_sec))
-        if ended:
-            self._members, self._nodes_of, self._known, self._wait_set = [], {}, {}, None
+        self._collection = None
         return ended
 
     def _wait_for_ready_callbacks(
@@ -113,10 +119,13 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
         end_ns = time.monotonic_ns() + timeout_ns
         worked = False
         while not (worked or self._is_shutdown or condition()):
-            for work in self._open_tasks():
+            tasks = self._open_tasks()
+            for work in tasks:
                 worked = True
                 yield work
-            for work in self._wait(timeout_ns if timeout_ns <= 0 else max(0, end_ns - time.monotonic_ns())):
+            # What a task has brought to its end, another one may await that was looked at before it.
+            ended = any(task.done() for task, _, _ in tasks)
+            for work in self._wait(0 if ended else timeout_ns if timeout_ns <= 0 else max(0, end_ns - time.monotonic_ns())):
                 worked = True
                 yield work
             if timeout_ns >= 0 and time.monotonic_ns() >= end_ns:
@@ -132,10 +141,9 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
             self._tasks[:] = [work for work in self._tasks if not (work[0].done() or work[0].cancelled())]
             return [work for work in reversed(self._tasks) if not work[0].executing()]
 
-    def _collect(self) -> Any:
-        """Collect the entities of all nodes; return a wait set that has room for them."""
+    def _collect(self) -> _Collection:
+        """Collect the entities of all nodes."""
         self._changed = False  # first: what changes from here on is collected the next time
-        self._members, self._nodes_of, self._known = [], {}, {kind: {} for kind in KINDS}
         nodes = self.get_nodes()
         lists = {
             "timer": [(timer, node) for node in nodes for timer in node.timers],
@@ -156,17 +164,18 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
             sum(number.num_events for number in inside),
             self._context.handle,
         )
+        collection = _Collection(wait_set, [], {kind: {} for kind in KINDS}, {})
         for waitable, node in waitables:
-            self._members.append(_Member(waitable, waitable, functools.partial(waitable.add_to_wait_set, wait_set)))
-            self._nodes_of[waitable] = node
+            collection.members.append(_Member(waitable, waitable, functools.partial(waitable.add_to_wait_set, wait_set)))
+            collection.nodes[waitable] = node
         for kind, entities in lists.items():
             add = getattr(wait_set, f"add_{kind}")
             for entity, node in entities:
                 with contextlib.suppress(InvalidHandle):
-                    self._known[kind][entity.handle.pointer] = entity
-                    self._members.append(_Member(entity, entity.handle, functools.partial(add, entity.handle)))
-                    self._nodes_of[entity] = node
-        return wait_set
+                    collection.known[kind][entity.handle.pointer] = entity
+                    collection.members.append(_Member(entity, entity.handle, functools.partial(add, entity.handle)))
+                    collection.nodes[entity] = node
+        return collection
 
     def _own_guards(self) -> tuple[Any, Any]:
         """Return what wakes this executor: its own guard, and that of signals."""
@@ -177,12 +186,13 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
 
     def _wait(self, timeout_ns: int) -> list[Work]:
         """Wait until an entity is ready, or the executor is woken; return what is to be run."""
-        if self._changed or self._wait_set is None:
-            self._wait_set = self._collect()
-        wait_set = self._wait_set
+        collection = self._collection
+        if self._changed or collection is None:
+            collection = self._collection = self._collect()
+        wait_set = collection.wait_set
         entered: list[Any] = []
         try:
-            waited = self._fill(wait_set, entered)
+            waited = self._fill(collection, entered)
             wait_set.wait(timeout_ns)
             if self._is_shutdown:
                 raise ShutdownException
@@ -190,7 +200,7 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
                 raise ExternalShutdownException
             ready = [(entity, self._take_waitable) for entity in waited if entity.is_ready(wait_set)]
             for kind in KINDS:
-                known, take = self._known[kind], self._takes[kind]
+                known, take = collection.known[kind], self._takes[kind]
                 ready += [(known[address], take) for address in wait_set.get_ready_entities(kind) if address in known]
         finally:
             for handle in entered:
@@ -198,10 +208,12 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
         for entity, take in ready:
             if take == self._takes["guard_condition"]:
                 entity._executor_triggered = True  # noqa: SLF001 - rclpy's own note: the wait has reset the guard, nothing has run yet
-        return [(_Call(functools.partial(self._run, entity, take)), entity, self._nodes_of[entity]) for entity, take in ready]
+        nodes = collection.nodes
+        return [(_Call(functools.partial(self._run, entity, take, nodes[entity])), entity, nodes[entity]) for entity, take in ready]
 
-    def _fill(self, wait_set: Any, entered: list[Any]) -> list[Any]:
+    def _fill(self, collection: _Collection, entered: list[Any]) -> list[Any]:
         """Fill the wait set with what may be executed now; return the waitables that are in it."""
+        wait_set = collection.wait_set
         wait_set.clear_entities()
         for guard in self._own_guards():
             try:
@@ -210,12 +222,12 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
                 raise ShutdownException from None
             entered.append(guard.handle)
             wait_set.add_guard_condition(guard.handle)
-        for guard in self._known["guard_condition"].values():
+        for guard in collection.known["guard_condition"].values():
             if guard._executor_triggered:  # noqa: SLF001 - a caller with another time-out has dropped what was ready
                 with contextlib.suppress(InvalidHandle):
                     guard.trigger()
         waitables: list[Any] = []
-        for entity, handle, add in self._members:
+        for entity, handle, add in collection.members:
             if not entity.callback_group.can_execute(entity):
                 continue
             try:
@@ -228,7 +240,7 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
                 waitables.append(entity)
         return waitables
 
-    def _run(self, entity: Any, take: Take) -> None:
+    def _run(self, entity: Any, take: Take, node: Node) -> None:
         """Take what an entity has, and call back; what awaits something goes on as a task."""
         if not entity.callback_group.beginning_execution(entity):
             return
@@ -238,7 +250,7 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
         except StopIteration:
             return
         with self._tasks_lock:
-            self._tasks.append((Task(work, executor=self), entity, self._nodes_of.get(entity)))
+            self._tasks.append((Task(work, executor=self), entity, node))
 
     def _take_timer(self, timer: Any) -> Any:
         """Take a timer that is still due: one that an earlier callback has cancelled was found ready, too."""
