@@ -54,8 +54,8 @@ class MockFront:
         ) as flight:
             self._flight = flight
             self._interrupts.install()
-            words = ""
-            while flight.poll() is None:
+            words: str | None = None  # a flight that ends between two looks still has its words to be read
+            while words is None:
                 live.show_new()
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     words, _ = flight.communicate(timeout=0.1)

@@ -16,13 +16,14 @@ from alula_common.network import NoFreeDomainError, claim_domain, free_port
 from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula_common.record import EVENTS, RecordWriter
 from alula_common.record import FILE as RECORD
+from alula_flight import mocked
 from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
 from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
 from alula_flight.ending import CANNOT_START
 from alula_flight.fly import main, monitor_of, sensors_words
 from alula_flight.live import LiveEvents, event_line
-from alula_flight.mocked import command
+from alula_flight.mocked import MockFront, command
 from alula_flight.spec import RequestError, RunSpec
 from alula_flight.verdict import conformance_lines
 from skill_model.execution_state import ExecutionState
@@ -326,3 +327,19 @@ def test_a_page_that_can_not_be_served_stops_no_flight(tmp_path):
         assert told.wait(30)
     assert "logs/console.log" in said[0]
     assert "the port is taken" in (tmp_path / "logs" / "console.log").read_text()
+
+
+def test_the_words_of_a_mocked_flight_that_ends_between_two_looks_are_told(monkeypatch, tmp_path):
+    monkeypatch.setattr(mocked, "command", lambda *_: [sys.executable, "-c", "print('no such fault'); raise SystemExit(2)"])
+    communicate, looks = subprocess.Popen.communicate, []
+
+    def slow(process, *words, **options):
+        """End the first look without a word, when the process has ended: a busy machine does that."""
+        if not looks:
+            looks.append(process.wait())
+            raise subprocess.TimeoutExpired("flight", 0.1)
+        return communicate(process, *words, **options)
+
+    monkeypatch.setattr(subprocess.Popen, "communicate", slow)
+    spec = RunSpec("mapping", str(tmp_path), "", 0, 0.0, (), "", None, 0, 0, 0, mock=True)
+    assert MockFront(spec, print).fly() == (2, "no such fault\n")

@@ -94,6 +94,8 @@ def test_rest():
     assert rests(track.between(0.0, phases.touch_down_s - 1.5), world, phases) is None, "the recording broke off before"
     assert rests(track.between(phases.zero_s + 1.0, np.inf), world, phases) is None
     assert rests(track, None, phases) is None
+    before = track.between(0.0, phases.zero_s - 0.1)
+    assert rests(before, world, replace(phases, touch_down_s=None)) is None, "the recording broke off before the lift-off"
 
 
 def test_a_landing_on_a_roof_is_a_rest():

@@ -340,6 +340,17 @@ def test_nothing_is_said_to_have_landed_that_never_flew(folder):
     assert "landed: no lift-off is known" in "\n".join(verdict_lines(summary, [], folder))
 
 
+def test_a_recording_that_broke_off_before_the_lift_off_says_nothing_of_a_landing(folder):
+    log = Log()
+    log.change(0.0, "navigation.flight_status", "ON_GROUND", "IN_AIR")
+    log.write(folder / RECORD)
+    t_s, position = poses()
+    before = t_s < LIFT_OFF_S - 0.1
+    states = [{"t_s": t, "reference": "idle", "landed_state": 1} for t in t_s[before]]
+    write_bag(folder / "functional.bag", poses=(t_s[before], position[before]), guidance=states)
+    assert make_report(facts(folder, faults=[], mission_exit=1))["landed"] is False
+
+
 def test_a_vehicle_that_lies_is_not_believed(folder):
     t_s, position = poses()
     position[t_s > LIFT_OFF_S + 60.0, 2] = 3.0

@@ -143,11 +143,12 @@ def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None
     return mapping(statistics) or None
 
 
-def landed(history: History, recording: Recording, problems: Problems, *, lifted_off: bool, resting: bool | None) -> bool | None:
+def landed(history: History, recording: Recording, problems: Problems, phases: Phases, *, resting: bool | None) -> bool | None:
     """Tell whether the vehicle came down: it must be said so, and be true where the truth is known; None: it never flew."""
-    if not lifted_off:
+    if not phases.lifted_off:
         return None
-    said = [recording.guidance[-1].landed_state == ON_GROUND] if recording.guidance else []
+    # A recording that broke off before the lift-off tells of a vehicle that had not flown yet.
+    said = [state.landed_state == ON_GROUND for state in recording.guidance[-1:] if state.t_s > phases.zero_s]
     said += [change.to_state == "ON_GROUND" for change in flight_status(history)[-1:]]
     if not said or resting is None:
         return any(said) if said else resting
@@ -197,7 +198,7 @@ def summarise(
     outcome, reason = read_outcome(facts, problems)
     bridge = None if facts.mock else read_bridge(facts, problems)
     note_doubts(facts, recording, phases, problems)
-    on_ground = landed(history, recording, problems, lifted_off=phases.lifted_off, resting=resting)
+    on_ground = landed(history, recording, problems, phases, resting=resting)
     said = recording.simulator
     worst = worse(said, recomputed)
     simulated = None if said is None else Encounter(said.collisions, said.min_clearance_m, said.distance_m)

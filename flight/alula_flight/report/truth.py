@@ -95,7 +95,7 @@ def rests(track: Track | None, world: TrueSurfaces | None, phases: Phases) -> bo
     """Tell whether the vehicle stands still on a surface at the end as it did before lift-off; None if that can't be known."""
     if track is None or world is None or track.t_s[0] > phases.zero_s:
         return None
-    if phases.touch_down_s is not None and track.t_s[-1] < phases.touch_down_s:
+    if track.t_s[-1] < (phases.zero_s if phases.touch_down_s is None else phases.touch_down_s):
         return None  # the recording broke off before
     end = track.between(track.t_s[-1] - REST_S, np.inf).position_enu_m
     heights = [_height_above_surface(world, place) for place in (end[-1], track.position_enu_m[0])]
