@@ -16,6 +16,7 @@ from uav_simulator.sensors.lidar import Lidar
 from uav_simulator.sensors.mounts import LIDAR, ZED_LEFT, rotation_matrix
 from uav_simulator.sensors.pose_track import Pose, PoseTrack
 from uav_simulator.sensors.stereo import StereoPair
+from uav_simulator.sensors.texture import GRAINS, layer, noise_tiles
 from uav_simulator.vehicle.quaternion import from_yaw, multiply
 from uav_simulator.world.config import find_world, load_world
 from uav_simulator.world.parts import build_parts
@@ -93,6 +94,17 @@ def test_the_sky_has_no_depth(world):
     left, right = pair.render(pose(0.0, 0.0, 3.0, multiply(from_yaw(0.0), (np.cos(-0.6), 0.0, np.sin(-0.6), 0.0))))  # nose up
     depth = matched_depth(pair, left, right)[:60]
     assert np.isnan(depth).mean() > 0.95
+
+
+def test_a_layer_of_noise_goes_on_beyond_its_tile_as_opencv_repeats_an_image():
+    tile, grain = noise_tiles(0)[0], GRAINS[0]
+    u, v = (np.random.default_rng(n).uniform(-200.0, 200.0, (135, 240)).astype(np.float32) for n in (1, 2))
+    repeated = cv2.remap(tile[:-1, :-1], u * 40.0, v * 40.0, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP).astype(np.float32)
+    whole = layer(tile, u, v, grain, np.zeros_like(u))
+    assert np.array_equal(whole, (repeated - 128.0) * (grain.contrast / 128.0))
+    coarse = np.full_like(u, 2.25 * grain.texel_m)
+    assert np.allclose(layer(tile, u, v, grain, coarse), 0.5 * whole, atol=1e-4)
+    assert not layer(tile, u, v, grain, 2.0 * coarse).any(), "what is finer than a pixel is faded out"
 
 
 def track_of(*poses):

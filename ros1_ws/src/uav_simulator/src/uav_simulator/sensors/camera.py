@@ -74,9 +74,7 @@ class ColourCamera:
         wide_u, wide_v, far = (cv2.resize(each, size, interpolation=cv2.INTER_LINEAR) for each in (u, v, depth))
         shade = np.zeros((size[1], size[0]), dtype=np.float32)
         for grain, tile in zip((FINE, COARSE), self._tiles, strict=False):
-            # Metres of surface under one pixel: what is finer would only flicker.
-            weight = grain.contrast * np.clip(2.0 - far / (self.camera.focal_px * 1.5 * grain.texel_m), 0.0, 1.0)
-            shade += weight * layer(tile, wide_u, wide_v, grain)
+            shade += layer(tile, wide_u, wide_v, grain, far / self.camera.focal_px)
         self._count += 1
         picture = colour + shade[..., None] + self._noise[self._count % NOISE_FRAMES]
         return np.asarray(np.clip(picture, 0.0, 255.0), dtype=np.uint8)

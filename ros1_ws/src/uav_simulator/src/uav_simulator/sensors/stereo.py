@@ -1,12 +1,14 @@
 """A rectified stereo pair of grey images.
 
 A ray is cast for each block of 2 x 2 pixels of both eyes, in one call; inside a block every pixel is met exactly with the plane
-of the block's triangle. That is a quarter of the rays at the price of outlines that are rough by a pixel.
+of the block's triangle. That is a quarter of the rays at the price of outlines that are rough by a pixel. Both eyes are worked on
+at once, in two threads: simulated time and the nodes that work on the images wait for them.
 """
 
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +18,7 @@ from uav_simulator.sensors.mounts import GEAR_M, STEREO_BASELINE_M, ZED_LEFT, ZE
 from uav_simulator.sensors.pose_track import Pose
 from uav_simulator.sensors.texture import GRAINS, layer, noise_tiles, surface_table
 from uav_simulator.vehicle.noise import SlowNoise
-from uav_simulator.world.scene import NO_HIT, Scene
+from uav_simulator.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -63,9 +65,10 @@ class StereoPair:
         cx, cy = self.camera.centre_px
         x = (np.arange(0, self.camera.width, 2) + 0.5 - cx) / self.camera.focal_px
         y = (np.arange(0, self.camera.height, 2) + 0.5 - cy) / self.camera.focal_px
-        self._x, self._y = x.astype(np.float32)[None, None, :], y.astype(np.float32)[None, :, None]
+        self._x, self._y = x.astype(np.float32)[None, :], y.astype(np.float32)[:, None]
         gx, gy = np.meshgrid(x, y)
         self._rays_camera = np.stack([gx, gy, np.ones_like(gx)], axis=-1)
+        self._other_eye = ThreadPoolExecutor(1, thread_name_prefix="right eye")
 
     def render(self, pose: Pose) -> tuple[Image, Image]:
         """Return the left and the right image, (height, width) uint8."""
@@ -73,70 +76,69 @@ class StereoPair:
         r_map_camera = r_map_body @ ZED_LEFT.matrix
         eyes = np.array([np.asarray(pose.position) + r_map_body @ np.asarray(m.translation) for m in (ZED_LEFT, ZED_RIGHT)])
         eyes[:, 2] = np.maximum(eyes[:, 2], GEAR_M)
-        index, depth = self._cast(r_map_camera, eyes)
-        grey = self._shade(index, depth, self._coefficients(r_map_camera, eyes))
-        grey *= np.float32(1.0 + self._exposure.step(FRAME_S)[0])
-        start = int(self._rng.integers(0, NOISE_BANK - grey.size))
-        grey += self._noise[start : start + grey.size].reshape(grey.shape)
-        images = np.clip(grey, 0.0, 255.0).astype(np.uint8)
-        return images[0], images[1]
+        triangle, depth = self._cast(r_map_camera, eyes)
+        light = np.float32(1.0 + self._exposure.step(FRAME_S)[0])
+        shape = (2, self.camera.height, self.camera.width)
+        start = int(self._rng.integers(0, NOISE_BANK - math.prod(shape)))
+        noise = self._noise[start : start + math.prod(shape)].reshape(shape)
+
+        def image(eye: int) -> Image:
+            return self._image(triangle[eye], depth[eye], self._coefficients(r_map_camera, eyes[eye]), light, noise[eye])
+
+        right = self._other_eye.submit(image, 1)
+        return image(0), right.result()
 
     def _cast(self, r_map_camera: Floats, eyes: Floats) -> tuple[NDArray[np.intp], Floats32]:
-        """Return per eye and block the row in the coefficients and the depth (m), (2, height/2, width/2)."""
-        directions = self._rays_camera @ r_map_camera.T
-        rays = np.empty((2, *directions.shape[:2], 6), dtype=np.float32)
+        """Return per eye and block its triangle, for the sky the number after the last one, and the depth (m), (2, height/2, width/2)."""
+        rays = np.empty((2, *self._rays_camera.shape[:2], 6), dtype=np.float32)
         rays[..., :3] = eyes[:, None, None, :]
-        rays[..., 3:] = directions  # z of 1 in the camera: the hit's parameter is its depth
-        hits = self._world.cast(rays)
-        rows = len(self._table.grey) + 1
-        index = np.where(hits.triangle == NO_HIT, rows - 1, hits.triangle).astype(np.intp)
-        index[1] += rows
-        return index, np.minimum(hits.range_m, SKY_M)
+        rays[..., 3:] = self._rays_camera @ r_map_camera.T  # z of 1 in the camera: the hit's parameter is its depth
+        hits = self._world.cast(rays, threads=2)
+        # The number of no hit, the greatest, becomes the sky's.
+        triangle = np.minimum(hits.triangle, np.uint32(len(self._table.grey)))
+        return triangle.astype(np.intp), np.minimum(hits.range_m, np.float32(SKY_M))
 
-    def _coefficients(self, r_map_camera: Floats, eyes: Floats) -> Floats32:
-        """Return per eye and triangle, and a last row for the sky, the coefficients of depth and texture coordinates, (13, 2 rows).
+    def _coefficients(self, r_map_camera: Floats, eye: Floats) -> Floats32:
+        """Return per triangle, and a last one for the sky, the coefficients of depth and texture coordinates, (13, triangles + 1).
 
         With a pixel's direction d = (x, y, 1): depth = c / (n d), u = u0 + depth (a d), v = v0 + depth (b d).
         """
         t, world = self._table, self._world
-        parts = []
-        for eye in eyes:
-            columns = [
-                *(world.normals @ r_map_camera).T,
-                world.plane_offsets - world.normals @ eye,
-                *(t.axis_u @ r_map_camera).T,
-                t.axis_u @ eye + t.offset_u,
-                *(t.axis_v @ r_map_camera).T,
-                t.axis_v @ eye + t.offset_v,
-                t.grey,
-            ]
-            sky = np.array([0.0, 0.0, 1.0, SKY_M, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, SKY_GREY])
-            parts.append(np.concatenate([np.array(columns), sky[:, None]], axis=1))
-        coefficients: Floats32 = np.concatenate(parts, axis=1).astype(np.float32)
+        columns = [
+            *(world.normals @ r_map_camera).T,
+            world.plane_offsets - world.normals @ eye,
+            *(t.axis_u @ r_map_camera).T,
+            t.axis_u @ eye + t.offset_u,
+            *(t.axis_v @ r_map_camera).T,
+            t.axis_v @ eye + t.offset_v,
+            t.grey,
+        ]
+        sky = np.array([0.0, 0.0, 1.0, SKY_M, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, SKY_GREY])
+        coefficients: Floats32 = np.concatenate([np.array(columns), sky[:, None]], axis=1).astype(np.float32)
         return coefficients
 
-    def _shade(self, index: NDArray[np.intp], depth: Floats32, table: Floats32) -> Floats32:
-        """Return both images as float32 grey values, (2, height, width)."""
-        shape = (2, self.camera.height, self.camera.width)
-        u, v, spread, grey = (np.empty(shape, dtype=np.float32) for _ in range(4))
-        nx, ny, nz, c, ax, ay, az, u0, bx, by, bz, v0, base = (np.take(column, index) for column in table)
+    def _image(self, triangle: NDArray[np.intp], depth: Floats32, table: Floats32, light: np.float32, noise: Floats32) -> Image:
+        """Return one eye's image, (height, width) uint8.
+
+        It is made of four, of one pixel of each block: no pass over the pixels is strided, and what is worked on stays in the cache.
+        """
+        image = np.empty(noise.shape, dtype=np.uint8)
+        nx, ny, nz, c, ax, ay, az, u0, bx, by, bz, v0, base = (np.take(column, triangle, mode="clip") for column in table)
         low, high = 0.9 * depth, 1.1 * depth
         half = 0.5 / self.camera.focal_px
-        for row in (0, 1):
-            for column in (0, 1):
-                x, y = self._x + half * (2 * column - 1), self._y + half * (2 * row - 1)
-                slope = nx * x + ny * y + nz
+        for column, x in enumerate((self._x - half, self._x + half)):
+            n_x, a_x, b_x = nx * x, ax * x, bx * x
+            for row, y in enumerate((self._y - half, self._y + half)):
+                slope = n_x + ny * y + nz
                 with np.errstate(divide="ignore", invalid="ignore"):
                     z = np.fmin(np.fmax(c / slope, low), high)
-                here = (slice(None), slice(row, None, 2), slice(column, None, 2))
-                u[here] = u0 + z * (ax * x + ay * y + az)
-                v[here] = v0 + z * (bx * x + by * y + bz)
+                u = u0 + z * (a_x + ay * y + az)
+                v = v0 + z * (b_x + by * y + bz)
                 # Metres of surface under one pixel, along the steeper direction.
-                spread[here] = z / (self.camera.focal_px * np.maximum(np.abs(slope), 0.02))
-                grey[here] = base
-        for eye in (0, 1):
-            for grain, tile in zip(GRAINS, self._tiles, strict=True):
-                weight = grain.contrast * np.clip(2.0 - spread[eye] / (1.5 * grain.texel_m), 0.0, 1.0)
-                sky_safe = np.abs(u[eye]) < 1e4
-                grey[eye] += weight * layer(tile, np.where(sky_safe, u[eye], 0.0), v[eye], grain)
-        return grey
+                spread = z / (self.camera.focal_px * np.maximum(np.abs(slope), 0.02))
+                grey = base.copy()
+                for grain, tile in zip(GRAINS, self._tiles, strict=True):
+                    grey += layer(tile, u, v, grain, spread)
+                here = (slice(row, None, 2), slice(column, None, 2))
+                image[here] = np.clip(grey * light + noise[here], 0.0, 255.0)
+        return image

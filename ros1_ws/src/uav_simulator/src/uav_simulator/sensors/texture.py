@@ -16,6 +16,7 @@ from uav_simulator.world.scene import Scene
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
+Image = NDArray[np.uint8]
 TILE = 1024
 SUN = np.array([0.35, -0.55, 0.76])
 
@@ -58,21 +59,30 @@ def surface_table(world: Scene, seed: int) -> SurfaceTable:
     return SurfaceTable(axis_u, axis_v, offset_u, offset_v, 255.0 * world.brightness * light)
 
 
-def noise_tiles(seed: int) -> list[NDArray[np.uint8]]:
-    """Return one tile of soft noise per grain, (1024, 1024) uint8, that joins itself at its edges."""
+def noise_tiles(seed: int) -> list[Image]:
+    """Return one tile of soft noise per grain, (1025, 1025) uint8: its last row and column are its first ones, so that tiles join."""
     rng = np.random.default_rng([seed, 2])
     tiles = []
     for _ in GRAINS:
         raw = rng.normal(size=(TILE, TILE)).astype(np.float32)
         padded = cv2.copyMakeBorder(raw, 4, 4, 4, 4, cv2.BORDER_WRAP)
         soft = cv2.GaussianBlur(padded, (0, 0), 0.9)[4:-4, 4:-4]
-        tiles.append(np.clip(128.0 + 60.0 * soft / soft.std(), 0.0, 255.0).astype(np.uint8))
+        tile = np.clip(128.0 + 60.0 * soft / soft.std(), 0.0, 255.0).astype(np.uint8)
+        tiles.append(np.asarray(cv2.copyMakeBorder(tile, 0, 1, 0, 1, cv2.BORDER_WRAP)))
     return tiles
 
 
-def layer(tile: NDArray[np.uint8], u_m: Floats32, v_m: Floats32, grain: Grain) -> Floats32:
-    """Look a layer of noise up at texture coordinates in metres, (H, W) float32; -1..1."""
-    scale = 1.0 / grain.texel_m
-    grey = cv2.remap(tile, u_m * scale, v_m * scale, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-    unit: Floats32 = (grey.astype(np.float32) - 128.0) * np.float32(1.0 / 128.0)
-    return unit
+def layer(tile: Image, u_m: Floats32, v_m: Floats32, grain: Grain, spread_m: Floats32) -> Floats32:
+    """Look a layer of noise up at texture coordinates in metres, (H, W) float32 grey values, faded out where a pixel spreads over more."""
+    grey: Floats32 = cv2.remap(tile, _texels(u_m, grain), _texels(v_m, grain), cv2.INTER_LINEAR).astype(np.float32)
+    grey -= 128.0
+    grey *= np.clip(2.0 - spread_m / (1.5 * grain.texel_m), 0.0, 1.0) * (grain.contrast / 128.0)
+    return grey
+
+
+def _texels(metres: Floats32, grain: Grain) -> Floats32:
+    """Return coordinates within the tile: OpenCV's own way to repeat an image takes three times as long."""
+    # Whole 32nds of a texel, as OpenCV interpolates: in float32, these are brought into the tile without an error.
+    texels: Floats32 = np.rint(metres * (32.0 / grain.texel_m)) * np.float32(1.0 / 32.0)
+    texels -= TILE * np.floor(texels * np.float32(1.0 / TILE))
+    return texels

@@ -50,9 +50,9 @@ class Scene:
         obstacles = self.triangles[len(parts[0].mesh.triangles) :]
         self._obstacles = _scene(self.vertices, obstacles) if len(obstacles) else None
 
-    def cast(self, rays: Floats32) -> Hits:
-        """Cast rays (N, 6) float32 (origin, unit direction, map)."""
-        answer = self._all.cast_rays(o3d.core.Tensor.from_numpy(rays), nthreads=1)
+    def cast(self, rays: Floats32, *, threads: int = 1) -> Hits:
+        """Cast rays (N, 6) float32 (origin, direction, map); ranges are in units of the direction's length."""
+        answer = self._all.cast_rays(o3d.core.Tensor.from_numpy(rays), nthreads=threads)
         return Hits(answer["t_hit"].numpy(), answer["primitive_ids"].numpy())
 
     def nearest(self, position: Vec3) -> Nearest:
