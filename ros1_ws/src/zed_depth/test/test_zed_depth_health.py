@@ -103,14 +103,34 @@ BREAKS = {
 }
 
 
+class Scene:
+    """A pair without noise, and the pairs that good cameras send of it: made once for all tests."""
+
+    def __init__(self, left, right, fx: float) -> None:
+        self.left, self.right, self.fx = left, right, fx
+        self._good: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def good(self, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the k-th pair with its noise."""
+        if k not in self._good:
+            self._good[k] = noisy(self.left, 90 + k), noisy(self.right, 190 + k)
+        return self._good[k]
+
+    def rig(self) -> StereoRig:
+        return rig_for(self.left, self.fx)
+
+
 def scenes():
-    yield pytest.param(wall_pair(9.5, seed=1), 240.0, id="wall")
+    yield pytest.param(Scene(*wall_pair(9.5, seed=1), 240.0), id="wall")
     if DATA.exists():
         images = (cv2.imread(str(DATA / f"motorcycle_{side}.png"), cv2.IMREAD_GRAYSCALE) for side in ("left", "right"))
         half = (cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for image in images)
-        yield pytest.param(tuple(half), 124.0, id="motorcycle")
+        yield pytest.param(Scene(*half, 124.0), id="motorcycle")
     else:
-        yield pytest.param(None, 0.0, id="motorcycle", marks=pytest.mark.skip(reason=f"no real data at {DATA}: set ALULA_DATA"))
+        yield pytest.param(None, id="motorcycle", marks=pytest.mark.skip(reason=f"no real data at {DATA}: set ALULA_DATA"))
+
+
+SCENES = tuple(scenes())
 
 
 def rig_for(image, fx) -> StereoRig:
@@ -123,19 +143,18 @@ def rig_for(image, fx) -> StereoRig:
     return rig
 
 
-@pytest.mark.parametrize(("scene", "fx"), scenes())
+@pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", BREAKS)
-def test_a_broken_rig_is_known_within_half_a_second(scene, fx, name) -> None:
+def test_a_broken_rig_is_known_within_half_a_second(scene, name) -> None:
     change, verdict, fault, sentence = BREAKS[name]
-    left, right = scene
-    rig = rig_for(left, fx)
+    rig = scene.rig()
     for k in range(3):
-        assert rig.finding(StereoPair(k * NS // 10, noisy(left, 90 + k), noisy(right, 190 + k))).ok
-    during = [rig.finding(StereoPair((3 + k) * NS // 10, *change(left, right, 300 + 2 * k))) for k in range(7)]
+        assert rig.finding(StereoPair(k * NS // 10, *scene.good(k))).ok
+    during = [rig.finding(StereoPair((3 + k) * NS // 10, *change(scene.left, scene.right, 300 + 2 * k))) for k in range(7)]
     assert all(finding.verdict is verdict for finding in during[4:]), [finding.reason for finding in during]
     assert {finding.fault for finding in during[4:]} == {fault}
     assert sentence in during[-1].reason
-    after = [rig.finding(StereoPair((20 + k) * NS // 10, noisy(left, 90 + k), noisy(right, 190 + k))) for k in range(3)]
+    after = [rig.finding(StereoPair((20 + k) * NS // 10, *scene.good(k))) for k in range(3)]
     assert all(finding.ok for finding in after)
 
 
@@ -145,21 +164,19 @@ def believed(rig, k, left, right) -> bool:
     return rig.finding(pair).ok and not rig.depth(pair).doubt
 
 
-@pytest.mark.parametrize(("scene", "fx"), scenes())
+@pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("name", BREAKS)
 @pytest.mark.parametrize("since_check", [0, 2])
-def test_no_pair_of_a_broken_rig_is_believed_wherever_it_falls_between_two_checks(scene, fx, name, since_check) -> None:
-    left, right = scene
-    rig = rig_for(left, fx)
+def test_no_pair_of_a_broken_rig_is_believed_wherever_it_falls_between_two_checks(scene, name, since_check) -> None:
+    rig = scene.rig()
     good = 5 + since_check  # both images are held against each other at 0, 4, 8: three pairs or one before the next time
     for k in range(good):
-        assert believed(rig, k, noisy(left, 90 + k), noisy(right, 190 + k)), k
+        assert believed(rig, k, *scene.good(k)), k
     change = BREAKS[name][0]
-    last = noisy(left, 89 + good), noisy(right, 189 + good)
-    frozen = name.startswith("frozen")  # at the last good pair
-    broken = [change(*(last if frozen else (left, right)), 300 + 2 * k) for k in range(6)]
+    last = scene.good(good - 1) if name.startswith("frozen") else (scene.left, scene.right)
+    broken = [change(*last, 300 + 2 * k) for k in range(6)]
     assert [k for k, pair in enumerate(broken) if believed(rig, good + k, *pair)] == []
-    after = [believed(rig, 20 + k, noisy(left, 90 + k), noisy(right, 190 + k)) for k in range(4)]
+    after = [believed(rig, 20 + k, *scene.good(k)) for k in range(4)]
     assert after[-2:] == [True, True]
 
 
@@ -179,11 +196,11 @@ def test_a_scene_with_less_depth_is_in_doubt_until_both_images_were_held_against
     assert believed(rig, 4, noisy(half[0], 9), noisy(half[1], 10))
 
 
-@pytest.mark.parametrize(("scene", "fx"), scenes())
+@pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("gain", [0.3, 0.6, 1.0, 1.4])
-def test_a_good_rig_is_never_suspected(scene, fx, gain) -> None:
-    left, right = (np.clip(image * gain, 0, 255) for image in scene)
-    rig = rig_for(left, fx)
+def test_a_good_rig_is_never_suspected(scene, gain) -> None:
+    left, right = (np.clip(image * gain, 0, 255) for image in (scene.left, scene.right))
+    rig = scene.rig()
     findings = [rig.finding(StereoPair(k * NS // 2, noisy(left, 2 * k), noisy(right, 2 * k + 1))) for k in range(6)]
     assert all(finding.ok for finding in findings), [finding.reason for finding in findings]
 

@@ -49,7 +49,7 @@ def look_ahead(
     T_map_camera = pose @ T_base_camera  # noqa: N806 -- T_target_source
     direction = direction_of_motion(pose[:3, 3], pose[:3, 0], motion)
     stride_px = settings.stride_px
-    depths = depth_m[::stride_px, ::stride_px]
+    depths = np.ascontiguousarray(depth_m[::stride_px, ::stride_px])
     wanted = depths <= settings.max_range_m
     # Most of what is seen is beside the corridor: it is left out before points are made of it.
     sides = ((np.array([-direction[1], direction[0], 0.0]), settings.corridor.half_width_m), (UPWARDS, settings.corridor.half_height_m))

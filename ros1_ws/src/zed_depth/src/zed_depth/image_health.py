@@ -58,19 +58,24 @@ class ImageJudge:
         return next((finding for finding in findings if not finding.ok), FINE)
 
     def _one(self, side: str, image: Gray) -> Finding:
-        sample = image[::STRIDE, ::STRIDE]
+        sample = np.ascontiguousarray(image[::STRIDE, ::STRIDE])
         previous, self._previous[side] = self._previous.get(side), sample
         limits = self._limits
-        size = (max(1, image.shape[1] // THUMB), max(1, image.shape[0] // THUMB))
-        thumb = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+        rows, columns = (max(1, length // THUMB) for length in image.shape)
+        # Whole blocks: OpenCV takes twenty times as long to average fractions of pixels.
+        thumb = np.asarray(cv2.resize(image[: rows * THUMB, : columns * THUMB], (columns, rows), interpolation=cv2.INTER_AREA))
         mean, contrast = float(thumb.mean()), float(thumb.std())
-        saturated = float(np.mean(sample >= SATURATED))
+        saturated = np.count_nonzero(sample >= SATURATED) / sample.size
         told = f"mean {mean:.0f}, contrast {contrast:.1f} of 255"
         if saturated > limits.max_saturated:
             return broken(FaultKind.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
         if mean < limits.dark_mean and contrast < 2.0 * limits.min_contrast:
             return broken(FaultKind.EXPOSURE, f"{side} image is dark ({told})")
-        if previous is not None and previous.shape == sample.shape and np.mean(previous != sample) < limits.min_changed:
+        if (
+            previous is not None
+            and previous.shape == sample.shape
+            and np.count_nonzero(previous != sample) < limits.min_changed * sample.size
+        ):
             return broken(FaultKind.FROZEN, f"{side} image is frozen")
         if contrast < limits.min_contrast:
             self._blank.add(side)

@@ -143,9 +143,10 @@ class StereoRig:
         matcher = self._matcher_for(calibration.geometry)
         images = calibration.prepared(pair.left, pair.right)
         disparity = matcher.disparity(*images)
-        share = float(np.mean(np.isfinite(disparity)))
+        share = np.count_nonzero(np.isfinite(disparity)) / disparity.size
         finding = FINE if share >= self._settings.min_valid else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
-        nearer = float(np.mean(disparity > calibration.geometry.offset_px + self._settings.view.min_parallax_px))
+        parallax = disparity > calibration.geometry.offset_px + self._settings.view.min_parallax_px
+        nearer = np.count_nonzero(parallax) / disparity.size
         with self._lock:
             self._valid = finding
             doubt = self._doubt({"depth": share, "parallax": nearer}, pair.stamp_ns)

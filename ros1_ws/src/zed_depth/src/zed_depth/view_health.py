@@ -210,8 +210,10 @@ def _covered_finding(left: Gray, right: Gray, offset_px: float) -> Finding | Non
     first = int(np.floor(offset_px * TILES[1] / left.shape[1])) - 1
     disparities = range(first, first + int(np.ceil(REACH * TILES[1])) + 2)
     for side, mine, other, step in (("left", content_left, content_right, 1), ("right", content_right, content_left, -1)):
-        # What the left camera sees is as far to the left, or farther, in the right image.
-        nothing = np.all([_moved(mine, step * tiles) < NO_CONTENT for tiles in disparities], axis=0)
+        # What the left camera sees is as far to the left, or farther, in the right image. Beyond the image any content may be.
+        wide = np.pad(mine, ((0, 0), (TILES[1], TILES[1])), constant_values=np.inf)
+        starts = [TILES[1] + step * tiles for tiles in disparities]
+        nothing = np.all([wide[:, start : start + TILES[1]] < NO_CONTENT for start in starts], axis=0)
         share = float(np.mean(nothing & (other >= CONTENT)))
         if share > COVERED:
             return broken(FaultKind.VIEW, f"the {side} camera sees nothing where the other one does: {share:.0%} of its view is covered")
@@ -224,14 +226,6 @@ def _content(image: Gray) -> Floats:
     size = (columns * TILE_CELLS, rows * TILE_CELLS)
     cells = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float64)
     return np.asarray(cells.reshape(rows, TILE_CELLS, columns, TILE_CELLS).std(axis=(1, 3)))
-
-
-def _moved(tiles: Floats, columns: int) -> Floats:
-    """Return the content so many tiles to the right of each, negative: to the left; beyond the image any."""
-    count = tiles.shape[1]
-    wide = np.pad(tiles, ((0, 0), (count, count)), constant_values=np.inf)
-    moved: Floats = wide[:, count + columns : 2 * count + columns]
-    return moved
 
 
 def edge_width_px(image: Gray) -> float:
