@@ -83,25 +83,27 @@ class CloudJudge:
         sample = sweep.points[::stride]
         previous, self._previous = self._previous, sample
         ranges = np.sqrt(np.einsum("ij,ij->i", sample, sample))
-        outside = np.isfinite(ranges) & (ranges > self_m)
+        returned = ranges > self_m
+        outside = np.flatnonzero(np.isfinite(ranges) & returned)
+        points, outside_m = sample.take(outside, axis=0), ranges.take(outside)
         sectors = _sectors(sample, ranges, stride, self_m)
         if self._left_behind(position_m):
             self._forget()
         before = self._lately()
-        count = int(np.count_nonzero(outside)) * stride
+        count = len(outside) * stride
         if count < self._limits.min_returns:
             return self._too_few(count, before, self_m)
-        far = self._far(ranges[outside])
+        far = self._far(outside_m)
         if far:
             return broken(FaultKind.RANGE, far)
-        if _frozen(sample[ranges > self_m], previous, sample, ranges > self_m):
+        if _frozen(sample, previous, np.flatnonzero(returned)):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
         noise_m = self._noise.risen_m(sweep, self_m=self_m)
         if noise_m:
             self._lost_at_m = position_m if self._lost_at_m is None else self._lost_at_m
             return broken(FaultKind.RANGE, f"the ranges scatter by {noise_m:.2f} m where they are smoothest")
         least_m = NEAR * self_m
-        off_m = self._steps.offset_m(sample[outside], ranges[outside], sweep.stamp_ns, least_m=least_m, position_m=position_m)
+        off_m = self._steps.offset_m(points, outside_m, sweep.stamp_ns, least_m=least_m, position_m=position_m)
         if off_m:
             became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
             return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
@@ -150,7 +152,7 @@ class CloudJudge:
         return broken(FaultKind.RETURNS, told)
 
     def _far(self, ranges: NDArray[np.float32]) -> str:
-        share = float(np.mean(ranges > self._limits.max_range_m))
+        share = np.count_nonzero(ranges > self._limits.max_range_m) / len(ranges)
         if share <= self._limits.far_share:
             return ""
         middle = float(np.median(ranges))
@@ -211,12 +213,12 @@ def _together(gone: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return together
 
 
-def _frozen(now: NDArray[np.float32], previous: NDArray[np.float32], sample: NDArray[np.float32], returned: NDArray[np.bool_]) -> bool:
-    """Return whether nearly all returns are where they were; the rest of the message may change."""
-    if previous.shape != sample.shape or not len(now):
+def _frozen(now: NDArray[np.float32], before: NDArray[np.float32], returned: NDArray[np.intp]) -> bool:
+    """Return whether nearly all of these points (N, 3) that returned are where they were; the rest of the message may change."""
+    if before.shape != now.shape or not len(returned):
         return False
-    same = np.all(now == previous[returned], axis=1)
-    return bool(np.mean(same) > FROZEN_SHARE)
+    x, y, z = (now.take(returned, axis=0) == before.take(returned, axis=0)).T
+    return np.count_nonzero(x & y & z) > FROZEN_SHARE * len(returned)
 
 
 def _angles(lost: NDArray[np.bool_]) -> str:

@@ -49,20 +49,25 @@ class GroundModel:
         ``seen`` (N, 3) are the points' corridor coordinates from ``origin_enu_m``, the vehicle's centre, along ``direction``.
         """
         row, column = (np.floor((seen[:, axis] + below_m) / CELL_M) for axis, below_m in enumerate((BEHIND_M, ASIDE_M)))
-        inside = (row >= 0) & (row < self._shape[0]) & (column >= 0) & (column < self._shape[1])
-        flat = (row[inside] * self._shape[1] + column[inside]).astype(np.intp)
+        inside = np.flatnonzero((row >= 0) & (row < self._shape[0]) & (column >= 0) & (column < self._shape[1]))
+        flat = (row * self._shape[1] + column).take(inside).astype(np.intp)
+        up_m = points_enu_m[:, 2].take(inside)
         lowest: Floats = np.full(self._shape[0] * self._shape[1], np.inf)
-        np.minimum.at(lowest, flat, points_enu_m[inside, 2])
+        np.minimum.at(lowest, flat, up_m)
         lowest = _without_ghosts(lowest, self._shape)
         ground = self._envelope(lowest)
         ground = np.minimum(ground, self._remembered(origin_enu_m, direction))
         self._remember(lowest, origin_enu_m, direction)
         heights = np.full(len(seen), np.inf)
-        heights[inside] = points_enu_m[inside, 2] - ground[flat]
+        heights[inside] = up_m - ground.take(flat)
         return heights
 
     def _envelope(self, lowest: Floats) -> Floats:
-        envelope: Floats = np.min(self._cones + lowest.astype(np.float32), axis=1).astype(np.float64)
+        seen = np.flatnonzero(np.isfinite(lowest))
+        # The cones are symmetric: those of the cells that were seen are rows, which lie together.
+        cones = self._cones.take(seen, axis=0)
+        cones += lowest.take(seen).astype(np.float32)[:, None]
+        envelope: Floats = np.min(cones, axis=0, initial=np.inf).astype(np.float64)
         return envelope
 
     def _remembered(self, origin: Floats, direction: Floats) -> Floats:
