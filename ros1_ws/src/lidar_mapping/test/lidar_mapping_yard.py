@@ -45,8 +45,8 @@ class Path:
         self._corridor, self._reach_m, self._across = corridor, reach_m, np.sin(np.radians(across_deg))
 
     def pose(self, t):
-        transform = np.eye(4)
-        transform[:3, :3] = Rotation.from_euler("z", self.yaw(t)).as_matrix()
+        transform, yaw = np.eye(4), self.yaw(t)
+        transform[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
         transform[:3, 3] = self.position(t)
         return transform
 
@@ -78,12 +78,12 @@ class Path:
         return Sweep(round(start_s * NS), seen[near].astype(np.float32), times[near].astype(np.float32))
 
     def autopilot(self, end_s, *, drift=0.0, jump_m=0.0, jump_s=np.inf, turned=lambda _t: np.zeros(3)):
-        """What the autopilot tells of the last second: the pose, its position wrong by ``drift`` of the way from the start.
+        """What the autopilot tells of the last sweep's time: the pose, its position wrong by ``drift`` of the way from the start.
 
         Its attitude is wrong by the rotation vector ``turned(t)``, map frame, radians.
         """
         poses = PoseBuffer(keep_s=60.0)
-        for t in np.arange(max(0.0, end_s - 1.0), end_s + 0.03, 0.02):
+        for t in np.arange(max(0.0, end_s - 0.12), end_s + 0.03, 0.02):  # a sweep's time, and a pose before and after
             pose = self.pose(t)
             start = self.position(0.0)
             given = start + (1.0 + drift) * (pose[:3, 3] - start) + (jump_m if t >= jump_s else 0.0) * np.array([1.0, 0.0, 0.0])

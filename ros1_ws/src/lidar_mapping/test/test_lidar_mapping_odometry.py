@@ -23,6 +23,7 @@ from lidar_mapping import (
     Keyframes,
     LidarInertialOdometry,
     OdometrySettings,
+    Patches,
     RegistrationSettings,
     State,
     Surface,
@@ -30,7 +31,8 @@ from lidar_mapping import (
     flat_patches,
     register,
 )
-from lidar_mapping.surface import PATCH_M, smallest_axis
+from lidar_mapping.registration import SEARCHED_M
+from lidar_mapping.surface import PATCH_M, join, smallest_axis
 from perception_core import NS, Sweep
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -133,6 +135,35 @@ def test_a_wrong_prediction_is_corrected(shift, turn) -> None:
 
 
 YARD = surface_of(yard(120_000, 1))
+
+
+def test_to_keep_the_partners_of_points_that_hardly_move_costs_no_accuracy(monkeypatch) -> None:
+    here, scan = np.array([1.0, 0.5, 2.0]), downsample(yard(20000, 2), 0.3) - [1.0, 0.5, 2.0]
+    places, asked = [], []
+    nearest = Surface.nearest
+    monkeypatch.setattr(Surface, "nearest", lambda self, *args, **kwargs: asked.append(1) or nearest(self, *args, **kwargs))
+    for moved_m in (SEARCHED_M, 0.0):
+        monkeypatch.setattr("lidar_mapping.registration.SEARCHED_M", moved_m)
+        found = filter_at(here + np.array([0.05, -0.03, 0.02]))
+        assert register(scan, YARD, found, RegistrationSettings()).believed
+        places.append((found.state.position, len(asked)))
+        asked.clear()
+    (kept, few), (searched, many) = places
+    assert kept == pytest.approx(searched, abs=2e-3)
+    assert (few <= 2, many >= RegistrationSettings().gates) == (True, True)
+
+
+def test_a_surface_that_was_added_to_finds_what_one_of_all_patches_finds() -> None:
+    rng = np.random.default_rng(5)
+    parts = [Patches(rng.uniform(-3.0, 3.0, (count, 3)), rng.normal(size=(count, 3))) for count in (400, 0, 150, 60)]
+    whole, grown = Surface(join(parts)), Surface(parts[0])
+    for part in parts[1:]:
+        grown = grown.joined(part)
+    asked = rng.uniform(-4.0, 4.0, (500, 3))
+    for one, other in zip(whole.nearest(asked, within_m=0.5), grown.nearest(asked, within_m=0.5), strict=True):
+        assert np.array_equal(one, other)
+    assert np.array_equal(whole.points, grown.points)
+    assert np.array_equal(whole.normals, grown.normals)
 
 
 def test_along_bare_walls_the_prediction_is_left_and_the_direction_is_named() -> None:

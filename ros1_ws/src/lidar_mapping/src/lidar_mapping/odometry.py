@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from lidar_mapping.inertial import (
     ATTITUDE,
@@ -20,6 +19,8 @@ from lidar_mapping.inertial import (
     InertialFilter,
     InertialNoise,
     State,
+    rotation_matrix,
+    rotation_vector,
 )
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.registration import Registration, RegistrationSettings, refused, register
@@ -41,6 +42,7 @@ IMU_GAP_NS = 100_000_000
 KNOT_NS = 10_000_000
 VELOCITY_BASE_NS = 100_000_000
 FIRST_SWEEPS = 3
+WHOLE_KEYFRAMES = 4  # the surface is made anew after so many keyframes; between them it is added to
 FIRST_HEADING_RAD = 0.001  # a new map's heading is what the start says, by definition
 ANY_M_S = 10.0
 CLEARLY = 0.05  # of fitness
@@ -126,7 +128,7 @@ class LidarInertialOdometry:
         """Follow the map when it is corrected; ``correction`` (4, 4) is T_corrected_before at the vehicle."""
         state, turn = self.filter.state, correction[:3, :3]
         position = turn @ state.position + correction[:3, 3]
-        error = (Rotation.from_rotvec(state.autopilot_error) * Rotation.from_matrix(turn.T)).as_rotvec()
+        error = rotation_vector(rotation_matrix(state.autopilot_error) @ turn.T)
         moved = replace(
             state,
             rotation=turn @ state.rotation,
@@ -222,10 +224,10 @@ class LidarInertialOdometry:
             return state.velocity + moves[:, DRIFT] @ state.autopilot_drift - autopilot.velocity
 
         def off_rad(state: State) -> tuple[Floats, Floats]:
-            said = Rotation.from_rotvec(state.autopilot_error).as_matrix() @ state.rotation
+            said = rotation_matrix(state.autopilot_error) @ state.rotation
             rows = np.zeros((3, TERMS))
             rows[:, ATTITUDE], rows[:, AUTOPILOT] = np.eye(3), said.T
-            return Rotation.from_matrix(autopilot.rotation.T @ said).as_rotvec(), rows
+            return rotation_vector(autopilot.rotation.T @ said), rows
 
         covariance = self.filter.covariance
         off, turns = off_rad(self.filter.state)
@@ -244,7 +246,7 @@ class LidarInertialOdometry:
         state, covariance = self.filter.state, self.filter.covariance.copy()
         covariance[AUTOPILOT, :], covariance[:, AUTOPILOT] = 0.0, 0.0
         covariance[AUTOPILOT, AUTOPILOT] = np.diag(self._settings.noise.autopilot_rad**2)
-        error = Rotation.from_matrix(autopilot.rotation @ state.rotation.T).as_rotvec()
+        error = rotation_vector(autopilot.rotation @ state.rotation.T)
         self.filter.state, self.filter.covariance = replace(state, autopilot_error=error), covariance
         self.filter.history[-1] = (self.filter.stamp_ns, self.filter.state)
 
@@ -267,12 +269,15 @@ class LidarInertialOdometry:
         sparse = len(self.keyframes.all) == 1 and len(self._since) >= FIRST_SWEEPS
         if self._last_pose is not None and not sparse:
             moved = np.linalg.inv(self._last_pose) @ pose
-            turned = Rotation.from_matrix(moved[:3, :3]).magnitude()
+            turned = np.linalg.norm(rotation_vector(moved[:3, :3]))
             if (np.linalg.norm(moved[:3, 3]) < settings.keyframe_m and turned < settings.keyframe_rad) or self.keyframes.full:
                 return None
         frame = self.keyframes.add(self.filter.stamp_ns, pose, np.vstack(self._since))
         self._since, self._last_pose = [], pose
-        self._surface = self.keyframes.surface(pose[:3, 3], settings.reach_m)
+        if self._surface is None or len(self.keyframes.all) % WHOLE_KEYFRAMES == 0:
+            self._surface = self.keyframes.surface(pose[:3, 3], settings.reach_m)
+        else:
+            self._surface = self._surface.joined(frame.patches.moved(pose))
         return frame
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lidar_mapping.inertial import ATTITUDE, POSITION, TERMS
+from lidar_mapping.surface import cross
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 POSE = np.array([0, 1, 2, 6, 7, 8])
 """The places of attitude and position in the filter's error."""
+SEARCHED_M = 0.03  # patches are searched again where a point has moved by more: within that a neighbouring patch tells of the same plane
+FITNESS_GATES = 3.0
 
 
 @dataclass(frozen=True)
@@ -83,12 +86,17 @@ def refused(reason: str, fitness: float = 0.0) -> Registration:
 
 
 class _Measurement:
-    """The normal equations of the pairs of points (N, 3), body frame, with a surface; each call narrows the gate."""
+    """The normal equations of the pairs of points (N, 3), body frame, with a surface; each call narrows the gate.
+
+    Inside, points are columns (3, N): numpy takes several times as long for rows of three.
+    """
 
     def __init__(self, points: Floats, surface: Surface, settings: RegistrationSettings, first_gate_m: float) -> None:
-        self._points, self._surface, self._settings = points, surface, settings
+        self._points, self._surface, self._settings = np.ascontiguousarray(points.T), surface, settings
         narrowing = np.geomspace(first_gate_m, settings.gate_m, settings.gates)
         self._gates_m = itertools.chain(narrowing, itertools.repeat(settings.gate_m))
+        self._reach_m = max(first_gate_m, FITNESS_GATES * settings.gate_m)
+        self._searched: Floats | None = None
         self.pairs = 0
         self.fitness = 0.0
         self.held: Floats = np.zeros((3, 3))
@@ -96,22 +104,29 @@ class _Measurement:
     def __call__(self, state: State) -> tuple[Floats, Floats]:
         gate_m = next(self._gates_m)
         settings = self._settings
-        placed = self._points @ state.rotation.T + state.position
-        paired, partner = self._surface.nearest(placed, within_m=gate_m)
-        normals = self._surface.normals[partner]
-        residual = np.einsum("ij,ij->i", normals, placed[paired] - self._surface.points[partner])
+        off_m, inside = self._off(state, gate_m)
         kernel_m = max(0.2 * gate_m, settings.kernel_m)
-        weight = settings.independent / settings.point_sigma_m**2 / (1.0 + (residual / kernel_m) ** 2)
-        rows = np.hstack([np.cross(self._points[paired], normals @ state.rotation), normals])
-        return self._spread((rows * weight[:, None]).T @ rows, rows.T @ (weight * residual), float(weight.sum()))
+        weight = inside * (settings.independent / settings.point_sigma_m**2 / (1.0 + (off_m / kernel_m) ** 2))
+        rows = np.vstack([cross(self._paired, state.rotation.T @ self._normals), self._normals])
+        return self._spread((rows * weight) @ rows.T, rows @ (weight * off_m), float(weight.sum()))
 
     def judge(self, state: State) -> None:
         """Find out how well the points lie where the state puts them."""
-        placed = self._points @ state.rotation.T + state.position
-        near, partner = self._surface.nearest(placed, within_m=3.0 * self._settings.gate_m)
-        off_m = np.abs(np.einsum("ij,ij->i", self._surface.normals[partner], placed[near] - self._surface.points[partner]))
-        self.pairs = int(np.count_nonzero(off_m < 0.5 * self._settings.gate_m))
-        self.fitness = self.pairs / max(len(near), 1)
+        off_m, near = self._off(state, FITNESS_GATES * self._settings.gate_m)
+        self.pairs = int(np.count_nonzero(near & (np.abs(off_m) < 0.5 * self._settings.gate_m)))
+        self.fitness = self.pairs / max(int(np.count_nonzero(near)), 1)
+
+    def _off(self, state: State, gate_m: float) -> tuple[Floats, NDArray[np.bool_]]:
+        """Return of each pair how far the point is off the plane of its patch (N,), metres, and whether the patch is within the gate."""
+        placed = state.rotation @ self._points + state.position[:, None]
+        if self._searched is None or np.abs(placed - self._searched).max() > SEARCHED_M:
+            self._searched = placed
+            self._chosen, patch = self._surface.nearest(placed.T, within_m=self._reach_m)
+            self._paired = self._points[:, self._chosen]
+            self._patches, self._normals = (np.ascontiguousarray(each[patch].T) for each in (self._surface.points, self._surface.normals))
+        apart = placed[:, self._chosen] - self._patches
+        off_m: Floats = np.einsum("ij,ij->j", self._normals, apart)
+        return off_m, np.einsum("ij,ij->j", apart, apart) < gate_m**2
 
     def _spread(self, information: Floats, gradient: Floats, total: float) -> tuple[Floats, Floats]:
         """Take the information of noise off, and put the rest in the filter's places."""

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from lidar_mapping.graph import GraphSettings, PoseGraph
-from lidar_mapping.inertial import POSITION, State
+from lidar_mapping.inertial import POSITION, State, rotation_vector
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.odometry import VELOCITY_BASE_NS, AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
 from lidar_mapping.readings import SET_BACK_NS
@@ -150,7 +149,7 @@ class Slam:
 
     def _start(self, sweep: Sweep, poses: PoseBuffer, velocity: Floats) -> None:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
-        error = Rotation.from_matrix(self.T_map_odom[:3, :3].T).as_rotvec()
+        error = rotation_vector(self.T_map_odom[:3, :3].T)
         start = State(place[:3, :3], velocity, place[:3, 3], autopilot_error=error)
         self._odometry = LidarInertialOdometry(self._settings.odometry, self.keyframes, sweep.stamp_ns, start)
 
