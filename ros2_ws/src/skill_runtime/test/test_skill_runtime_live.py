@@ -240,6 +240,34 @@ def process(ros2_domain):
         one.stdout.close()
 
 
+@pytest.mark.parametrize("goals", [1, 5])
+def test_managers_that_are_shut_down_send_the_results_of_their_goals(spinning, process, goals):
+    """An action client of ROS 2 knows nothing of events: it hears by the result only, or never."""
+    served = process("--ros-args", "-p", "use_sim_time:=false")
+    node = Node(f"skill_runtime_tester_{next(NUMBERS)}")
+    client = SkillsetClient(node, "navigation")
+    assert client.wait_ready(READY_S)
+    spinning.spin(node)
+    for resource, state in FLYING.items():
+        take(node, resource, state)
+    actions = ActionClient(node, navigation_actions.GotoStraight, "navigation/skill/goto_straight")
+    assert actions.wait_for_server(READY_S)
+    results: list[str] = []
+
+    def ask(sent) -> None:
+        sent.result().get_result_async().add_done_callback(lambda ended: results.append(ended.result().result.message))
+
+    for _ in range(goals):
+        goal = navigation_actions.GotoStraight.Goal(speed=1.0)
+        actions.send_goal_async(goal).add_done_callback(ask)
+    until(lambda: client.resources["axes_authority"] == "USED" and len(results) == goals - 1, "one runs, the others are refused")
+    served.send_signal(signal.SIGINT)
+    until(lambda: len(results) == goals, "all have their results")
+    assert results[-1] == "the managers were shut down"
+    assert served.wait(SOON_S) == 0
+    actions.destroy()
+
+
 @pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + DOUBT_S + 2.0)])
 def test_no_client_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
     served = process("--ros-args", "-p", "use_sim_time:=false", "__name:=from_roslaunch")

@@ -39,7 +39,7 @@ class _Member(NamedTuple):
 
     entity: Any
     handle: Any
-    """Is entered while it is waited for, so that nobody destroys it: the entity's handle, or the waitable itself."""
+    """Is entered while it is waited for, so that it is not destroyed meanwhile: the entity's handle, or the waitable itself."""
     add: Callable[[], object]
     """Adds it to the wait set."""
 
@@ -85,6 +85,11 @@ class StaticSingleThreadedExecutor(SingleThreadedExecutor):  # type: ignore[misc
             "client": self._take_client,
             "service": self._take_service,
         }
+
+    @property
+    def idle(self) -> bool:
+        """Whether no task is left to be done, but for one that asks."""
+        return not self._open_tasks()
 
     def wake(self) -> None:
         """Wake the executor because the entities of a node have changed, or what it is to wait for of them."""

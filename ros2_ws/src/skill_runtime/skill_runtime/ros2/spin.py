@@ -188,14 +188,18 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
         stop.set()
 
     def end() -> None:
-        over.set()
-        executor.shutdown(timeout_sec=0)
+        """Shut down once nothing else is left: rclpy sends results by tasks, which make others."""
+        if executor.idle or time.monotonic() > patient_until_s:
+            over.set()
+            executor.shutdown(timeout_sec=0)
+        else:
+            executor.create_task(end)
 
     thread = threading.Thread(target=spin, name="executor")
     thread.start()
     wait_for(stop)
     at_stop()
     node.close("the managers were shut down")
-    # In the executor's own queue, so after the results of what was failed.
+    patient_until_s = time.monotonic() + END_S / 2
     executor.create_task(end)
     thread.join(END_S)
