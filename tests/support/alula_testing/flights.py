@@ -63,6 +63,10 @@ class Flight:
         """Wait until a skill runs."""
         self.wait_for(f"{skill} RUNNING", lambda: any(e.get("skill") == skill and e.get("state") == "RUNNING" for e in self.events()))
 
+    def wait_in_air(self) -> None:
+        """Wait until the vehicle has lifted off."""
+        self.wait_for("lift-off", lambda: any((e.get("resource"), e.get("to_state")) == ("flight_status", "IN_AIR") for e in self.events()))
+
     def words(self) -> str:
         """What the flight printed so far."""
         return (self.out.parent / f"{self.out.name}.txt").read_text(encoding="utf-8")

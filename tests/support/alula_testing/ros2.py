@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -25,7 +26,7 @@ def ros2_domain() -> Iterator[int]:
 
 
 def spin(executor: Any) -> None:
-    """Spin until the executor is shut down, in a thread of its own.
+    """Spin until the executor is shut down or `end_spinning` is called, in a thread of its own.
 
     rclpy 7.1.6 raises InvalidHandle where another thread destroys a subscription or a client that the executor is about to look at;
     it can go on afterwards, so tests may destroy what they made.
@@ -41,3 +42,30 @@ def spin(executor: Any) -> None:
         except (ExternalShutdownException, ShutdownException):
             return
         return
+
+
+def end_spinning(executor: Any, thread: threading.Thread, timeout_s: float = 5.0) -> None:
+    """End a thread that runs `spin` as soon as the executor has done what it was given, and then the executor; wall clock in seconds.
+
+    rclpy sends the result of a goal that has ended by a task of the executor: one that has not begun at the shutdown is lost, and Python
+    warns of a coroutine that was never awaited. And the shutdown takes away what the thread may still be about to wait for.
+    """
+    if thread.is_alive():
+        executor.create_task(_leave, executor).add_done_callback(lambda _: executor.wake())
+        thread.join(timeout_s)
+    executor.shutdown(timeout_sec=timeout_s)
+
+
+class _OtherTasksFirst:
+    """What a task awaits that lets all others of its executor run before it goes on; rclpy begins with the newest."""
+
+    def __await__(self) -> Iterator[None]:
+        yield
+
+
+async def _leave(executor: Any) -> None:
+    from rclpy.executors import ShutdownException
+
+    executor.wake()
+    await _OtherTasksFirst()
+    raise ShutdownException

@@ -11,7 +11,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from alula_testing import waits
 from alula_testing.recorder import Recorder
-from alula_testing.ros2 import spin
+from alula_testing.ros2 import end_spinning, spin
 from skill_runtime.ros2 import SkillsetNode
 
 SOON_S = 10.0
@@ -35,8 +35,7 @@ class Spun:
         self._thread.start()
 
     def close(self) -> None:
-        self.executor.shutdown(timeout_sec=5.0)
-        self._thread.join(5.0)
+        end_spinning(self.executor, self._thread)
         self.node.destroy_node()
 
 

@@ -18,7 +18,7 @@ from skillset_interfaces.srv import Transition
 
 from alula_testing import waits
 from alula_testing.recorder import Recorder
-from alula_testing.ros2 import spin
+from alula_testing.ros2 import end_spinning, spin
 from skill_model.execution_state import ExecutionState
 from skill_runtime.hook_processes import HookServer, RemoteHooks, pipe_address
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
@@ -82,8 +82,7 @@ class Spinning:
         for node, executor, thread in reversed(self.running):
             if hasattr(node, "close"):
                 node.close("the test is over")
-            executor.shutdown(timeout_sec=5.0)
-            thread.join(5.0)
+            end_spinning(executor, thread)
             node.destroy_node()
         for pipe in self.pipes:
             pipe.close(*() if isinstance(pipe, RemoteHooks) else ("the test is over", 5.0))

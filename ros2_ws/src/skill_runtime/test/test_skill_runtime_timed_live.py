@@ -24,6 +24,7 @@ from std_msgs.msg import Float64  # noqa: E402
 
 from alula_testing import waits  # noqa: E402
 from alula_testing.recorder import Recorder  # noqa: E402
+from alula_testing.ros2 import end_spinning, spin  # noqa: E402
 from skill_model.execution_state import ExecutionState  # noqa: E402
 from skill_model.expressions import Comparison, DataIs, ResourceIs  # noqa: E402
 from skill_model.model import Assignment, Data, Effect, Event, Hold, Invariant, Progress  # noqa: E402
@@ -64,7 +65,7 @@ class Managers:
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
         self.executor.add_node(self.other)
-        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread = threading.Thread(target=spin, args=(self.executor,), daemon=True)
         self.thread.start()
 
     def film(self, fps: float) -> None:
@@ -77,8 +78,7 @@ class Managers:
 
     def close(self) -> None:
         self.node.close("the test is over")
-        self.executor.shutdown(timeout_sec=5.0)
-        self.thread.join(5.0)
+        end_spinning(self.executor, self.thread)
         self.node.destroy_node()
         self.other.destroy_node()
 

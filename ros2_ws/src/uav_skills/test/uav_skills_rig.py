@@ -6,8 +6,11 @@ import importlib
 import math
 import threading
 import time
+from collections.abc import Callable
 
 from uav_skills_functional_fake import LONG_WAY_STEP_M, FakeFunctional
+
+from alula_testing.ros2 import end_spinning, spin
 
 SKILLSETS = ("navigation", "perception", "mapping", "video")
 READY = {
@@ -32,6 +35,8 @@ class Rig:
 
         self._ready = False
         self.nodes = []
+        self.followers: list[Callable[[], float]] = []
+        """Further clocks that time waits for, in seconds: of processes beside this one."""
         self.functional = FakeFunctional(heard_s=self._heard_s)
         self.executor = SingleThreadedExecutor()
         sim_time = [Parameter("use_sim_time", value=True)]
@@ -48,14 +53,17 @@ class Rig:
         for node in self.nodes:
             self.executor.add_node(node)
         self.clients = {name: SkillsetClient(self.caller, name) for name in SKILLSETS}
-        self._thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self._thread = threading.Thread(target=spin, args=(self.executor,), daemon=True)
         self._thread.start()
         assert all(client.wait_ready(20.0) for client in self.clients.values())
         self._ready = True
 
     def _heard_s(self) -> float:
-        """Return the clock of the slowest node that serves; it is 0.0 until that has heard it."""
-        return min(node.get_clock().now().nanoseconds for node in self.nodes) * 1e-9 if self._ready else math.inf
+        """Return the clock of the slowest node that serves, or of a follower; it is 0.0 until that has heard it."""
+        if not self._ready:
+            return math.inf
+        heard_s = [node.get_clock().now().nanoseconds * 1e-9 for node in self.nodes]
+        return min([*heard_s, *(follower() for follower in self.followers)])
 
     def _kept(self, make_hooks):
         def make(node):
@@ -109,8 +117,7 @@ class Rig:
     def close(self) -> None:
         for node in self.nodes[:-1]:
             node.close("test is over")
-        self.executor.shutdown(timeout_sec=2.0)
-        self._thread.join(timeout=3.0)
+        end_spinning(self.executor, self._thread)
         for node in self.nodes:
             node.destroy_node()
         self.functional.close()

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from skillset_interfaces.msg import Event
 from skillset_interfaces.srv import SetPaused, Transition, Why
 
+from alula_testing.ros2 import end_spinning, spin
 from alula_testing.traces import live
 from alula_testing.traces.stage import Client, HooksFactory
 from skill_runtime.ros2 import SkillsetClient, SkillsetNode
@@ -65,8 +66,7 @@ class Ros2Stage(live.LiveStage):
         """End the managers."""
         self._managers.close("the play is over")
         for node, executor, thread in reversed(self._spun):
-            executor.shutdown(timeout_sec=live.PATIENCE_S)
-            thread.join(live.PATIENCE_S)
+            end_spinning(executor, thread, live.PATIENCE_S)
             node.destroy_node()
 
     def _call(self, service: str, request: Any) -> Any:
@@ -84,6 +84,6 @@ class Ros2Stage(live.LiveStage):
     def _spin(self, node: Node) -> None:
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        thread = threading.Thread(target=executor.spin, daemon=True)
+        thread = threading.Thread(target=spin, args=(executor,), daemon=True)
         thread.start()
         self._spun.append((node, executor, thread))
