@@ -213,6 +213,30 @@ def test_readings_of_an_imu_that_is_mounted_turned_are_turned_into_the_body(flig
         end.unregister()
 
 
+def test_a_gyro_that_is_biased_where_the_vehicle_stands_does_not_turn_the_map(flight, states) -> None:
+    walls = Walls(flight)
+    imu = rospy.Publisher("/imu/data", Imu, queue_size=100)
+    wait_until(imu.get_num_connections, timeout_s=NODE_UP_S, what="it listens to the IMU")
+
+    def measure(stamp_ns: int) -> None:
+        for before_ns in range(90_000_000, -1, -10_000_000):
+            reading = Imu(header=Header(stamp=rospy.Time.from_sec((stamp_ns - before_ns) / NS), frame_id="base_link"))
+            reading.angular_velocity.z, reading.linear_acceleration.z = 0.1, 9.81
+            imu.publish(reading)
+        walls(stamp_ns)
+
+    flight.at_10_hz = measure
+    poses: list[PoseWithCovarianceStamped] = []
+    listener = rospy.Subscriber("/lidar_mapping/pose", PoseWithCovarianceStamped, poses.append)
+    flight.run(5.0)
+    assert rospy.ServiceProxy("/lidar_mapping/enable", SetBool)(True).success
+    assert flight.run(8.0, until=lambda: bool(states) and states[-1].scans >= 12 and len(poses) >= 12)
+    headings_deg = [np.degrees(2.0 * np.arctan2(p.pose.pose.orientation.z, p.pose.pose.orientation.w)) for p in poses]
+    assert np.abs(headings_deg).max() < 0.1
+    for end in (listener, imu):
+        end.unregister()
+
+
 def test_garbage_on_its_inputs_is_left_out_and_it_maps_on(flight, states) -> None:
     walls = Walls(flight)
     imu = rospy.Publisher("/imu/data", Imu, queue_size=10)

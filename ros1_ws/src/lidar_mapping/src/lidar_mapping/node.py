@@ -21,6 +21,7 @@ from lidar_mapping.ply import read_ply, write_ply
 from lidar_mapping.readings import ReadingQueue
 from lidar_mapping.settings import MappingSettings
 from lidar_mapping.slam import Slam
+from lidar_mapping.standing import StandingGyro
 from perception_core import NS, Sweep
 from perception_core.ros import (
     DoneReporter,
@@ -58,6 +59,7 @@ class LidarMappingNode:
         self._path = Path(settings.map_path)
         self._slam = Slam(settings.slam)
         self._readings = ReadingQueue()
+        self._standing = StandingGyro()
         self._lock = Lock()
         self._saving = Lock()
         self._received = 0
@@ -124,6 +126,8 @@ class LidarMappingNode:
             self._on_garbage(
                 f"a reading of {IMU} can't be one: stamp {reading.stamp_ns}, {reading.rates} rad/s, {reading.specific_force} m/s2"
             )
+            return
+        self._standing.add(reading, self._vehicle.poses)
 
     def _imu_turn(self, frame: str) -> Floats:
         """Return R_base_imu (3, 3); an IMU of which ``/tf_static`` says nothing is taken to lie in the body's axes."""
@@ -144,6 +148,7 @@ class LidarMappingNode:
             if not self._switch.enabled:
                 return
             self._begin_as_flown()
+            self._slam.gyro_bias = self._standing.bias
             registration = self._slam.add(sweep, self._readings.take_until(sweep.end_ns), poses, self._vehicle.mount(frame))
             self._publish_state(sweep.stamp_ns, registration)
             self._publish_pose(sweep.end_ns)

@@ -60,6 +60,8 @@ class Slam:
         self.keyframes = Keyframes(voxel_m=settings.odometry.map_voxel_m, limit=settings.odometry.max_keyframes)
         self.count = SlamCount()
         self.T_map_odom: Floats = np.eye(4)
+        self.gyro_bias: Floats = np.zeros(3)
+        """What the gyro says at rest, (3,) rad/s about the body's axes, as far as it is known when track is taken up."""
         self._graph = PoseGraph(settings.graph, settings.odometry.registration)
         self._odometry: LidarInertialOdometry | None = None
         self._lost_since_ns: int | None = None
@@ -150,7 +152,7 @@ class Slam:
     def _start(self, sweep: Sweep, poses: PoseBuffer, velocity: Floats) -> None:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
         error = rotation_vector(self.T_map_odom[:3, :3].T)
-        start = State(place[:3, :3], velocity, place[:3, 3], autopilot_error=error)
+        start = State(place[:3, :3], velocity, place[:3, 3], gyro_bias=self.gyro_bias, autopilot_error=error)
         self._odometry = LidarInertialOdometry(self._settings.odometry, self.keyframes, sweep.stamp_ns, start)
 
     def _take(self, step: Step, T_odom_base: Floats) -> None:  # noqa: N803 -- T_target_source
