@@ -1,7 +1,7 @@
 """The gyro's bias, learned while the vehicle stands: an IMU inside a LiDAR is seldom calibrated when it is switched on.
 
-The data sheet of the Bosch BMI088 allows an offset of 1 degree/s (0.017 rad/s). What is left after a stand, 0.003 rad/s, and what changes in
-flight, the filter estimates.
+The data sheet of the Bosch BMI088 allows an offset of 1 degree/s (0.017 rad/s). What is left after a stand, and what changes in flight, the
+filter estimates.
 """
 
 from __future__ import annotations
