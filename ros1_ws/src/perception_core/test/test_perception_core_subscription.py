@@ -117,3 +117,19 @@ def test_another_type_is_told(ros_master) -> None:
     assert garbage[0] == "/raw/other carries std_msgs/String, expected *"
     subscriber.close()
     publisher.unregister()
+
+
+def test_a_look_between_bytes_and_their_message_rebuilds_nothing_however_far_the_clock_has_run() -> None:
+    stream = subscription.Stream()
+    looks = [(100, 1), (230, 2), (300, 2), (430, 4), (500, 4), (560, 5)]  # bytes of a message that is under way at every other look
+    assert not any(stream.lost(*so_far, 10.0 * k) for k, so_far in enumerate(looks))
+
+
+def test_a_stream_without_messages_is_lost_after_its_patience_which_doubles_until_one_comes() -> None:
+    stream = subscription.Stream()
+    assert not stream.lost(100, 1, 0.0)
+    assert [stream.lost(100 + 10 * k, 1, 0.5 * k) for k in range(1, 6)] == [False] * 4 + [True]
+    assert [stream.lost(10 * k, 0, 10.0 + 0.5 * k) for k in range(1, 11)] == [False] * 8 + [True, False]
+    assert not stream.lost(400, 3, 30.0)
+    assert [stream.lost(400 + 10 * k, 3, 30.0 + 0.5 * k) for k in range(1, 6)] == [False] * 4 + [True]
+    assert not any(stream.lost(0, 0, 40.0 + k) for k in range(20)), "where no bytes come nothing is wrong"

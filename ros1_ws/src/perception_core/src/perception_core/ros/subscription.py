@@ -34,14 +34,43 @@ def warn_of_garbage(reason: str) -> None:
     rospy.logwarn_throttle(2.0, f"left out: {reason}")
 
 
+class Stream:
+    """Tells from what a stream has brought so far, as seen from time to time, whether it has lost the borders between its messages.
+
+    It has where bytes came and for `SILENCE_S` no message, from the first look that sees it on: a look may fall between the bytes and
+    their message, and the mission clock may have run far since the look before. Each time the patience is doubled, until a message comes.
+    """
+
+    def __init__(self) -> None:
+        self._received, self._messages = 0, 0
+        self._waits_since_s: float | None = None
+        self._patience_s = SILENCE_S
+
+    def lost(self, received: int, messages: int, now_s: float) -> bool:
+        """Return whether the connections are to be rebuilt; their counts begin at zero then. Bytes and messages so far, mission clock."""
+        if messages > self._messages:
+            self._patience_s = SILENCE_S
+        if messages != self._messages or received < self._received:
+            self._received, self._messages = received, messages
+        if received == self._received:
+            self._waits_since_s = None
+            return False
+        if self._waits_since_s is None:
+            self._waits_since_s = now_s
+        if abs(now_s - self._waits_since_s) < self._patience_s:  # absolute: the clock may go back
+            return False
+        self._received, self._messages, self._waits_since_s = 0, 0, None
+        self._patience_s = min(2.0 * self._patience_s, LONGEST_SILENCE_S)
+        return True
+
+
 class RawSubscriber(Generic[Message]):
     """Subscribe to bytes and decode them here.
 
     rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
-    So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A stream that has lost the
-    borders between its messages can't be decoded at all: where bytes came and for `SILENCE_S` no message, the connections are rebuilt, at
-    growing intervals. Where no bytes come, as mostly on a latched topic, nothing is wrong with the stream. Of messages that wait the newest
-    ``queue_size`` are decoded.
+    So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A `Stream` that has lost the
+    borders between its messages can't be decoded at all: the connections are rebuilt, at growing intervals. Where no bytes come, as mostly
+    on a latched topic, nothing is wrong with the stream. Of messages that wait the newest ``queue_size`` are decoded.
     """
 
     def __init__(
@@ -57,9 +86,7 @@ class RawSubscriber(Generic[Message]):
         self._topic, self._kind, self._buffer_bytes, self._queue_size = topic, kind, buffer_bytes, queue_size
         self._on_message, self._on_garbage = on_message, on_garbage
         self._lock = Lock()
-        self._complete_s = rospy.get_time()
-        self._received, self._messages = 0, 0
-        self._patience_s = SILENCE_S
+        self._stream = Stream()
         self._reconnected_s = -math.inf
         self._ended = False
         self._subscriber = self._subscribe()
@@ -101,21 +128,11 @@ class RawSubscriber(Generic[Message]):
         pause = rospy.rostime.wallsleep
         while not (rospy.is_shutdown() or self._ended):
             pause(LOOK_S)
-            if self._complete():
-                self._complete_s = rospy.get_time()
-            elif abs(rospy.get_time() - self._complete_s) >= self._patience_s:  # also where the clock went back
+            with self._lock:
+                connections = [] if self._ended else list(self._subscriber.impl.connections)
+            received, messages = (sum(int(getattr(each, count)) for each in connections) for count in ("stat_bytes", "stat_num_msg"))
+            if self._stream.lost(received, messages, rospy.get_time()):
                 self._reconnect()
-
-    def _complete(self) -> bool:
-        """Return whether no bytes came since the last message."""
-        with self._lock:
-            connections = [] if self._ended else list(self._subscriber.impl.connections)
-        received, messages = (sum(int(getattr(each, count)) for each in connections) for count in ("stat_bytes", "stat_num_msg"))
-        if messages > self._messages:
-            self._patience_s = SILENCE_S
-        if messages != self._messages or received < self._received:
-            self._received, self._messages = received, messages
-        return received == self._received
 
     def _reconnect(self) -> None:
         with self._lock:
@@ -124,5 +141,3 @@ class RawSubscriber(Generic[Message]):
             self._reconnected_s = rospy.get_time()
             self._subscriber.unregister()
             self._subscriber = self._subscribe()
-        self._received, self._messages = 0, 0
-        self._complete_s, self._patience_s = rospy.get_time(), min(2.0 * self._patience_s, LONGEST_SILENCE_S)
