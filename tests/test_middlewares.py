@@ -354,7 +354,7 @@ def scripts(draw) -> Script:
     return Script(tuple(steps), {skill: tuple(draw(st.lists(BEHAVIOURS, max_size=3))) for skill in INPUTS})
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@settings(max_examples=8, suppress_health_check=list(HealthCheck), database=None)
 @given(script=scripts())
 def test_any_script_has_the_same_trace_everywhere(players, script):
     trace = compare(players, script)

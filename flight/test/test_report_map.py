@@ -73,7 +73,7 @@ def test_coverage_is_the_mapped_part(upto, expected):
     assert len(quality.missed_enu_m) == round((1 - quality.coverage) * quality.in_reach)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.lists(st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-1, 4)), min_size=1, max_size=30))
 def test_more_points_never_cover_less(places):
     patches = patches_in_reach(plain(), ROUTE)[::50]

@@ -39,13 +39,11 @@ def test_goal_status_byte_for_byte():
     )
 
 
-@settings(deadline=None)
 @given(st.lists(goal_statuses, max_size=4))
 def test_status_array_round_trip(statuses):
     assert actionlib_wire.decode_status_array(actionlib_wire.encode_status_array(statuses, seq=1, stamp_ns=5)) == statuses
 
 
-@settings(deadline=None)
 @given(goal_ids, goal_statuses, st.binary(max_size=50))
 def test_goals_and_outcomes_round_trip(goal_id, status, payload):
     assert actionlib_wire.decode_goal(actionlib_wire.encode_goal(goal_id, payload, seq=1, stamp_ns=5)) == (goal_id, payload)
@@ -53,7 +51,6 @@ def test_goals_and_outcomes_round_trip(goal_id, status, payload):
     assert actionlib_wire.decode_goal_id(actionlib_wire.encode_goal_id(goal_id)) == goal_id
 
 
-@settings(deadline=None)
 @given(st.binary(max_size=120))
 def test_any_bytes_are_read_or_refused(data):
     for decode in (
@@ -192,7 +189,7 @@ events_to_ros1 = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(events_to_ros1)
 def test_any_course_of_events_answers_each_ros2_client_exactly_once(events):
     server, clients = Server(), Clients2()
@@ -245,7 +242,7 @@ events_to_ros2 = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(events_to_ros2)
 def test_any_course_of_events_gives_each_ros1_client_exactly_one_result(events):
     server, clients = Server(), Clients1()

@@ -77,7 +77,7 @@ def field_bytes(types, kind):
 def test_random_messages_return_byte_for_byte(types, name):
     message = types.message(name)
 
-    @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+    @settings(max_examples=25, suppress_health_check=list(HealthCheck), database=None)
     @given(ros1_bytes(types, name.replace("/", "/msg/")))
     def round_trip(ros1):
         assert bytes(message.to_ros1(message.to_ros2(ros1))) == ros1

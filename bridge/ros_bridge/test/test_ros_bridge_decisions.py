@@ -183,7 +183,7 @@ SELECTIONS = st.builds(
 )
 
 
-@settings(max_examples=300, deadline=None, database=None)
+@settings(max_examples=300, database=None)
 @given(SELECTIONS, st.sets(NAMES, max_size=4), st.sets(NAMES, max_size=4))
 def test_no_renaming_makes_two_routes_meet_or_a_message_go_round(selection, names1, names2):
     found = [one.spec for one in decided(ros1(names1), ros2({name: (end(),) for name in names2}), selection)]

@@ -141,7 +141,7 @@ def registered(fields):
     return register(fields), table
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data(), st.booleans(), definitions())
 def test_any_message_of_any_definition_both_ways(library, data, with_header, fields):
     fields = [("", "header", None), *fields] if with_header else fields
@@ -165,7 +165,7 @@ def any_inner_header(fields):
     return any(isinstance(kind, list) and any(part[1] == "header" for part in kind) for _, kind, _ in fields)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(definitions(), st.binary(max_size=200))
 def test_garbage_is_refused_or_converted_but_never_read_beyond(library, fields, garbage):
     name, table = registered(fields)

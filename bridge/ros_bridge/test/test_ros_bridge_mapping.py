@@ -218,7 +218,7 @@ VALUES = {
 ROS2_KINDS = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@settings(max_examples=30, suppress_health_check=list(HealthCheck), database=None)
 @given(st.data())
 def test_any_order_of_any_fields_returns_byte_for_byte(tmp_path_factory, data):
     kinds = data.draw(st.lists(st.sampled_from(KINDS), min_size=1, max_size=6))

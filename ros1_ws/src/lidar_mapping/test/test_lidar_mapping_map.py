@@ -22,7 +22,7 @@ def slow_map(clouds, voxel_m) -> dict[tuple[int, ...], np.ndarray]:
 
 
 @given(st.lists(points_of, min_size=1, max_size=4), st.sampled_from([0.1, 0.25, 1.0]))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_voxels_hold_the_means_that_the_obvious_way_finds(clouds, voxel_m) -> None:
     voxels = VoxelMap(voxel_m=voxel_m, max_voxels=10_000)
     new = sum(voxels.insert(cloud) for cloud in clouds)

@@ -49,7 +49,7 @@ def filter_at(position=(0.0, 0.0, 2.0), *, sigma_m=0.1, sigma_rad=0.02) -> Inert
 
 
 @given(vectors, vectors, vectors, vectors, vectors, vectors, vectors)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel, autopilot, drift) -> None:
     error = np.concatenate([turn, velocity, position, gyro, accel, autopilot, drift])
     start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro, gyro[::-1], drift[::-1])
@@ -91,7 +91,7 @@ def test_a_plane_is_flat_and_an_edge_is_not() -> None:
 
 
 @given(arrays(np.float64, (6, 3, 3), elements=st.floats(-1.0, 1.0)))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_smallest_axis_is_the_general_ways(factors) -> None:
     matrices = factors.transpose(0, 2, 1) @ factors
     spread, axes = smallest_axis(matrices)
@@ -121,7 +121,7 @@ def surface_of(points) -> Surface:
 
 
 @given(st.tuples(*[st.floats(-0.2, 0.2)] * 3), st.tuples(*[st.floats(-0.03, 0.03)] * 3))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_wrong_prediction_is_corrected(shift, turn) -> None:
     here = np.array([1.0, 0.5, 2.0])
     found = filter_at(here + shift)

@@ -36,7 +36,7 @@ def look(cloud, poses, motion):
 
 
 @given(st.floats(-3.1, 3.1), st.floats(2.5, 10.0), st.integers(0, 1000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_sideways_flight_sees_what_is_beside_the_nose_whatever_the_yaw(yaw, distance, seed) -> None:
     # base left = sensor x: the box is to the left, and the vehicle flies to its left.
     cloud = box_cloud((distance, 0.0, 0.0), seed=seed)

@@ -53,7 +53,7 @@ def test_no_obstacle_on_slopes_up_to_8_degrees(angle_deg, height_m, seed) -> Non
 
 
 @given(st.floats(0.0, 8.0), st.floats(2.0, 11.0), st.floats(-0.9, 0.9), st.floats(0.35, 1.0), st.integers(0, 10_000))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_box_above_0_3_m_is_found_on_any_slope(angle_deg, x, y, size_m, seed) -> None:
     ground_m = float(np.tan(np.radians(angle_deg)) * x)
     points = np.vstack([slope(angle_deg, seed=seed), box(x, y, width_m=0.5, height_m=size_m, ground_m=ground_m, seed=seed)])

@@ -25,7 +25,7 @@ def look(points, support=None, **corridor):
 
 
 @given(st.floats(1.0, 7.5), st.floats(-1.1, 1.1), st.floats(-0.5, 0.5), st.integers(0, 1000))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_a_blob_anywhere_in_the_corridor_is_found_at_its_distance(ahead, left, up, seed) -> None:
     found = look(blob(ahead, left, up, seed=seed))
     assert found is not None
@@ -55,7 +55,7 @@ def test_ground_is_no_obstacle_even_when_the_vehicle_is_low() -> None:
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-50, 50), st.floats(-50, 50), st.integers(0, 10_000))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_turning_and_moving_the_whole_scene_changes_nothing(angle, x, y, seed) -> None:
     rng = np.random.default_rng(seed)
     points = np.vstack([blob(rng.uniform(2, 7), rng.uniform(-2, 2), seed=seed), rng.uniform(-9, 9, (40, 3)) + ORIGIN])
@@ -78,7 +78,7 @@ def test_single_outliers_before_an_obstacle_do_not_stop_the_vehicle() -> None:
 
 
 @given(st.floats(0.35, 7.9), st.floats(-1.2, 1.2), st.floats(-0.55, 0.55))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_three_close_returns_suffice_wherever_the_cells_cut_them(ahead, left, up) -> None:
     three = ORIGIN + np.array([ahead, left, up]) + np.array([[0.0, 0.0, 0.0], [0.03, 0.02, 0.03], [0.02, -0.03, -0.03]])
     assert look(three) is not None

@@ -177,7 +177,7 @@ def test_a_stamp_that_does_not_advance() -> None:
 
 
 @given(st.floats(0.0, 0.6), st.floats(0.0, 0.03), st.integers(0, 1000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_steady_latency_never_flaps(latency_s, jitter_s, seed) -> None:
     noise = np.random.default_rng(seed)
     judge, watch = StampJudge(StampLimits()), HealthWatch(HealthLimits())
@@ -204,7 +204,7 @@ def test_future_stamps_then_silence_is_noticed_at_once() -> None:
 
 
 @given(st.lists(st.sampled_from([True, None, "bad", "unsure?"]), min_size=1, max_size=80))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_never_ok_on_old_and_never_broken_on_fresh_measurements(said) -> None:
     came: list[float] = []
 

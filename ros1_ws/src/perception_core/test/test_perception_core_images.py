@@ -76,7 +76,7 @@ def test_what_is_no_picture_is_refused(change, sentence) -> None:
 
 
 @given(st.binary(max_size=300), st.integers(0, 40), st.integers(0, 40), st.integers(0, 200), st.sampled_from(sorted(ENCODINGS)))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_garbage_is_read_or_refused(data, width, height, step, encoding) -> None:
     garbage = SimpleNamespace(height=height, width=width, encoding=encoding, is_bigendian=0, step=step, data=data)
     try:

@@ -24,7 +24,7 @@ def flight(velocity, yaw_rate_rad_s, *, start_ns=T0, seconds=1.0, hz=50) -> Pose
 
 
 @given(st.floats(0.0, 1.0), st.floats(-3.0, 3.0), st.floats(-1.5, 1.5))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_interpolation_meets_a_steady_motion_everywhere(t, speed, yaw_rate) -> None:
     pose = flight((speed, 0.0, 0.0), yaw_rate).at([T0 + int(t * NS)])
     assert pose.position[0] == pytest.approx([speed * t, 0.0, 0.0], abs=1e-6)
@@ -57,7 +57,7 @@ def sensor() -> np.ndarray:
 
 
 @given(st.integers(1, 200), st.integers(0, 2**31))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_standing_still_a_sweep_is_moved_rigidly(count, seed) -> None:
     rng = np.random.default_rng(seed)
     sweep = Sweep(T0, rng.uniform(-20, 20, (count, 3)).astype(np.float32), rng.uniform(0, 0.1, count).astype(np.float32))
@@ -67,7 +67,7 @@ def test_standing_still_a_sweep_is_moved_rigidly(count, seed) -> None:
 
 
 @given(st.integers(0, 2**31), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_moving_sensor_sees_a_standing_world_where_it_is(seed, yaw_rate, speed) -> None:
     rng = np.random.default_rng(seed)
     world = rng.uniform(-20, 20, (300, 3))

@@ -89,7 +89,7 @@ def test_out_lets_nothing_through_and_forgets_what_waits():
     assert channel.due(20 * NS) == []
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.integers(0, 200), st.integers(1, 1500)), max_size=60), st.integers(0, 3))
 def test_nothing_is_invented_doubled_or_early(sends: list[tuple[int, int]], quality: int):
     channel = Channel(PRESETS[list(Quality)[quality]].down, seed=6)

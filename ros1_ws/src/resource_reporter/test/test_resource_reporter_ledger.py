@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_reporter.ledger import FIRST_RETRY_S, LONGEST_RETRY_S, Call, Ledger
@@ -161,7 +161,6 @@ class LateSkillset:
 happenings = st.sampled_from(["show", "call", "abandon", "fail", "reply", "restart"])
 
 
-@settings(deadline=None)
 @given(st.lists(st.one_of(st.tuples(st.sampled_from(NAMES), st.sampled_from(["OK", "BROKEN"])), happenings), max_size=60))
 def test_whatever_happens_the_skillset_ends_with_the_last_reports(events):
     skillset, wanted = LateSkillset(), {}

@@ -3,20 +3,17 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from uav_guidance.carrot import HeadingCarrot, LineCarrot
 from uav_guidance.frames import wrap
 from uav_guidance.vectors import Line, Vec3
 
-UNHURRIED = settings(deadline=None)  # the machine may have other things to do
-
 steps = st.lists(st.tuples(st.floats(0.0, 0.2), st.floats(-1.0, 6.0)), min_size=1, max_size=200)
 speeds, accels = st.floats(0.3, 5.0), st.floats(0.5, 3.0)
 
 
-@UNHURRIED
 @given(st.floats(0.01, 50.0), speeds, accels, st.floats(0.5, 5.0), st.floats(-2.0, 8.0), steps)
 def test_speed_and_acceleration_stay_within_limits_whatever_the_follower_does(length, speed, accel, lead, initial, course):
     line = Line(Vec3(1.0, 2.0, 3.0), Vec3(1.0 + length, 2.0, 3.0))
@@ -34,7 +31,6 @@ def test_speed_and_acceleration_stay_within_limits_whatever_the_follower_does(le
         before_m, before_m_s = carrot.travelled_m, carrot.speed_m_s
 
 
-@UNHURRIED
 @given(st.floats(0.01, 50.0), speeds, accels)
 def test_arrives_softly_in_the_time_of_a_trapezoid(length, speed, accel):
     line = Line(Vec3(), Vec3(0.0, length, 0.0))
@@ -51,7 +47,6 @@ def test_arrives_softly_in_the_time_of_a_trapezoid(length, speed, accel):
     assert last_m_s <= accel * 0.05 * 2 + 1e-9 or length < 0.05
 
 
-@UNHURRIED
 @given(speeds, accels, st.floats(0.5, 5.0))
 def test_waits_at_its_lead_for_a_follower_that_stands(speed, accel, lead):
     carrot = LineCarrot(Line(Vec3(), Vec3(100.0, 0.0, 0.0)), speed_m_s=speed, accel_m_s2=accel, lead_m=lead)
@@ -60,7 +55,6 @@ def test_waits_at_its_lead_for_a_follower_that_stands(speed, accel, lead):
     assert carrot.travelled_m == pytest.approx(lead, abs=0.01)
 
 
-@UNHURRIED
 @given(st.floats(-3.1, 3.1), st.floats(-20.0, 20.0), st.floats(0.05, 1.5))
 def test_heading_turns_the_short_way_at_its_rate(start, target, rate):
     carrot = HeadingCarrot(start)
@@ -76,7 +70,6 @@ def test_heading_turns_the_short_way_at_its_rate(start, target, rate):
     assert turned == pytest.approx(to_go, abs=1e-6)
 
 
-@UNHURRIED
 @given(st.floats(-3.1, 3.1), st.floats(0.05, 1.5))
 def test_heading_waits_for_a_nose_that_does_not_turn(target, rate):
     carrot = HeadingCarrot(0.0)

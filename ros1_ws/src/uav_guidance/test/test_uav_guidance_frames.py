@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -14,22 +14,18 @@ from uav_guidance.encoding import setpoint_message
 from uav_guidance.follower import Setpoint
 from uav_guidance.vectors import Line, Vec3
 
-UNHURRIED = settings(deadline=None)  # the machine may have other things to do
-
 numbers = st.floats(-1e4, 1e4)
 vectors = st.builds(Vec3, numbers, numbers, numbers)
 angles = st.floats(-20.0, 20.0)
 near = st.floats(-100.0, 100.0)
 
 
-@UNHURRIED
 @given(vectors)
 def test_enu_and_ned_round_trip(v):
     assert frames.ned_from_enu(frames.enu_from_ned(v)) == v
     assert frames.enu_from_ned(Vec3(1.0, 2.0, 3.0)) == Vec3(2.0, 1.0, -3.0)
 
 
-@UNHURRIED
 @given(angles)
 def test_yaw_round_trip(yaw):
     there = frames.yaw_ned_from_enu(yaw)
@@ -42,7 +38,6 @@ def test_north_and_east(yaw_ned, yaw_enu):
     assert frames.wrap(frames.yaw_enu_from_ned(yaw_ned) - yaw_enu) == pytest.approx(0.0, abs=1e-12)
 
 
-@UNHURRIED
 @given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), angles)
 def test_attitude_maps_the_body_axes_as_the_autopilots_does(roll, pitch, yaw):
     ned_frd = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
@@ -52,7 +47,6 @@ def test_attitude_maps_the_body_axes_as_the_autopilots_does(roll, pitch, yaw):
     assert np.allclose(ours, expected, atol=1e-9)
 
 
-@UNHURRIED
 @given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), angles, st.builds(Vec3, *[st.floats(-3, 3)] * 3), st.floats(-0.05, 0.05))
 def test_attitude_turned_on_by_body_rates(roll, pitch, yaw, rates, duration):
     before = frames.quaternion_enu_flu(roll, pitch, yaw)
@@ -84,7 +78,6 @@ def test_local_position_across_the_date_line():
     assert frames.local_enu_from_global((0, -1_799_999_995, 0), (0, 1_799_999_995, 0)).x == pytest.approx(10 * 0.0111318, rel=1e-4)
 
 
-@UNHURRIED
 @given(st.builds(Vec3, near, near, near), st.builds(Vec3, near, near, near), st.builds(Vec3, near, near, near))
 def test_no_point_of_a_line_is_nearer_than_its_distance(start, target, point):
     line = Line(start, target)

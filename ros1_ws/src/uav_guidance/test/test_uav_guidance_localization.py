@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from guidance_fake_autopilot import GUIDED
 from guidance_pure_flight import PureFlight
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -19,7 +19,6 @@ from uav_guidance.requests import HeadingRequest, TakeoffRequest
 from uav_guidance.settings import Settings
 from uav_guidance.vectors import ZERO, Vec3
 
-UNHURRIED = settings(deadline=None)
 STEP_S = 0.05
 LEVEL = (0.0, 0.0, 0.0, 1.0)
 
@@ -54,7 +53,6 @@ def begun(**changes: float) -> Localization:
 # ---- conversions -----------------------------------------------------------------------------------------------------------
 
 
-@UNHURRIED
 @given(corrections, places)
 def test_there_and_back_is_the_same_place(correction, place):
     assert (correction.to_odom(correction.to_map(place)) - place).norm < 1e-9
@@ -67,14 +65,12 @@ def test_without_a_correction_nothing_changes_by_a_single_bit(place):
     assert NO_CORRECTION.to_odom(place) == place
 
 
-@UNHURRIED
 @given(places, places, angles)
 def test_a_correction_between_two_coordinates_of_a_place_turns_one_into_the_other(in_odom, in_map, yaw):
     correction = Correction.between(in_odom, in_map, yaw)
     assert (correction.to_map(in_odom) - in_map).norm < 1e-9
 
 
-@UNHURRIED
 @given(st.floats(-1.4, 1.4), st.floats(-1.4, 1.4), angles, places)
 def test_quaternions_turn_as_those_of_scipy(roll, pitch, yaw, vector):
     quaternion = quaternion_enu_flu(roll, pitch, yaw)
@@ -100,7 +96,6 @@ def test_a_tilt_of_the_transform_does_not_lift_a_vehicle_far_from_the_origin():
 # ---- following -------------------------------------------------------------------------------------------------------------
 
 
-@UNHURRIED
 @given(st.lists(st.tuples(st.floats(-0.15, 0.15), st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), places), min_size=1, max_size=20))
 def test_place_and_heading_move_at_a_bounded_rate_wherever_the_vehicle_is(steps):
     limits = Settings(map_jump_m=100.0, map_jump_rad=3.0)
@@ -123,7 +118,6 @@ def test_it_arrives_at_the_newest_transform():
     assert localization.correction == goal.level_at(place)
 
 
-@UNHURRIED
 @given(transforms, places)
 def test_numbers_that_are_none_never_get_in(transform, place):
     localization = begun()

@@ -4,7 +4,7 @@ import math
 from dataclasses import fields
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -20,8 +20,6 @@ from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
 from uav_guidance.vectors import Vec3
 from uav_guidance.vehicle import Landed, Mode, Vehicle, mode_name, updated
-
-UNHURRIED = settings(deadline=None)  # the machine may have other things to do
 
 # ---- commands
 
@@ -98,7 +96,6 @@ def test_text_chunks_are_put_together():
 # ---- time
 
 
-@UNHURRIED
 @given(st.lists(st.integers(-19, 30), min_size=60, max_size=120), st.integers(0, 10**6))
 def test_stamps_grow_and_follow_the_time_of_measurement(delays_ms, boot_offset_ms):
     clock = StampClock()

@@ -46,7 +46,7 @@ def test_a_packet_in_bytes():
     assert VideoPacket.parse(data, SEAL) == PACKET
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.binary(max_size=200))
 def test_garbage_is_refused(data: bytes):
     with pytest.raises(WireError):
@@ -55,7 +55,7 @@ def test_garbage_is_refused(data: bytes):
         Report.parse(data, SEAL)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.integers(0, 10_000), st.integers(1, 255))
 def test_a_single_changed_byte_is_found_out(place: int, change: int):
     """Of what matters: SSRC, payload type and version are not ours to judge."""

@@ -59,25 +59,25 @@ def read(text: str) -> None:
         assert finding.render()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.text(max_size=200))
 def test_any_text(text):
     read(text)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.lists(st.sampled_from([*PIECES, *WHOLE.split()]), max_size=120).map(" ".join))
 def test_any_row_of_words(text):
     read("skillset s { " + text)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, len(WHOLE)), st.integers(0, 30), st.sampled_from(["", *PIECES]))
 def test_a_model_with_something_cut_out_or_put_in(place, length, piece):
     read(WHOLE[:place] + piece + WHOLE[place + length :])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_the_whole_check_of_a_mutated_model_of_the_robot_language(data):
     """Many single characters changed, put in or left out, then all that `./alula check` does: an exit code, and text or JSON."""

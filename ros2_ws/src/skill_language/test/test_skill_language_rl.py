@@ -281,13 +281,13 @@ def survives(text, name="x.rl"):
         assert finding.render()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(0, len(WHOLE)), st.integers(0, 60), st.sampled_from(["", *PIECES]), st.sampled_from(["x.rl", "x.skill", "x"]))
 def test_a_model_with_something_cut_out_or_put_in(place, length, piece, name):
     survives(WHOLE[:place] + piece + WHOLE[place + length :], name)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.sampled_from([*PIECES, *WHOLE.split()]), max_size=100).map(" ".join))
 def test_any_row_of_words(text):
     survives("skillset s { skill f { " + text)

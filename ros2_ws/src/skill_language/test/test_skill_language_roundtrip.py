@@ -15,7 +15,7 @@ from skill_model.expressions import Comparison, DataIs
 from skill_model.json_form import from_json, to_json
 from skill_model.model import Assignment, Effect, Event, Precondition, Result, ResultKind, Skill, Skillset
 
-SLOW = settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SLOW = settings(max_examples=80, suppress_health_check=[HealthCheck.too_slow])
 
 
 PARSE = {Notation.PAPER: paper.parse, Notation.ROBOT_LANGUAGE: rl.parse}

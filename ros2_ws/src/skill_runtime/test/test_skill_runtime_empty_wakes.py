@@ -16,7 +16,8 @@ from std_srvs.srv import Trigger  # noqa: E402
 
 from alula_testing.waits import until  # noqa: E402
 from skill_runtime.ros2 import empty_wakes  # noqa: E402
-from skill_runtime.ros2.empty_wakes import AT_ONCE_S, KINDS, ROW, watch_empty_wakes  # noqa: E402
+from skill_runtime.ros2.empty_wakes import AT_ONCE_S, ROW, watch_empty_wakes  # noqa: E402
+from skill_runtime.ros2.executor import KINDS  # noqa: E402
 from skill_runtime.ros2.middleware import RclpyMiddleware  # noqa: E402
 
 SOON_S = 10.0

@@ -240,16 +240,22 @@ def process(ros2_domain):
         one.stdout.close()
 
 
-@pytest.mark.parametrize("goals", [1, 5])
-def test_managers_that_are_shut_down_send_the_results_of_their_goals(spinning, process, goals):
-    """An action client of ROS 2 knows nothing of events: it hears by the result only, or never."""
-    served = process("--ros-args", "-p", "use_sim_time:=false")
+def flying(spinning) -> tuple[Node, SkillsetClient]:
+    """Return a node and its client of the managers of a process, which have been told that the vehicle flies."""
     node = Node(f"skill_runtime_tester_{next(NUMBERS)}")
     client = SkillsetClient(node, "navigation")
     assert client.wait_ready(READY_S)
     spinning.spin(node)
     for resource, state in FLYING.items():
         take(node, resource, state)
+    return node, client
+
+
+@pytest.mark.parametrize("goals", [1, 5])
+def test_managers_that_are_shut_down_send_the_results_of_their_goals(spinning, process, goals):
+    """An action client of ROS 2 knows nothing of events: it hears by the result only, or never."""
+    served = process("--ros-args", "-p", "use_sim_time:=false")
+    node, client = flying(spinning)
     actions = ActionClient(node, navigation_actions.GotoStraight, "navigation/skill/goto_straight")
     assert actions.wait_for_server(READY_S)
     results: list[str] = []
@@ -271,12 +277,7 @@ def test_managers_that_are_shut_down_send_the_results_of_their_goals(spinning, p
 @pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + DOUBT_S + 2.0)])
 def test_no_client_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
     served = process("--ros-args", "-p", "use_sim_time:=false", "__name:=from_roslaunch")
-    node = Node(f"skill_runtime_tester_{next(NUMBERS)}")
-    client = SkillsetClient(node, "navigation")
-    assert client.wait_ready(READY_S)
-    spinning.spin(node)
-    for resource, state in FLYING.items():
-        take(node, resource, state)
+    _, client = flying(spinning)
     handle = client.start("goto_straight", target=(1, 2, 3), speed=1)
     until(lambda: handle.state is S.RUNNING, "goto_straight runs")
     asked_s = time.monotonic()

@@ -45,7 +45,7 @@ def play(steps, latency_s: float):
     return story, handles
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(STEPS, st.sampled_from([0.0, 0.01, 0.3]))
 def test_whatever_is_asked_for_each_execution_ends_once_and_the_same_script_gives_the_same_story(steps, latency_s):
     story, handles = play(steps, latency_s)

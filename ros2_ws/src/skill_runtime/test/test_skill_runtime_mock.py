@@ -364,7 +364,7 @@ def test_a_file_that_can_not_be_read_is_named(tmp_path):
     assert load_behaviour([tmp_path / "empty.yaml"], [FLYING]) == Behaviour()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.text(max_size=40))
 def test_any_text_is_a_formula_or_refused(text):
     try:
@@ -395,7 +395,7 @@ RULES = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(RULES, max_size=3), st.lists(st.floats(0.0, 2.0), max_size=5), st.integers(0, 5))
 def test_whatever_the_script_every_execution_ends_once_and_the_story_repeats(rules, gaps, seed):
     def story():

@@ -305,7 +305,7 @@ def breaks_at_ms(values, hold):
     return None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(TRACES, st.sampled_from([Hold(0.5), Hold(1.0, 12.0), Hold(hysteresis=12.0), Hold(0.3, 11.0)]), st.booleans())
 def test_an_invariant_breaks_when_the_page_says_so(values, hold, punctual):
     bench = watching(hold)

@@ -35,7 +35,7 @@ def _eager_switching():
 
 
 # Shrinking means little where threads race, and takes minutes.
-@settings(max_examples=60, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(max_examples=60, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(skillsets(), st.fixed_dictionaries(dict.fromkeys(SKILLS, BEHAVIOURS)), PROGRAMS)
 def test_every_trace_obeys_the_model(skillset, behaviours, programs):
     bench = Bench(skillset, authority=False)

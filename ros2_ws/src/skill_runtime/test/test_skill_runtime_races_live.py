@@ -117,7 +117,6 @@ def check_callers(bench: LiveBench) -> None:
 @pytest.mark.parametrize("separate", [False, True], ids=["single", "separate"])
 @settings(
     max_examples=6,
-    deadline=None,
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

@@ -313,7 +313,7 @@ def test_inputs_may_be_read_from_the_blackboard_at_the_start():
 RESULTS = ["ARRIVED", "AT_ALTITUDE", "ALIGNED", "BLOCKED", "ABORTED", "LOST", "FAILED", "DONE", "LANDED", None]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     results=st.lists(st.sampled_from(RESULTS), max_size=25),
     breaks=st.lists(st.tuples(st.floats(0.0, 25.0), st.sampled_from(["zed", "lidar", "pilot"])), max_size=3),

@@ -34,7 +34,7 @@ def note_health(blackboard: Blackboard, resource: str, health: SensorHealth | An
 
 
 class AuthorityRemarks:
-    """Remarks why the companion does not command: no link is another matter than a pilot, or an autopilot that has begun anew."""
+    """Remarks why the companion does not command: the link is lost, a pilot or a failsafe commands, or the autopilot has restarted."""
 
     def __init__(self, blackboard: Blackboard) -> None:
         self._remarks = blackboard.remarks

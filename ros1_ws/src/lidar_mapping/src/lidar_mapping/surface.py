@@ -131,7 +131,7 @@ class Surface:
         self._trees = trees or [(0, _tree(self.points))]  # with the number of the first patch in each
 
     def joined(self, patches: Patches) -> Surface:
-        """Return this surface with more patches, in a tree of their own: building a large one anew takes long."""
+        """Return this surface with more patches, in a tree of their own: building one tree of all patches takes long."""
         more = (len(self.points), _tree(patches.points))
         return Surface(join([Patches(self.points, self.normals), patches]), [*self._trees, more])
 

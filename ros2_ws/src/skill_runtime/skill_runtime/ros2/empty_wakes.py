@@ -16,13 +16,14 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.waitable import NumberOfEntities, Waitable
 
+from skill_runtime.ros2.executor import KINDS
+
 if TYPE_CHECKING:
     from rclpy.node import Node
 
 AT_ONCE_S = 0.001
 ROW = 3
 """So many waits one after the other that return at once with nothing are a busy loop."""
-KINDS = ("subscription", "guard_condition", "timer", "client", "service")
 _WATCHED: weakref.WeakKeyDictionary[Node, EmptyWakes] = weakref.WeakKeyDictionary()
 
 
