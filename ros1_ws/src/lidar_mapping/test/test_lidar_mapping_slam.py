@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 from dataclasses import replace
 from threading import Timer
 
@@ -202,6 +203,22 @@ def test_a_sweep_without_pose_changes_nothing() -> None:
     with pytest.raises(PoseUnavailableError):
         slam.add(Path(lap).sweep(0.0, seed=1), [], PoseBuffer(), np.eye(4))
     assert (len(slam.map), slam.count.scans) == (0, 0)
+
+
+@pytest.mark.parametrize("every_s", [0.01, 0.005])
+def test_what_the_imu_felt_while_the_autopilot_was_silent_counts(every_s) -> None:
+    """The link is lost for a second, in which the vehicle turns; the autopilot tells nothing of that, and the scans after it are thin."""
+    path = Path(leg, yaw=lambda t: 0.25 * (1.0 - np.cos(np.pi * np.clip(t - 1.0, 0.0, 1.0))))
+    slam, rng = Slam(SlamSettings()), np.random.default_rng(5)
+    for k in range(22):
+        start_s, end_s = k / 10, (k + 1) / 10
+        readings = [path.reading(t, rng) for t in np.arange(start_s + every_s, end_s + every_s / 2, every_s)]
+        silent = 1.0 < end_s < 2.0
+        said = PoseBuffer() if silent else path.autopilot(end_s, turned=lambda t: np.array([0.0, 0.0, -0.5 if t > 1.5 else 0.0]))
+        with pytest.raises(PoseUnavailableError) if silent else nullcontext():
+            slam.add(path.sweep(start_s, seed=k, count=7000 if end_s < 1.5 else 30), readings, said, np.eye(4))
+    turned = Rotation.from_matrix(path.pose(2.2)[:3, :3].T @ slam.pose()[0][:3, :3]).magnitude()
+    assert turned < 0.02
 
 
 def test_a_sweep_that_is_not_later_is_left_out_and_a_clock_that_was_set_back_is_followed() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from lidar_mapping.graph import GraphSettings, PoseGraph
 from lidar_mapping.inertial import POSITION, State, rotation_vector
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.odometry import VELOCITY_BASE_NS, AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
-from lidar_mapping.readings import SET_BACK_NS
+from lidar_mapping.readings import KEPT, SET_BACK_NS
 from lidar_mapping.registration import refused
 from lidar_mapping.surface import flat_patches
 from lidar_mapping.voxel_map import VoxelMap, downsample
@@ -65,6 +66,7 @@ class Slam:
         self._graph = PoseGraph(settings.graph, settings.odometry.registration)
         self._odometry: LidarInertialOdometry | None = None
         self._lost_since_ns: int | None = None
+        self._readings: deque[ImuReading] = deque(maxlen=KEPT)
 
     @property
     def loops(self) -> int:
@@ -124,19 +126,23 @@ class Slam:
     def stop(self) -> None:
         """Lose track: the next sweep starts from where the autopilot says, corrected as the map was last."""
         self._odometry = None
+        self._readings.clear()
         self._lost_since_ns = None
 
     def add(self, sweep: Sweep, readings: Sequence[ImuReading], poses: PoseBuffer, T_base_lidar: Floats) -> Registration:  # noqa: N803
         """Follow the vehicle through one sweep; a scan that is not believed, or not later than the one before, is not inserted.
 
         A sweep that is earlier by more than a second tells of a clock that was set back: track is lost and found as at the start.
-        ``poses`` are the autopilot's. Raises PoseUnavailableError when it says nothing of the sweep's end; then nothing was changed.
+        ``readings`` are those since the call before; ``poses`` are the autopilot's. Raises PoseUnavailableError when it says nothing of the
+        sweep's end: then nothing was changed, and the readings are kept for the next sweep, for the vehicle has turned all the same.
         """
+        self._readings.extend(readings)
         ends = poses.at([sweep.end_ns - VELOCITY_BASE_NS, sweep.end_ns])
         velocity = (ends.position[1] - ends.position[0]) / (VELOCITY_BASE_NS / NS)
         early_ns = 0 if self._odometry is None else self._odometry.filter.stamp_ns - sweep.end_ns
         if early_ns > SET_BACK_NS:
             self.stop()
+            self._readings.extend(readings)
         elif self._odometry is not None and early_ns >= 0:
             self.count.scans += 1
             self.count.rejected += 1
@@ -145,7 +151,8 @@ class Slam:
             self._start(sweep, poses, velocity)
         assert self._odometry is not None  # noqa: S101 -- just started
         near = sweep.within(self._settings.self_m, self._settings.max_range_m)
-        step = self._odometry.add(near, readings, T_base_lidar, AutopilotMotion(ends.rotation[1], velocity))
+        step = self._odometry.add(near, self._readings, T_base_lidar, AutopilotMotion(ends.rotation[1], velocity))
+        self._readings.clear()
         self._take(step, ends.matrix(1))
         return step.registration
 
