@@ -8,7 +8,7 @@ import pytest
 from guidance_fake_autopilot import GUIDED, LAND
 from guidance_pure_flight import PureFlight
 
-from uav_guidance.requests import HeadingRequest, HoverRequest, PositionRequest
+from uav_guidance.requests import HeadingRequest, HoverRequest, LandRequest, PositionRequest
 from uav_guidance.settings import Settings
 from uav_guidance.vectors import Vec3
 
@@ -114,3 +114,27 @@ def test_a_heading_that_jumps_turns_the_vehicle_at_the_rate_of_its_reference(fly
     flying.vehicle.body.yaw += math.radians(20.0)
     assert farthest_setpoint_m(flying, 3.0) < 0.3
     assert flying.report.course.reference == "hover"
+
+
+@pytest.mark.parametrize("silent", [{"LOCAL_POSITION_NED"}, {"ATTITUDE"}, {"LOCAL_POSITION_NED", "ATTITUDE"}])
+def test_a_place_that_is_not_told_any_more_makes_no_setpoint(flying, silent):
+    # An estimator without a position, or streams that another client has reset; heartbeats and the landed state go on.
+    flying.go(20.0, 0.0)
+    flying.run(3.0)
+    flying.withheld = silent
+    flying.run(2.2)
+    sent = len(flying.setpoints)
+    flying.run(5.0)
+    assert len(flying.setpoints) == sent
+    for request in (HoverRequest(), PositionRequest(Vec3(1.0, 0.0, 3.0), 1.0, along_travel=False)):
+        assert flying.ask(request).reason == "the autopilot does not say where it is"
+    flying.withheld = set()
+    assert farthest_setpoint_m(flying, 3.0) < LEAD_M + 0.3
+    flying.until(lambda r: r.course.remaining_enu_m.norm < 0.1)
+
+
+def test_a_vehicle_that_does_not_know_its_place_can_be_landed(flying):
+    flying.withheld = {"LOCAL_POSITION_NED"}
+    flying.run(3.0)
+    assert flying.agreed(LandRequest()).accepted
+    flying.until(lambda r: not r.vehicle.armed)

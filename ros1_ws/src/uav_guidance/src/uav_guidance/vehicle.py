@@ -24,6 +24,7 @@ from uav_guidance.vectors import ZERO, Vec3
 ARMED_FLAG = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 PREARM_CHECK = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
 MOST_ACCEL_M_S2 = 5.0  # of a multicopter in guided flight
+LATE_S = 1.0  # a place or an attitude that was told longer ago than something else is not known any more
 REBOOT_MS = 1000  # the autopilot's clock may step back by less (messages out of order)
 
 GlobalPlace = tuple[int, int, int]
@@ -54,6 +55,10 @@ class Mode(IntEnum):
     FLOWHOLD = 22
     FOLLOW = 23
     ZIGZAG = 24
+    SYSTEMID = 25
+    AUTOROTATE = 26
+    AUTO_RTL = 27
+    TURTLE = 28
 
 
 class Landed(IntEnum):
@@ -85,6 +90,9 @@ class Vehicle:
     boot_ms: int = 0
     boots: int = 1
     """How often the autopilot was seen to start, the first time included."""
+    place_s: float = -math.inf
+    attitude_s: float = -math.inf
+    """When place and attitude were told last, seconds of the mission clock, as ``heartbeat_s``."""
     position_enu_m: Vec3 | None = None
     velocity_enu_m_s: Vec3 = ZERO
     quat_xyzw: Quaternion | None = None
@@ -98,8 +106,9 @@ class Vehicle:
 
     @property
     def located(self) -> bool:
-        """Whether position and attitude are known."""
-        return self.position_enu_m is not None and self.quat_xyzw is not None
+        """Whether position and attitude are known: an estimator that has lost its position tells none, though heartbeats go on."""
+        newest_s = max(self.heartbeat_s or 0.0, self.place_s, self.attitude_s)
+        return self.position_enu_m is not None and self.quat_xyzw is not None and newest_s - min(self.place_s, self.attitude_s) < LATE_S
 
     @property
     def on_ground(self) -> bool:
@@ -154,16 +163,17 @@ def _of_this_boot(vehicle: Vehicle, message: Any) -> Vehicle:
     return Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
 
 
-def _local_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
-    vehicle = _of_this_boot(vehicle, message)
+def _local_position(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+    vehicle = replace(_of_this_boot(vehicle, message), place_s=now_s)
     position = enu_from_ned(Vec3(message.x, message.y, message.z))
     velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))
     return replace(vehicle, boot_ms=int(message.time_boot_ms), position_enu_m=position, velocity_enu_m_s=velocity)
 
 
-def _attitude(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+def _attitude(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
     return replace(
         _of_this_boot(vehicle, message),
+        attitude_s=now_s,
         quat_xyzw=quaternion_enu_flu(message.roll, message.pitch, message.yaw),
         yaw_rad=yaw_enu_from_ned(message.yaw),
         rates_flu_rad_s=rates_flu_from_frd(Vec3(message.rollspeed, message.pitchspeed, message.yawspeed)),
