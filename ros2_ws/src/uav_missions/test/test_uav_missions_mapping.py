@@ -235,12 +235,75 @@ def test_when_the_pilot_takes_over_nothing_more_is_commanded():
     flight.fly_until_running("goto_straight", 2)
     commands = len(flight.world.starts())
     flight.world.take_authority()
-    flight.world.resources["SDK_authority"] = "AVAILABLE"  # given back at once: the mission stays out of it
-    assert flight.fly() is Status.FAILURE
+    assert flight.fly(limit_s=400.0) is Status.FAILURE
     flight.settle()
     assert flight.world.starts()[commands:] == []
     assert not flight.world.running()
     assert "keep_sdk_authority" in flight.blackboard.reason
+
+
+@pytest.mark.parametrize("away_s", [0.0, 2.0, 60.0])
+def test_a_vehicle_that_is_given_back_is_landed_where_it_is(away_s):
+    flight = Flight(World())
+    world = flight.world
+    flight.fly_until_running("goto_straight", 2)
+    commands = len(world.starts())
+    world.take_authority()
+    taken_s = world.now_s
+    flight.fly(until=lambda: world.now_s >= taken_s + away_s, limit_s=100.0)
+    world.resources["SDK_authority"] = "AVAILABLE"
+    back_s = world.now_s
+    assert flight.fly(limit_s=400.0) is Status.FAILURE
+    assert world.starts()[commands:] == ["hover", "land"]
+    assert world.handles[-2].started_s - back_s > 2.9, "not while the pilot still turns his switch"
+    assert world.resources["flight_status"] == "ON_GROUND"
+    assert "keep_sdk_authority" in flight.blackboard.reason
+
+
+def test_a_vehicle_that_is_taken_again_while_it_lands_is_left_alone_again():
+    world = World(script=lambda handle: "BLOCKED" if handle.skill == "land" and world.log.count(("running", "land")) == 1 else None)
+    flight = Flight(world)
+    flight.fly_until_running("goto_straight", 2)
+    world.take_authority()
+    world.resources["SDK_authority"] = "AVAILABLE"
+    flight.fly(until=lambda: "land" in world.starts(), limit_s=100.0)
+    world.take_authority()
+    commands, taken_s = len(world.starts()), world.now_s
+    flight.fly(until=lambda: world.now_s > taken_s + 60.0, limit_s=100.0)
+    assert world.starts()[commands:] == []
+    world.resources["SDK_authority"] = "AVAILABLE"
+    assert flight.fly(limit_s=400.0) is Status.FAILURE
+    assert set(world.starts()[commands:]) == {"hover", "land"}
+    assert world.resources["flight_status"] == "ON_GROUND"
+
+
+def test_a_vehicle_that_is_taken_is_waited_for_until_it_has_stood_for_a_while():
+    flight = Flight(World())
+    world = flight.world
+    flight.fly_until_running("goto_straight", 2)
+    world.take_authority()
+    taken_s = world.now_s
+    flight.fly(until=lambda: world.now_s > taken_s + 20.0)
+    world.resources["flight_status"] = "ON_GROUND"  # what an autopilot that restarts in the air says, too
+    stood_s = world.now_s
+    assert flight.fly() is Status.FAILURE
+    assert world.now_s - stood_s == pytest.approx(3.0, abs=0.3)
+
+
+def test_a_pilot_who_flies_through_guided_gets_no_command():
+    flight = Flight(World())
+    world = flight.world
+    flight.fly_until_running("goto_straight", 2)
+    commands = len(world.starts())
+    world.take_authority()
+    begun_s = world.now_s
+
+    def switching() -> bool:
+        world.resources["SDK_authority"] = "AVAILABLE" if (world.now_s - begun_s) % 5.0 < 2.0 else "UNAVAILABLE"
+        return world.now_s > begun_s + 100.0
+
+    flight.fly(until=switching, limit_s=200.0)
+    assert world.starts()[commands:] == []
 
 
 def test_a_moment_without_authority_while_giving_up_is_not_taken_for_the_pilot():

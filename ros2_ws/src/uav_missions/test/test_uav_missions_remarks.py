@@ -36,6 +36,17 @@ def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, w
     assert blackboard.explained() == f"navigation.goto: RESOURCE_INVARIANT_VIOLATED keep_sdk_authority ({words})"
 
 
+def test_the_cause_of_a_lost_authority_stays_told_after_a_landing():
+    blackboard = make_blackboard(World())
+    authority = AuthorityRemarks(blackboard)
+    blackboard.failures.append(LOST)
+    blackboard.note_reason()
+    for told in (state(landed_state=1, authority=True), state(authority=True), state(), state(authority=True)):
+        authority.note(told)
+    authority.note(state(landed_state=1, authority=True, mode="LAND"))
+    assert blackboard.explained().endswith("keep_sdk_authority (the vehicle is in LOITER: the pilot or a failsafe has it)")
+
+
 def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
     blackboard = make_blackboard(World())
     authority = AuthorityRemarks(blackboard)

@@ -37,7 +37,7 @@ class FlightSettings:
     settle_s: float = 3.0
     landing_chances: int = 10
     others_landing_s: float = 180.0
-    """How long to wait for the pilot, or the autopilot's own failsafe, to land what we may not command."""
+    """How long to wait for the pilot, or the autopilot's own failsafe, to land what we may not command, or to give it back."""
 
 
 class Flying:
@@ -72,7 +72,22 @@ class Flying:
         return self.skill(name, "land", success="LANDED")
 
     def stop_here(self) -> Behaviour:
-        """Make a tree that stops the vehicle and lands it where it is; also what an abort from outside ends with."""
+        """Make a tree that stops the vehicle and lands it where it is, however often it is taken; what giving up and an abort end with."""
+        return RetryAfter(
+            "again when it is taken again",
+            self.land_here(),
+            chances=self._settings.landing_chances,
+            wait_s=0.0,
+            worth_it=lambda: not self.ours() and not self.on_ground(),
+            blackboard=self._blackboard,
+        )
+
+    def land_here(self) -> Behaviour:
+        """Make a tree that stops the vehicle and lands it where it is; it fails when the vehicle is taken while it does.
+
+        A vehicle that is not ours is left alone until it is down. One that is given back meanwhile (the pilot chooses GUIDED, the link
+        holds again) would hover for long: it is landed, too.
+        """
         settings = self._settings
         hover = self.skill("hover", "hover", {"duration": settings.hover_s}, success="DONE")
         land = RetryAfter(
@@ -80,7 +95,7 @@ class Flying:
             self.land("land here"),
             chances=settings.landing_chances,
             wait_s=settings.blocked_wait_s,
-            worth_it=self.obeys,
+            worth_it=self.ours,
             blackboard=self._blackboard,
         )
         on_ground = Stays("stays on the ground", self.on_ground, settings.settle_s, blackboard=self._blackboard)
@@ -88,8 +103,16 @@ class Flying:
         stop = Sequence("stop and land", memory=True, children=[FailureIsSuccess("if it can", hover), down])
         # For a while: a navigation that was restarted does not know yet that the vehicle is ours.
         taken = Stays("the pilot has control", lambda: not self.obeys(), settings.settle_s, blackboard=self._blackboard)
-        lands = Awaits("the pilot or the autopilot lands it", self.on_ground, settings.others_landing_s, blackboard=self._blackboard)
-        leave = Sequence("leave it to them", memory=True, children=[taken, FailureIsSuccess("or not", lands)])
+        # An autopilot that restarts in the air says at once that it stands: the record goes on until it does.
+        landed, given_back = (lasting(each, settings.settle_s, self._blackboard) for each in (self.on_ground, self.ours))
+
+        def over() -> bool:
+            return landed() or given_back()
+
+        what = "the pilot or the autopilot lands it, or gives it back"
+        lands = Awaits(what, over, settings.others_landing_s, blackboard=self._blackboard)
+        theirs = Check("is down, or still theirs", lambda: self.on_ground() or not self.ours())
+        leave = Sequence("leave it to them", memory=True, children=[taken, FailureIsSuccess("or not", lands), theirs])
         return Selector("land where it is", memory=True, children=[leave, stop])
 
     # --- legs --------------------------------------------------------------------------------------------------------
@@ -133,7 +156,11 @@ class Flying:
     def obeys(self) -> bool:
         """Tell whether the vehicle is ours to command: it is now, and has been since the mission began."""
         taken = any(failure.result in AUTHORITY_INVARIANTS for failure in self._blackboard.failures)
-        return not taken and self._navigation.resources.get("SDK_authority") == "AVAILABLE"
+        return not taken and self.ours()
+
+    def ours(self) -> bool:
+        """Tell whether the vehicle is ours to command now, be it that it was given back."""
+        return self._navigation.resources.get("SDK_authority") == "AVAILABLE"
 
     def on_ground(self) -> bool:
         """Tell whether the vehicle is on the ground."""
@@ -162,6 +189,21 @@ def conditions_of_flight(navigation: Client, clients: Iterable[Client], blackboa
         condition("the home point is valid", holds=state("homepoint_status") == "VALID", otherwise="the home point is not valid"),
         condition("the vehicle is on the ground", holds=grounded, otherwise="the vehicle is not on the ground"),
     ]
+
+
+def lasting(condition: Callable[[], bool], duration_s: float, blackboard: RouteBlackboard) -> Callable[[], bool]:
+    """Make a condition: another one has held at each look for this time of mission clock."""
+    since_s: float | None = None
+
+    def holds() -> bool:
+        nonlocal since_s
+        if not condition():
+            since_s = None
+            return False
+        since_s = blackboard.now_s if since_s is None else since_s
+        return blackboard.now_s - since_s >= duration_s
+
+    return holds
 
 
 def beside(name: str, work: Behaviour, companion: Behaviour) -> Parallel:

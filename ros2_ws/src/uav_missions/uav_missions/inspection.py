@@ -37,7 +37,8 @@ What was decided, and why:
   of travel, for the ZED, would end the inspection. The mission is given up: stop, hover, land. The ZED is not needed.
 - **BLOCKED** on a leg: one more attempt after 2 s, then the mission is given up.
 - **The control link is lost**: the autopilot's own failsafe flies home and lands. That takes the authority away from us, so
-  the mission is given up and commands nothing; it ends when the vehicle is on the ground. The same when the pilot takes over.
+  the mission is given up and commands nothing; it ends when the vehicle is on the ground. The same when the pilot takes over; a vehicle
+  that is given back is landed where it is, as in the mapping mission.
 """
 
 from __future__ import annotations
@@ -93,8 +94,10 @@ class InspectionMission:
         self._stream: SkillLeaf[RouteBlackboard] = SkillLeaf("stream", clients.video, "stream", self._criteria(), blackboard=blackboard)
         self.land = self._flying.land("land")
         self.flight = self._inspect_the_building()
-        self.video_lost = self._end("the video was lost", Check("stream failed", self._stream_failed))
-        give_up = self._end("give up", Do("note why", RouteBlackboard.note_reason, blackboard=blackboard))
+        stream_failed = Check("stream failed", self._stream_failed)
+        self.video_lost = Sequence("the video was lost", memory=True, children=[stream_failed, self._flying.land_here()])
+        note = Do("note why", RouteBlackboard.note_reason, blackboard=blackboard)
+        give_up = Sequence("give up", memory=True, children=[note, self.stop_here()])
         self.giving_up = SuccessIsFailure("given up", give_up)
         self.root = Selector("inspection mission", memory=True, children=[self.flight, self.video_lost, self.giving_up])
 
@@ -142,9 +145,6 @@ class InspectionMission:
         along = Sequence("along the wall", memory=True, children=[locked, flying.leg("fly", "goto")])
         leg = [flying.next_waypoint(), flying.turn_sideways("face the wall"), beside("fly facing the wall", along, lock), flying.reached()]
         return flying.until_flown(Sequence("leg", memory=True, children=leg))
-
-    def _end(self, name: str, first: Behaviour) -> Sequence:
-        return Sequence(name, memory=True, children=[first, self.stop_here()])
 
     def _criteria(self) -> Mapping[str, object]:
         settings = self._settings

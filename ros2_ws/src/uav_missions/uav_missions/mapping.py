@@ -27,8 +27,9 @@ What was decided, and why:
 - **The map's LiDAR fails** while the ZED is fine: without it there is no map, which is what the flight is for. Flying on would
   only take a risk for nothing: the mission is given up. The same when the map is lost (its skill's invariant `not_lost`).
 - **Giving up**: stop, hover, land where it is. The way home may be what the sensors no longer see.
-- **The pilot takes over** (SDK_authority is lost): the mission is given up and commands nothing more, also if the
-  authority comes back.
+- **The pilot takes over**, or the link is lost (SDK_authority is lost): the mission is given up and commands nothing, until the vehicle is
+  down. When the authority comes back before (the pilot chooses GUIDED, the link holds again) and stays for 3 s, the vehicle is
+  landed where it is: the route is not resumed.
 - **No motion before the eye is open**: a depth map skill's progress is 1 once obstacle messages arrive; legs wait for it.
 """
 

@@ -38,13 +38,14 @@ class AuthorityRemarks:
 
     def __init__(self, blackboard: Blackboard) -> None:
         self._remarks = blackboard.remarks
-        self._flying = False
+        self._flying = self._flown = False
 
     def note(self, state: GuidanceState | Any) -> None:
-        """Take a state of the guidance. What was remarked in flight stays."""
+        """Take a state of the guidance. What was remarked in flight stays, also when the vehicle is given back and has landed."""
         standing = state.landed_state == ON_GROUND
+        self._flown |= not standing
         if state.authority:
-            remark = "" if standing else self._remarks.get(AUTHORITY, "")
+            remark = self._remarks.get(AUTHORITY, "") if self._flown else ""
         elif not state.link:
             remark = "the link to the autopilot is lost"
         elif standing and not state.ready:
