@@ -26,7 +26,9 @@ def number(value: float | None, unit: str, digits: int = 2) -> str:
 
 
 def landed(summary: Mapping[str, Any]) -> str:
-    """Return whether it came down, in words; nothing is said of what is not known to have flown."""
+    """Return whether it came down well, in words; nothing is said of what is not known to have flown."""
+    if summary.get("crash"):
+        return f"no, it crashed: {summary['crash']}"
     return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
 
 

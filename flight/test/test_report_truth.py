@@ -13,7 +13,7 @@ from alula_flight.report.events import History
 from alula_flight.report.phases import Phases, find_phases
 from alula_flight.report.recording import GuidanceAccount, Recording, SimulatorAccount, Track
 from alula_flight.report.recovery import moving_again
-from alula_flight.report.truth import VEHICLE_RADIUS_M, Encounter, disagreements, encounter, rests, worse
+from alula_flight.report.truth import VEHICLE_RADIUS_M, Encounter, disagreements, encounter, impact, rests, worse
 from alula_flight.report.world import TrueSurfaces
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -104,6 +104,48 @@ def test_a_landing_on_a_roof_is_a_rest():
     raised[track.t_s >= phases.landing_s, 2] += 1.0 * np.linspace(0, 1, (track.t_s >= phases.landing_s).sum()).clip(max=1.0)
     raised[track.t_s >= phases.touch_down_s, 2] = 1.0 + STAND_M
     assert rests(Track(track.t_s, raised), world, phases) is True
+
+
+def ending_with(heights_m) -> tuple[Track, Phases]:
+    """Fly, and come down through these heights at 20 Hz; the last one is where it stays."""
+    track, _, phases = flight((10, 0, 3))
+    flown = track.between(0.0, phases.landing_s)
+    heights_m = np.concatenate([heights_m, np.full(30, heights_m[-1])])
+    t_s = flown.t_s[-1] + 0.05 * np.arange(1, len(heights_m) + 1)
+    end = np.column_stack([np.full(len(t_s), 10.0), np.zeros(len(t_s)), heights_m])
+    return Track(np.concatenate([flown.t_s, t_s]), np.concatenate([flown.position_enu_m, end])), phases
+
+
+def falling(from_m: float, *, ground_m: float = STAND_M, sinks_in_m: float = 0.0):
+    """Return the heights of a fall, and of the springing back of a ground that gives way."""
+    heights = from_m - 4.903 * (0.05 * np.arange(100)) ** 2
+    return [*heights[heights > ground_m], ground_m - sinks_in_m, ground_m - sinks_in_m / 2, ground_m]
+
+
+@pytest.mark.parametrize(
+    ("heights_m", "speed_m_s"),
+    [
+        (np.arange(3.0, STAND_M, -0.5 * 0.05), None),  # LAND
+        (np.arange(3.0, STAND_M, -2.5 * 0.05), None),  # a pilot's throttle at zero
+        ([*np.arange(3.0, 0.7, -0.5 * 0.05), STAND_M], None),  # an estimate that jumps by 0.4 m at the touch-down
+        (np.arange(3.0, STAND_M, -3.5 * 0.05), 3.5),
+        (falling(3.0), 6.0),
+        (falling(3.0, sinks_in_m=0.4), 6.0),
+    ],
+)
+def test_an_impact_is_told_from_a_landing_by_the_path(heights_m, speed_m_s):
+    track, phases = ending_with(heights_m)
+    told = impact(track, phases)
+    if speed_m_s is None:
+        assert told == ""
+    else:
+        assert float(told.removeprefix("it met the ground at ").removesuffix(" m/s or more")) == pytest.approx(speed_m_s, abs=1.0)
+
+
+def test_an_impact_that_the_simulator_felt_counts_as_well():
+    said = SimulatorAccount(12.0, collisions=1, min_clearance_m=2.0, distance_m=50.0, faults=(), crash="it met the ground at 7.7 m/s")
+    assert worse(said, Encounter()).crash == "it met the ground at 7.7 m/s"
+    assert worse(said, Encounter(crash="it met the ground at 7.0 m/s or more")).crash == "it met the ground at 7.7 m/s"
 
 
 def test_the_worse_account_wins():

@@ -358,3 +358,16 @@ def test_a_vehicle_that_lies_is_not_believed(folder):
     summary = make_report(facts(folder))
     assert summary["landed"] is False
     assert "the vehicle is said to be on the ground, its true path ends otherwise" in summary["problems"]
+
+
+@pytest.mark.parametrize("told", ["it met the ground at 7.6 m/s", ""])
+def test_a_vehicle_that_fell_has_not_landed(folder, told):
+    t_s, position = poses()
+    since_s = t_s - LIFT_OFF_S
+    position[:, 2] = np.where(since_s > LANDING_S, np.maximum(3.0 - 4.903 * (since_s - LANDING_S) ** 2, 0.3), position[:, 2])
+    state = {"lift_off_s": LIFT_OFF_S, "collisions": 1, "crash": told, "min_clearance_m": 1.0, "distance_m": 80.0, "faults": []}
+    write_bag(folder / "functional.bag", poses=(t_s, position), states=[state], guidance=guidance(t_s))
+    summary = make_report(facts(folder, faults=[]))
+    assert (summary["landed"], summary["collisions"], summary["problems"]) == (False, 1, [])
+    assert summary["crash"].startswith(told or "it met the ground at ")
+    assert f"landed: no, it crashed: {summary['crash']}" in "\n".join(verdict_lines(summary, [], folder))

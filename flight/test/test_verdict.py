@@ -58,6 +58,11 @@ def test_what_is_not_known_of_a_flight_is_said_so() -> None:
     ]
 
 
+def test_a_crash_is_no_landing() -> None:
+    summary = {"outcome": "given_up", "landed": False, "crash": "it met the ground at 7.6 m/s", "duration_s": 9.0}
+    assert verdict_lines(summary, [], OUT)[2].startswith("  landed: no, it crashed: it met the ground at 7.6 m/s, duration 9.0 s")
+
+
 def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
     summary = {"outcome": None, "landed": False, "duration_s": 12.0, "distance_m": 9.0}
     lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)

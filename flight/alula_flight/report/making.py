@@ -22,7 +22,7 @@ from alula_flight.report.recovery import Recovery, find_recovery
 from alula_flight.report.summary import Summary, summarise
 from alula_flight.report.timeline import make_timeline
 from alula_flight.report.timeline_picture import draw_timeline
-from alula_flight.report.truth import Encounter, disagreements, encounter, rests
+from alula_flight.report.truth import Encounter, disagreements, encounter, impact, rests
 from alula_flight.report.video import Video, radio_lost_s, read_video
 from alula_flight.report.video_picture import draw_video
 from alula_flight.report.world import TrueSurfaces
@@ -160,6 +160,8 @@ def _compare(folder: Path, account: Account, problems: Problems, *, mapped: bool
     with problems.survive("the clearance to the true surfaces"):
         recomputed = encounter(recording.truth, world, phases)
         resting = rests(recording.truth, world, phases)
+        if resting and (how := impact(recording.truth, phases)):
+            recomputed = replace(recomputed, crash=how, collisions=max(recomputed.collisions or 0, 1))
         for sentence in disagreements(recording, recomputed):
             problems.note(sentence)
     points: Floats | None = None

@@ -61,6 +61,7 @@ class SimulatorAccount:
     min_clearance_m: float | None
     distance_m: float | None
     faults: tuple[FaultChange, ...]
+    crash: str = ""
 
 
 @dataclass(frozen=True)
@@ -196,6 +197,7 @@ def _simulator_account(texts: list[str], problems: Problems) -> SimulatorAccount
             min_clearance_m=finite(state.get("min_clearance_m")),
             distance_m=finite(state.get("distance_m")),
             faults=tuple(fault_changes(state.get("faults"))),
+            crash=str(state.get("crash") or ""),
         )
     return None
 

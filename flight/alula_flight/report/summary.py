@@ -73,6 +73,7 @@ class EncounterSummary(TypedDict):
     """One account of how near the vehicle came."""
 
     collisions: int | None
+    crash: str | None
     min_clearance_m: float | None
     distance_m: float | None
 
@@ -85,12 +86,16 @@ class LiftOff(TypedDict):
 
 
 class Summary(TypedDict):
-    """The whole file. ``collisions``, ``min_clearance_m``, ``distance_m``: the worse of ``accounts``. ``mock``: None in the simulator."""
+    """The whole file. ``collisions``, ``min_clearance_m``, ``distance_m``: the worse of ``accounts``. ``mock``: None in the simulator.
+
+    ``crash``: how the vehicle crashed on its way down, None if it did not. One that has crashed has not ``landed``.
+    """
 
     scenario: str
     outcome: str | None
     reason: str | None
     landed: bool | None
+    crash: str | None
     seed: int | None
     duration_s: float | None
     collisions: int | None
@@ -143,8 +148,8 @@ def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None
     return mapping(statistics) or None
 
 
-def landed(history: History, recording: Recording, problems: Problems, phases: Phases, *, resting: bool | None) -> bool | None:
-    """Tell whether the vehicle came down: it must be said so, and be true where the truth is known; None: it never flew."""
+def came_down(history: History, recording: Recording, problems: Problems, phases: Phases, *, resting: bool | None) -> bool | None:
+    """Tell whether the vehicle came down, landed or crashed: it must be said so, and be true where that is known; None: it never flew."""
     if not phases.lifted_off:
         return None
     # A recording that broke off before the lift-off tells of a vehicle that had not flown yet.
@@ -198,15 +203,16 @@ def summarise(
     outcome, reason = read_outcome(facts, problems)
     bridge = None if facts.mock else read_bridge(facts, problems)
     note_doubts(facts, recording, phases, problems)
-    on_ground = landed(history, recording, problems, phases, resting=resting)
+    on_ground = came_down(history, recording, problems, phases, resting=resting)
     said = recording.simulator
     worst = worse(said, recomputed)
-    simulated = None if said is None else Encounter(said.collisions, said.min_clearance_m, said.distance_m)
+    simulated = None if said is None else Encounter(said.collisions, said.min_clearance_m, said.distance_m, said.crash)
     return Summary(
         scenario=facts.scenario,
         outcome=outcome,
         reason=reason,
-        landed=on_ground,
+        landed=False if worst.crash else on_ground,
+        crash=worst.crash or None,
         seed=facts.seed,
         duration_s=duration_s(history, recording, phases),
         collisions=worst.collisions,
@@ -291,6 +297,7 @@ def _encounter(encounter: Encounter | None) -> EncounterSummary | None:
         return None
     return EncounterSummary(
         collisions=encounter.collisions,
+        crash=encounter.crash or None,
         min_clearance_m=_rounded(encounter.min_clearance_m),
         distance_m=_rounded(encounter.distance_m),
     )

@@ -25,6 +25,9 @@ REST_MOVE_M = 0.1
 REST_HEIGHT_M = 0.2
 CLEARANCE_AGREES_M = 0.2
 DISTANCE_AGREES = 0.05
+HARD_M_S = 3.0  # down: no landing, also not a pilot's with the throttle at zero
+IMPACT_S = 0.2  # before the vehicle came to rest; long enough for a few poses, so that a jump of an estimated place is no fall
+TOUCHED_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class Encounter:
     collisions: int | None = None
     min_clearance_m: float | None = None
     distance_m: float | None = None
+    crash: str = ""
+    """How the vehicle crashed on its way down; empty: it did not, or nothing is known of it."""
 
 
 def encounter(track: Track | None, world: TrueSurfaces | None, phases: Phases) -> Encounter:
@@ -103,6 +108,21 @@ def rests(track: Track | None, world: TrueSurfaces | None, phases: Phases) -> bo
     return bool(still and heights[0] - heights[1] < REST_HEIGHT_M)
 
 
+def impact(track: Track | None, phases: Phases) -> str:
+    """Say how the vehicle met what it rests on, if that was no landing; for one that is known to rest (`rests`)."""
+    if track is None or not phases.lifted_off:
+        return ""
+    t_s, height = track.t_s, track.position_enu_m[:, 2]
+    above = np.flatnonzero(np.abs(height - height[-1]) > TOUCHED_M)
+    if not len(above):
+        return ""
+    touch = int(above[-1])
+    begin = int(np.searchsorted(t_s, t_s[touch] - IMPACT_S))
+    passed_s = t_s[touch] - t_s[begin]
+    sink_m_s = float((height[begin] - height[touch]) / passed_s) if passed_s > 0.0 else 0.0
+    return f"it met the ground at {sink_m_s:.1f} m/s or more" if sink_m_s > HARD_M_S else ""
+
+
 def _height_above_surface(world: TrueSurfaces, place: NDArray[np.float64]) -> float:
     return float(world.first_hit_m(place, np.array([[0.0, 0.0, -1.0]]))[0])
 
@@ -114,7 +134,8 @@ def worse(simulator: SimulatorAccount | None, recomputed: Encounter) -> Encounte
     collisions = [n for n in (simulator.collisions, recomputed.collisions) if n is not None]
     clearance = [m for m in (simulator.min_clearance_m, recomputed.min_clearance_m) if m is not None]
     distance = [m for m in (simulator.distance_m, recomputed.distance_m) if m is not None]
-    return Encounter(max(collisions, default=None), min(clearance, default=None), max(distance, default=None))
+    crash = simulator.crash or recomputed.crash
+    return Encounter(max(collisions, default=None), min(clearance, default=None), max(distance, default=None), crash)
 
 
 def disagreements(recording: Recording, recomputed: Encounter) -> list[str]:

@@ -140,6 +140,33 @@ def test_a_frame_that_comes_twice_gets_its_answer_again_and_moves_nothing(vehicl
     sock.close()
 
 
+def test_packets_repeated_while_time_was_held_get_one_answer(vehicle):
+    peer = Peer(vehicle.port)
+    sock = peer.socket
+    now_s = tick_while(vehicle, lambda: [peer.step([1000] * 6) for _ in range(8)])
+    for _ in range(5):  # once a second, while time stands still
+        sock.send(packet(8, [1000] * 6))
+    frames = []
+
+    def work():
+        frames.append(json.loads(sock.recv(4096)))
+        for frame in (9, 10):
+            sock.send(packet(frame, [1000] * 6))
+            frames.append(json.loads(sock.recv(4096)))
+
+    tick_while(vehicle, work, now_s)
+    assert [state["timestamp"] for state in frames] == pytest.approx([0.0225, 0.025, 0.0275]), "each packet has the answer to itself"
+
+
+def test_an_autopilot_that_restarts_behind_repetitions_is_answered(vehicle):
+    before, after = Peer(vehicle.port), Peer(vehicle.port)
+    now_s = tick_while(vehicle, lambda: [before.step([1000] * 6) for _ in range(8)])
+    for _ in range(3):
+        before.socket.send(packet(8, [1000] * 6))
+    tick_while(vehicle, lambda: after.step([1000] * 6), now_s)
+    assert after.state["timestamp"] == pytest.approx(0.0025)
+
+
 def test_garbage_is_left_alone_and_a_taken_port_is_named(vehicle):
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for wrong in (b"", b"\x1a", struct.pack("<HHI", 18458, 400, 0), bytes(65000)):

@@ -6,12 +6,14 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from uav_simulator_link import (
     ACCEPTED,
+    GROUND,
     GUIDED,
     LAND,
     LOITER,
     POSITION,
     POSITION_YAW,
     RTL,
+    STABILIZE,
     Link,
     yaw_ned_deg,
 )
@@ -117,6 +119,38 @@ def test_the_yaw_stick_overrides_the_setpoints_yaw_until_it_is_centred():
     link.pilot.yaw_stick(0.0)
     link.run(5.0, each_tick=lambda: link.setpoint(POSITION_YAW, hold, yaw=math.radians(90)))
     assert yaw_ned_deg(link) == pytest.approx(90.0, abs=3.0)
+
+
+@pytest.mark.parametrize("height_m", [3.0, 8.0])
+def test_a_take_over_without_a_remote_control_sinks_in_loiter_and_lands(height_m):
+    link = Link().flying(height_m)
+    link.pilot.throttle_stick(-1.0)
+    link.run(2.0)
+    assert link.position[2] == pytest.approx(height_m, abs=0.2), "in GUIDED the sticks do nothing"
+    link.pilot.set_mode(LOITER)
+    link.run(1.5)
+    assert link.vehicle.body.velocity[2] < -0.5
+    link.run_until(lambda: link.landed_state == GROUND, timeout_s=10.0)
+    assert link.pilot.armed
+    link.run_until(lambda: not link.pilot.armed, timeout_s=11.0)
+
+
+def test_a_take_over_without_a_remote_control_falls_in_stabilize():
+    link = Link().flying()
+    link.pilot.throttle_stick(-1.0)
+    link.pilot.set_mode(STABILIZE)
+    link.run_until(lambda: link.landed_state == GROUND, timeout_s=1.0)
+    assert link.position[2] == 0.0
+    assert link.pilot.armed
+    link.run_until(lambda: not link.pilot.armed, timeout_s=11.0)
+
+
+def test_a_throttle_that_holds_keeps_the_height_in_stabilize():
+    link = Link().flying()
+    link.pilot.throttle_stick(0.1)
+    link.pilot.set_mode(STABILIZE)
+    link.run(5.0)
+    assert link.position[2] == pytest.approx(3.0, abs=0.2)
 
 
 # --- a ground station's sticks: MANUAL_CONTROL -----------------------------------------------------------------------------

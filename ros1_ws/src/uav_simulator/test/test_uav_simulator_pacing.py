@@ -176,7 +176,11 @@ def test_pilot_words():
     assert link.pilot.mode is Mode.RTL
     apply_pilot_word("GCS_LOST", link.pilot, link.endpoint)
     assert not link.endpoint.gcs_present
-    for wrong, said in (("JUMP", "unknown word 'JUMP'"), ("YAW_STICK left", "not 'left'")):
+    for wrong, said in (
+        ("JUMP", "unknown word 'JUMP'"),
+        ("YAW_STICK left", "not 'left'"),
+        ("THROTTLE up", "THROTTLE needs a number from -1 to 1, not 'up'"),
+    ):
         with pytest.raises(ConfigError, match=said):
             apply_pilot_word(wrong, link.pilot, link.endpoint)
 

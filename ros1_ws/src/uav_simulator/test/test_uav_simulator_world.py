@@ -238,3 +238,38 @@ def test_a_vehicle_that_falls_to_the_ground_has_crashed_whatever_its_autopilot_s
         monitor.step(body, LandedState.ON_GROUND if body.on_ground else state)
     assert body.on_ground
     assert monitor.collisions == collisions
+    assert monitor.crash.startswith("it met the ground at 7.") == bool(collisions)
+
+
+@pytest.mark.parametrize(("sink_m_s", "crash"), [(0.5, ""), (2.6, ""), (3.2, "it met the ground at 3.2 m/s")])
+def test_a_hard_landing_of_the_pilots_is_no_crash_yet(sink_m_s, crash):
+    monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.85)
+    body = body_at(0.0, 0.0, 0.01)
+    body.velocity = (0.0, 0.0, -sink_m_s)
+    for height_m in (0.01, 0.0):
+        body.position = (0.0, 0.0, height_m)
+        monitor.step(body, LandedState.LANDING)
+    assert (monitor.crash, monitor.collisions) == (crash, 1 if crash else 0)
+
+
+def test_coming_down_upside_down_is_a_crash():
+    monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.85)
+    body = body_at(0.0, 0.0, 0.01)
+    body.attitude = (0.0, 1.0, 0.0, 0.0)
+    monitor.step(body, LandedState.LANDING)
+    body.position = (0.0, 0.0, 0.0)
+    monitor.step(body, LandedState.ON_GROUND)
+    assert (monitor.crash, monitor.collisions) == ("it met the ground leaning by 180 degrees", 1)
+
+
+def test_coming_down_on_something_is_a_crash_and_touching_it_in_flight_a_collision():
+    for state, height_m, crash in (
+        (LandedState.LANDING, 1.0, "it touched something on its way down, 1.0 m above the ground"),
+        (LandedState.IN_AIR, 3.0, ""),
+        (LandedState.TAKING_OFF, 1.0, ""),
+    ):
+        monitor = ContactMonitor(Scene(build_parts(CONFIG, 0)), 0.85)
+        body = body_at(4.9, -3.9, height_m)
+        body.velocity = (0.0, 0.0, -0.5)
+        monitor.step(body, state)
+        assert (monitor.crash, monitor.collisions) == (crash, 1)

@@ -13,7 +13,7 @@ from uav_simulator.vehicle.airframe import Airframe
 from uav_simulator.vehicle.hexacopter import Hexacopter
 
 TICK_S = 0.02
-GUIDED, LOITER, RTL, LAND, BRAKE = 4, 5, 6, 9, 17
+STABILIZE, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 4, 5, 6, 9, 17
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 POSITION, POSITION_YAW, VELOCITY = 0x0DF8, 0x09F8, 0x0DC7

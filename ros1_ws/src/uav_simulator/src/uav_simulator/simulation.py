@@ -36,6 +36,7 @@ class State:
     t_s: float
     lift_off_s: float | None
     collisions: int
+    crash: str
     min_clearance_m: float | None
     distance_m: float
     sensors: dict[str, str]
@@ -104,6 +105,7 @@ class Simulation:
             t_s=round(self.now_s, 3),
             lift_off_s=None if self.lift_off_s is None else round(self.lift_off_s, 3),
             collisions=self._contacts.collisions,
+            crash=self._contacts.crash,
             min_clearance_m=round(clearance, 3) if math.isfinite(clearance) else None,
             distance_m=round(self._distance_m, 2),
             sensors=self.sensors.modes,

@@ -11,6 +11,7 @@ import logging
 import select
 import socket
 import time
+from dataclasses import dataclass
 
 from uav_simulator.ardupilot.motors import HexaX, thrusts_n
 from uav_simulator.ardupilot.protocol import BodyState, MotorPacket, answer, parse_packet
@@ -35,6 +36,17 @@ SILENCE_S = 10.0  # wall clock; then, and so often, it is told
 log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class _Received:
+    """A packet and its sender."""
+
+    packet: MotorPacket
+    peer: tuple[str, int]
+
+    def repeats(self, other: _Received) -> bool:
+        return self.peer == other.peer and self.packet.frame == other.packet.frame
+
+
 class ArduPilotVehicle:
     """Serves one ArduPilot; one that is restarted finds the body where it is, and its own time at zero."""
 
@@ -53,9 +65,8 @@ class ArduPilotVehicle:
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
         self._tell_wall_s = time.monotonic() + SILENCE_S
-        self._peer: tuple[str, int] | None = None
-        self._served: tuple[str, int] | None = None  # whose frame was the last one
-        self._frame = 0
+        self._served: _Received | None = None
+        self._next: _Received | None = None  # taken from the socket behind the repetitions of the last one
         self._answer = b""
         self._time_s = self._session_s = 0.0
         self._steps = self._steps_done = 0
@@ -75,11 +86,11 @@ class ArduPilotVehicle:
         """Take packets until the tick is complete; False when none has come for a while."""
         until_s = time.monotonic() + WAIT_S
         while True:
-            packet = self._receive(until_s)
-            if packet is None:
+            received = self._receive(until_s)
+            if received is None:
                 self._tell_silence()
                 return False
-            if self._take(packet, dt_s) and self._steps_done == self._steps:
+            if self._take(received, dt_s) and self._steps_done == self._steps:
                 self._steps_done = 0
                 self._time_s = now_s
                 self._note_height()
@@ -93,19 +104,23 @@ class ArduPilotVehicle:
         """Free the port."""
         self._socket.close()
 
-    def _receive(self, until_s: float) -> MotorPacket | None:
+    def _receive(self, until_s: float) -> _Received | None:
         """Return the next packet; None when there is none in time."""
-        while (rest_s := until_s - time.monotonic()) > 0.0:
+        received, self._next = self._next, None
+        while received is None and (rest_s := until_s - time.monotonic()) > 0.0:
             readable, _, _ = select.select([self._socket], [], [], rest_s)
-            if not readable:
-                continue
-            # A peer that has gone makes a call fail (ICMP port unreachable); the next one is waited for.
-            with contextlib.suppress(BlockingIOError, ConnectionError):
-                data, self._peer = self._socket.recvfrom(BUFFER)
-                packet = parse_packet(data)
-                if packet is not None:
-                    self._tell_wall_s = time.monotonic() + SILENCE_S
-                    return packet
+            received = self._read() if readable else None
+        return received
+
+    def _read(self) -> _Received | None:
+        """Return the packet that waits in the socket; None if there is none, or something else."""
+        # A peer that has gone makes a call fail (ICMP port unreachable); the next one is waited for.
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            data, peer = self._socket.recvfrom(BUFFER)
+            packet = parse_packet(data)
+            if packet is not None:
+                self._tell_wall_s = time.monotonic() + SILENCE_S
+                return _Received(packet, peer)
         return None
 
     def _tell_silence(self) -> None:
@@ -113,22 +128,32 @@ class ArduPilotVehicle:
             self._tell_wall_s += SILENCE_S
             log.warning("no motor outputs on UDP port %d for %g s: is ArduPilot running with --model JSON:127.0.0.1?", self.port, SILENCE_S)
 
-    def _take(self, packet: MotorPacket, dt_s: float) -> bool:
+    def _take(self, received: _Received, dt_s: float) -> bool:
         """Make the packet's step and answer; one that comes twice gets its answer again. Return whether there was a step."""
-        restarted = self._peer != self._served or packet.frame < self._frame
-        fresh = restarted or packet.frame != self._frame
+        last, packet = self._served, received.packet
+        fresh = last is None or not received.repeats(last)
         if fresh:
-            if restarted:
+            if last is None or received.peer != last.peer or packet.frame < last.packet.frame:  # it has been restarted
                 self._session_s = self._time_s + self._steps_done * (dt_s / max(self._steps, 1))
-            self._served, self._frame = self._peer, packet.frame
+            self._served = received
             if self._steps_done == 0:
                 self._steps = min(max(round(dt_s * packet.rate_hz), LEAST_STEPS), MOST_STEPS)
                 self._wind_m_s = self._wind.step(dt_s)
             self._step(packet, dt_s / self._steps)
-        if self._peer is not None:
-            with contextlib.suppress(BlockingIOError, ConnectionError):
-                self._socket.sendto(self._answer, self._peer)
+        self._drop_repetitions(received)
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            self._socket.sendto(self._answer, received.peer)
         return fresh
+
+    def _drop_repetitions(self, received: _Received) -> None:
+        """Drop what ArduPilot has repeated, once a second, while time was held.
+
+        One answer is enough: it would take each further one for the answer to its next packet, and fly by a state that is older by
+        a step from then on.
+        """
+        while self._next is None and select.select([self._socket], [], [], 0.0)[0]:
+            another = self._read()
+            self._next = another if another is not None and not another.repeats(received) else None
 
     def _step(self, packet: MotorPacket, dt_s: float) -> None:
         body = self.body

@@ -246,6 +246,10 @@ class Autopilot:
         """Take the sticks of the ground station; they fly in modes of the pilot's, in GUIDED they turn the nose alone [11]."""
         self._sticks.move(raw, self.now_s)
 
+    def throttle_stick(self, up: float) -> None:
+        """Leave the throttle of the remote control at -1 (zero) to 1; 0 holds the height [11]."""
+        self._sticks.set_throttle(up)
+
     def yaw_stick(self, rate_rad_s: float) -> None:
         """Turn by the pilot's stick until it is centred, 0 [11]."""
         self._navigator.yaw_stick_rad_s = rate_rad_s
@@ -387,11 +391,17 @@ class Autopilot:
         if self.now_s - self._landed_since_s >= delay:
             self.disarm()
 
+    @property
+    def _idling(self) -> bool:
+        """Return whether the motors carry nothing: off, or the pilot's own throttle is at zero [11]."""
+        return not self.armed or (self.mode is Mode.STABILIZE and self._sticks.at(self.now_s).up <= -1.0)
+
     def _fly(self, now_s: float, dt_s: float) -> None:
-        if not self.armed or self.landed:
+        if self._idling or self.landed:
             self._vehicle.target = None
-            if not self.armed and not self.landed:
-                self.landed = self._vehicle.body.on_ground  # fallen after a forced disarm
+            if not self.landed:
+                self.landed = self._vehicle.body.on_ground  # fallen
+                self._landed_since_s = now_s
             if self.landed:
                 self._navigator.restart(self.estimate)
             return

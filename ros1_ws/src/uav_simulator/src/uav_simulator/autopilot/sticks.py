@@ -1,4 +1,4 @@
-"""A pilot's sticks as a ground station moves them with MANUAL_CONTROL: what they say now, and how fast that is."""
+"""A pilot's sticks, the remote control's or as a ground station moves them with MANUAL_CONTROL: what they say now, and how fast that is."""
 
 from __future__ import annotations
 
@@ -31,12 +31,17 @@ CENTRED = Deflection()
 
 
 class Sticks:
-    """Remembers what came last; it counts for RC_OVERRIDE_TIME, then the sticks are centred."""
+    """Remembers what came last; it counts for RC_OVERRIDE_TIME, then the remote control's own sticks do: centred, but for the throttle."""
 
     def __init__(self, params: Parameters) -> None:
         self._params = params
         self._moved_s = -math.inf
         self._last = CENTRED
+        self._own = CENTRED
+
+    def set_throttle(self, up: float) -> None:
+        """Leave the remote control's throttle at -1 (zero) to 1; without a remote control, ArduPilot's simulator has it at zero."""
+        self._own = Deflection(up=_live(up, THROTTLE_DEAD))
 
     def move(self, raw: Deflection, now_s: float) -> None:
         """Take what a MANUAL_CONTROL says."""
@@ -46,8 +51,8 @@ class Sticks:
         )
 
     def at(self, now_s: float) -> Deflection:
-        """Return what they say; what is too old says nothing."""
-        return self._last if now_s - self._moved_s <= self._params["RC_OVERRIDE_TIME"] else CENTRED
+        """Return what they say; what a ground station has said too long ago says nothing."""
+        return self._last if now_s - self._moved_s <= self._params["RC_OVERRIDE_TIME"] else self._own
 
     def velocity_m_s(self, stick: Deflection, yaw_rad: float) -> Vec3:
         """Return the velocity (ENU) that a deflection asks for."""
