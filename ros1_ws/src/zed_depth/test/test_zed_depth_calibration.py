@@ -13,6 +13,10 @@ from zed_depth import CalibrationError, StereoCalibration
 WIDTH, HEIGHT = 480, 270
 
 
+def region(x_offset=0, y_offset=0, width=0, height=0) -> SimpleNamespace:
+    return SimpleNamespace(x_offset=x_offset, y_offset=y_offset, width=width, height=height)
+
+
 def info(*, right=False, fx=240.0, cx=240.0, cy=135.0, baseline_m=0.12, **changes) -> SimpleNamespace:
     shift = -fx * baseline_m if right else 0.0
     given = {
@@ -25,6 +29,7 @@ def info(*, right=False, fx=240.0, cx=240.0, cy=135.0, baseline_m=0.12, **change
         "P": [fx, 0, cx, shift, 0, fx, cy, 0, 0, 0, 1, 0],
         "binning_x": 0,
         "binning_y": 0,
+        "roi": region(),
     }
     return SimpleNamespace(**{**given, **changes})
 
@@ -58,6 +63,35 @@ def test_binned_images_have_the_calibration_of_the_whole_sensor() -> None:
     assert (made.geometry.fx, made.geometry.baseline_m) == (240.0, pytest.approx(0.12))
 
 
+def test_a_part_of_the_sensor_has_the_calibration_of_the_whole() -> None:
+    whole = {"width": 960, "height": 540, "fx": 480.0, "cx": 480.0, "cy": 270.0}
+    parts = {"roi": region(96, 60, 768, 400), "binning_x": 2, "binning_y": 2}
+    made = calibration(info(**whole, **parts), info(right=True, **whole, **parts))
+    assert made.size == (200, 384)
+    assert (made.geometry.fx, made.geometry.cx, made.geometry.cy) == (240.0, 192.0, 105.0)
+    assert (made.geometry.baseline_m, made.geometry.offset_px) == (pytest.approx(0.12), 0.0)
+    farther = calibration(info(**whole, roi=region(96, 60, 768, 400)), info(right=True, **whole, roi=region(80, 60, 768, 400)))
+    assert farther.geometry.offset_px == -16.0  # the right part begins farther to the left
+
+
+@pytest.mark.parametrize(("cx", "cy"), [(84.0, 135.0), (432.0, 135.0), (240.0, 40.0), (144.0, 100.0)])
+def test_the_principal_point_of_a_cropped_pair_may_be_anywhere_along_one_axis(cx, cy) -> None:
+    made = calibration(info(cx=cx, cy=cy), info(right=True, cx=cx - 60.0, cy=cy))
+    assert (made.geometry.cx, made.geometry.cy, made.geometry.offset_px) == (cx, cy, 60.0)
+
+
+def test_what_the_raw_image_does_not_show_is_told_apart() -> None:
+    """Rectified with a shorter focal length than that of the raw image, the image has a border that no camera saw."""
+    raw = {"D": [-0.05, 0.0, 0.0, 0.0, 0.0], "K": [300.0, 0, 240.0, 0, 300.0, 135.0, 0, 0, 1], "fx": 240.0}
+    unseen = calibration(info(**raw), info(right=True, **raw)).unseen
+    assert unseen is not None
+    assert unseen.shape == (HEIGHT, WIDTH)
+    assert unseen[:, :25].all()
+    assert unseen[:8].all()
+    assert not unseen[40:-40, 60:-60].any()
+    assert calibration().unseen is None
+
+
 NAN_P = [float("nan")] * 12
 BAD_PAIRS = {
     "P of zeros": (info(P=[0] * 12), None, "P has the focal lengths 0 and 0 px: the camera is not calibrated"),
@@ -69,6 +103,13 @@ BAD_PAIRS = {
     "other sizes": (None, info(right=True, width=640), "left camera_info is for 480x270 images, the right for 640x270"),
     "doubled P": (info(fx=480, cx=480, cy=270), None, r"principal point \(480, 270\) is far from the middle of 480x270 images"),
     "halved P": (info(fx=120, cx=119.75, cy=67.25), None, r"principal point \(120, 67\) is far from the middle of 480x270 images"),
+    "outside": (info(cx=-20.0), None, r"principal point \(-20, 135\) is far from the middle"),
+    "part beyond the sensor": (info(roi=region(100, 0, 480, 270)), None, "region of interest is not within its 480x270 pixels"),
+    "P of another camera": (
+        info(D=[-0.3, 0.1, 0, 0, 0], K=[900.0, 0, 240.0, 0, 900.0, 135.0, 0, 0, 1]),
+        None,
+        "raw image shows only 7% of its rectified one",
+    ),
     "no size": (info(width=0, height=0), None, "the left camera_info is for 0x0 images, expected 32 to 16384 pixels each way"),
     "absurd size": (None, info(right=True, width=2**31), "the right camera_info is for 2147483648x270 images"),
     "D of no model": (info(D=[-0.3, 0.1, 0.0]), None, r"D \(3 numbers\), R, P rectify no image"),

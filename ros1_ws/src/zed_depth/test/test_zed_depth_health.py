@@ -103,6 +103,24 @@ BREAKS = {
 }
 
 
+@pytest.mark.parametrize(("begin", "end"), [(-1.0, 0.33), (0.25, 0.75), (0.6, 2.0)])
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_covered_part_of_a_lens_is_known_before_surfaces_of_little_texture(side, begin, end) -> None:
+    shade = 25.0 * np.sin(np.linspace(0.0, 7.0, 480))
+    pale = [150.0 + shade + 0.2 * (image - 120.0) for image in wall_pair(9.5, seed=1)]
+    rig = rig_for(pale[0], 240.0)
+    sky = np.where(np.arange(270) < 90, 300.0, 0.0)[:, None]  # brighter than can be shown
+    for k, gains in enumerate(((1.0, 1.0), (1.0, 0.7), (0.6, 1.0))):
+        left, right = (gain * (image + sky) for gain, image in zip(gains, pale, strict=True))
+        good = rig.finding(StereoPair(k * NS // 2, noisy(left, k), noisy(right, 20 + k)))
+        assert good.ok, good.reason
+    pale[side] = covered(pale[side], begin, end)
+    for k in range(3, 6):
+        found = rig.finding(StereoPair(k * NS // 2, noisy(pale[0], k), noisy(pale[1], 20 + k)))
+    assert (found.verdict, found.fault) == (BROKEN, FaultKind.VIEW)
+    assert "covered" in found.reason
+
+
 class Scene:
     """A pair without noise, and the pairs that good cameras send of it: made once for all tests."""
 
@@ -156,6 +174,50 @@ def test_a_broken_rig_is_known_within_half_a_second(scene, name) -> None:
     assert sentence in during[-1].reason
     after = [rig.finding(StereoPair((20 + k) * NS // 10, *scene.good(k))) for k in range(3)]
     assert all(finding.ok for finding in after)
+
+
+def tiled_pair(disparity_px: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the left and right image (270, 480) of a wall of equal tiles, a little aslant: each corner looks like all others."""
+    tile = np.full((88, 88), 170, np.float32)
+    tile[:3], tile[:, :3] = 60, 60
+    wall = np.tile(tile, (20, 30))
+    grains = np.random.default_rng(seed).normal(0, 1.5, (2, 270, 480))
+    images = []
+    for shift, grain in zip((0.0, disparity_px), grains, strict=True):
+        seen = np.array([[0.2575, 0.02, -shift - 40.0], [0.01, 0.25, -40.0]])
+        images.append(np.clip(cv2.warpAffine(wall, seen, (480, 270), flags=cv2.INTER_AREA) + grain, 0, 255).astype(np.uint8))
+    return images[0], images[1]
+
+
+def test_texture_that_repeats_is_no_other_scene_and_hides_no_fault() -> None:
+    rig = rig_for(np.zeros((270, 480)), 240.0)
+
+    def finding(k, left, right):
+        return rig.finding(StereoPair(k * NS // 2, left, right))
+
+    for k, gain in enumerate((1.0, 0.7, 1.3)):  # of the right eye
+        left, right = tiled_pair(9.5, k)
+        good = finding(k, left, noisy(gain * right, k))
+        assert good.ok, good.reason
+    left, right = tiled_pair(9.5, 3)
+    off = finding(3, left, shifted(right, 3))
+    assert (off.verdict, off.fault) == (BROKEN, FaultKind.CALIBRATION)
+    left, right = tiled_pair(9.5, 4)
+    strange = finding(4, left, wall_pair(9.5, seed=4)[1])
+    assert (strange.verdict, strange.fault) == (BROKEN, FaultKind.VIEW)
+    assert "do not see the same scene" in strange.reason
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(("shift_px", "found"), [(0.0, False), (0.4, False), (-0.4, False), (1.0, True), (-1.0, True)])
+def test_rows_that_are_off_by_a_pixel_are_found_and_by_less_than_half_a_pixel_borne(scene, shift_px, found) -> None:
+    """3 rows of a camera of 1920 px are 1 of the image that is matched."""
+    moved = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, shift_px]])
+    height, width = scene.right.shape
+    right = cv2.warpAffine(scene.right.astype(np.float32), moved, (width, height), borderMode=cv2.BORDER_REPLICATE, flags=cv2.INTER_CUBIC)
+    rig = scene.rig()
+    told = [rig.finding(StereoPair(k * NS // 2, noisy(scene.left, k), noisy(right, 50 + k))) for k in range(4)]
+    assert {finding.fault for finding in told} == {FaultKind.CALIBRATION if found else FaultKind.NONE}, [each.reason for each in told]
 
 
 def believed(rig, k, left, right) -> bool:

@@ -59,6 +59,18 @@ def test_distance_of_a_wall_is_right_to_a_quarter_pixel(disparity_px) -> None:
     assert abs(float(np.nanmedian(depth)) - expected_m) < ZED.depth_error_m(expected_m, 0.25)
 
 
+def test_the_number_of_threads_changes_no_bit_of_the_result() -> None:
+    threads = cv2.getNumThreads()
+    found = []
+    try:
+        for count in (1, 2, 3):
+            cv2.setNumThreads(count)
+            found.append(disparity(*wall_pair(8.5, seed=1)).tobytes())
+    finally:
+        cv2.setNumThreads(threads)
+    assert len(set(found)) == 1
+
+
 def test_the_left_columns_have_depth_too() -> None:
     found = disparity(*wall_pair(8.0, seed=2))
     assert np.isfinite(found[20:-20, 16:64]).mean() > 0.9
@@ -110,6 +122,9 @@ def test_obstacle_is_where_the_wall_stands_in_the_map() -> None:
     depth[:] = 30.0
     assert (look(NS).nearest, look(NS).unknown) == (None, "")
     depth[:, : depth.shape[1] // 2] = np.nan  # as where both lenses are covered alike
+    assert (look(NS).nearest, look(NS).unknown) == (None, "only 0% of a part of the view ahead has a depth")
+    depth[:] = 30.0
+    depth[80:190, 210:270] = np.nan  # as behind a drop on both lenses: it hides 0.7 m at 3 m
     assert (look(NS).nearest, look(NS).unknown) == (None, "only 0% of a part of the view ahead has a depth")
     with pytest.raises(PoseUnavailableError):
         look(3 * NS)

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 VIEW_M = 3.0  # how far ahead the corridor's cross-section must be in view: farther than the vehicle needs to stop
 VIEW_SHARE = 0.5  # of the cross-section
 GRID = (9, 5)
-PARTS = 3  # side by side, of the corridor's view: each must have depths, or half a covered lens would pass for a free way
+PARTS = 8  # side by side, of the corridor's view: each must have depths, or what covers a lens would pass for a free way
 UPWARDS = np.array([0.0, 0.0, 1.0])
 
 
@@ -24,7 +24,7 @@ class AheadSettings:
     """Where to look, and what to believe.
 
     The range ends where a disparity error of one pixel makes the depth useless: with fx 240 px and 0.12 m between the cameras one pixel is
-    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of a third of the corridor's view it is unknown what is there.
+    0.6 m at 4 m, 2.2 m at 8 m. With a depth for less than ``min_known`` of an eighth of the corridor's width it is unknown what is there.
     """
 
     corridor: Corridor

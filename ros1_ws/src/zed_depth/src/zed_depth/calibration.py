@@ -20,8 +20,19 @@ ROW_TOLERANCE_PX = 1.0  # by which the rows of both projections may disagree
 FOCAL_LIMITS = (0.2, 10.0)  # of the width: views of 136 and of 6 degrees
 BASELINE_LIMITS_M = (0.005, 3.0)
 SIZE_LIMITS_PX = (32, 16_384)
-CENTRE_LIMITS = (0.3, 0.7)  # of the size, of the principal point: with half of its P, or twice, a camera_info is of other images
+CENTRE_LIMITS = (0.0, 1.0)  # of the size: the principal point of a cropped or convergent pair may be anywhere in the image, along one axis
+SAME_SIZE = (0.3, 0.7)  # of the size: with half of its P, or twice, the point is beyond these to one side along both axes
+LEAST_SEEN = 0.25  # of a rectified image that its raw image must show
 FISHEYE = "equidistant"
+
+
+class RegionLike(Protocol):
+    """What is read of a sensor_msgs/RegionOfInterest: the part of the sensor that is sent, before binning; zeros: all of it."""
+
+    x_offset: int
+    y_offset: int
+    width: int
+    height: int
 
 
 class InfoLike(Protocol):
@@ -36,6 +47,7 @@ class InfoLike(Protocol):
     P: Sequence[float]
     binning_x: int
     binning_y: int
+    roi: RegionLike
 
 
 class CalibrationError(ValueError):
@@ -98,18 +110,24 @@ class Camera:
         if not all(np.isfinite(values).all() for values in (D, K, R, P)):
             raise CalibrationError(f"the {side} camera_info holds values that are not finite")
         bins = np.array([max(1, int(info.binning_x)), max(1, int(info.binning_y))])
-        width, height = info.width // int(bins[0]), info.height // int(bins[1])
+        region = info.roi
+        corner = np.array([region.x_offset, region.y_offset])
+        size = np.array([region.width or info.width, region.height or info.height])
+        if np.any(corner + size > (info.width, info.height)):
+            raise CalibrationError(f"the {side} camera_info's region of interest is not within its {info.width}x{info.height} pixels")
+        width, height = (int(length) for length in size // bins)
         least, most = SIZE_LIMITS_PX
         if not (least <= width <= most and least <= height <= most):
             raise CalibrationError(f"the {side} camera_info is for {width}x{height} images, expected {least} to {most} pixels each way")
-        scale = np.diag([1.0 / bins[0], 1.0 / bins[1], 1.0])
+        # K and P are those of the whole sensor.
+        part = np.diag([1.0 / bins[0], 1.0 / bins[1], 1.0]) @ np.array([[1.0, 0.0, -corner[0]], [0.0, 1.0, -corner[1]], [0.0, 0.0, 1.0]])
         if not R.any():
             if D.any():
                 raise CalibrationError(f"the {side} camera_info has a distortion but no rectification (R is zero): calibrate the pair")
             R = np.eye(3)  # noqa: N806
         if np.abs(R @ R.T - np.eye(3)).max() > 1e-3:
             raise CalibrationError(f"the {side} camera_info's R is no rotation")
-        camera = cls(width=width, height=height, K=scale @ K, D=D, R=R, P=scale @ P, fisheye=info.distortion_model == FISHEYE)
+        camera = cls(width=width, height=height, K=part @ K, D=D, R=R, P=part @ P, fisheye=info.distortion_model == FISHEYE)
         camera.check_projection(side)
         return camera
 
@@ -121,8 +139,9 @@ class Camera:
         low, high = (limit * self.width for limit in FOCAL_LIMITS)
         if not low <= fx <= high:
             raise CalibrationError(f"the {side} camera_info's fx of {fx:g} px is not that of images {self.width} px wide")
-        low, high = CENTRE_LIMITS
-        if not (low <= cx / self.width <= high and low <= cy / self.height <= high):
+        centre = np.array([cx / self.width, cy / self.height])
+        within = np.all((centre >= CENTRE_LIMITS[0]) & (centre <= CENTRE_LIMITS[1]))
+        if not within or np.all(centre < SAME_SIZE[0]) or np.all(centre > SAME_SIZE[1]):
             raise CalibrationError(
                 f"the {side} camera_info's principal point ({cx:.0f}, {cy:.0f}) is far from the middle of {self.width}x{self.height} images"
             )
@@ -147,7 +166,17 @@ class Camera:
                 first, second = cv2.initUndistortRectifyMap(self.K, self.D, self.R, self.P[:, :3], size, cv2.CV_16SC2)
         except cv2.error as error:
             raise CalibrationError(f"the camera_info's K, D ({len(self.D)} numbers), R, P rectify no image: {error.err}") from error
+        share = float(np.mean(self.shown(first)))
+        if share < LEAST_SEEN:
+            raise CalibrationError(
+                f"the camera_info's raw image shows only {share:.0%} of its rectified one: its K, D, R, P are not of one camera"
+            )
         return first, second
+
+    def shown(self, places: NDArray[np.int16]) -> NDArray[np.bool_]:
+        """Return which of the places (h, w, 2), column and row, are in the raw image."""
+        inside: NDArray[np.bool_] = np.all((places >= 0) & (places < (self.width, self.height)), axis=2)
+        return inside
 
 
 def geometry_of(left: Camera, right: Camera) -> StereoGeometry:
@@ -176,6 +205,15 @@ class StereoCalibration:
         self.divisor = max(1, round(cameras[0].width / max_width_px))
         self.geometry = self.full.scaled(self.divisor)
         self._maps = tuple(None if rectified or camera.rectified else camera.maps() for camera in cameras)
+        self.unseen = self._unseen(cameras[0])
+        """Which pixels of the prepared left image its raw image does not show, (h, w), or None where it shows all of them."""
+
+    def _unseen(self, left: Camera) -> NDArray[np.bool_] | None:
+        if self._maps[0] is None:
+            return None
+        shown = self._scaled(255 * left.shown(self._maps[0][0]).astype(np.uint8))
+        unseen: NDArray[np.bool_] = shown < 255
+        return unseen if unseen.any() else None
 
     def prepared(self, left: Gray, right: Gray) -> tuple[Gray, Gray]:
         """Return both images ready for matching; raise CalibrationError when they have another size than the camera_info says."""
@@ -187,8 +225,13 @@ class StereoCalibration:
 
     def _one(self, image: Gray, index: int) -> Gray:
         maps = self._maps[index]
-        straight = image if maps is None else cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        if self.divisor > 1:
-            size = (image.shape[1] // self.divisor, image.shape[0] // self.divisor)
-            straight = cv2.resize(straight[: size[1] * self.divisor, : size[0] * self.divisor], size, interpolation=cv2.INTER_AREA)
-        return np.asarray(straight)
+        return self._scaled(
+            image if maps is None else np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+        )
+
+    def _scaled(self, image: Gray) -> Gray:
+        if self.divisor == 1:
+            return image
+        size = (image.shape[1] // self.divisor, image.shape[0] // self.divisor)
+        whole = image[: size[1] * self.divisor, : size[0] * self.divisor]
+        return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

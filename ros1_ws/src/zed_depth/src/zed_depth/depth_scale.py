@@ -138,15 +138,7 @@ def _way_m(one: _View, other: _View) -> float:
     return float(np.linalg.norm(one.T_map_camera[:3, 3] - other.T_map_camera[:3, 3]))
 
 
-def landmarks_of(left: Gray, right: Gray, places: Floats, disparity_px: Floats) -> Landmarks:
-    """Return the features of a pair whose disparities (N,) at places (N, 2) in the left image could be refined below a pixel."""
-    beside = np.stack([disparity_px, np.zeros_like(disparity_px)], axis=1)
-    moved = _followed(left, right, places, places - beside, levels=0) - places
-    usable = (np.abs(moved[:, 1]) < 1.0) & (np.abs(moved[:, 0] + disparity_px) < 2.0)
-    return Landmarks(left, places[usable], -moved[usable, 0])
-
-
-def _followed(image: Gray, other: Gray, places: Floats, guesses: Floats, *, levels: int) -> Floats:
+def followed(image: Gray, other: Gray, places: Floats, guesses: Floats, *, levels: int) -> Floats:
     """Return where the features at places (N, 2) are in another image, by Lucas and Kanade from the guesses (N, 2) on; NaN where lost."""
     if not len(places):
         return np.empty((0, 2))
@@ -169,7 +161,7 @@ def tracked(
     height, width = image.shape
     near = (earlier.disparity_px - geometry.offset_px >= LEAST_DISPARITY_PX) & ((turned + moved)[:, 2] > LEAST_DEPTH)
     near &= np.all((guesses >= 0.0) & (guesses < [width, height]), axis=1)
-    places = _followed(earlier.image, image, earlier.places[near], guesses[near], levels=LEVELS)
+    places = followed(earlier.image, image, earlier.places[near], guesses[near], levels=LEVELS)
     known = np.isfinite(places[:, 0])
     return Landmarks(earlier.image, earlier.places[near][known], earlier.disparity_px[near][known]), places[known]
 

@@ -143,6 +143,8 @@ class StereoRig:
         matcher = self._matcher_for(calibration.geometry)
         images = calibration.prepared(pair.left, pair.right)
         disparity = matcher.disparity(*images)
+        if calibration.unseen is not None:
+            disparity[calibration.unseen] = np.nan
         share = np.count_nonzero(np.isfinite(disparity)) / disparity.size
         finding = FINE if share >= self._settings.min_valid else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
         parallax = disparity > calibration.geometry.offset_px + self._settings.view.min_parallax_px
@@ -179,5 +181,5 @@ class StereoRig:
 
 
 def _same(one: InfoLike, other: InfoLike) -> bool:
-    names = ("width", "height", "distortion_model", "D", "K", "R", "P", "binning_x", "binning_y")
+    names = ("width", "height", "distortion_model", "D", "K", "R", "P", "binning_x", "binning_y", "roi")
     return all(tuple(np.atleast_1d(getattr(one, name))) == tuple(np.atleast_1d(getattr(other, name))) for name in names)

@@ -16,11 +16,12 @@ from zed_depth.view_health import ViewLimits
 class ZedSettings:
     """Private parameters of /zed_depth with their defaults; units in the names. Those with a range may be changed in flight.
 
-    ``rectified``: the images are, though their camera_info is that of the raw ones; otherwise the camera_info decides.
+    ``rectified``: the images are, though their camera_info is that of the raw ones; otherwise the camera_info decides. ``threads``: of
+    OpenCV, which matches four bands of the image by itself; the result does not depend on them.
     """
 
     enabled: bool = False
-    threads: int = 1
+    threads: int = 2
     rectified: bool = False
     # health
     timeout_s: float = tunable(0.35, 0.1, 5.0, "without a good pair until broken")
@@ -32,7 +33,7 @@ class ZedSettings:
     dark_mean: float = tunable(20.0, 0.0, 255.0, "grey levels; a darker image needs twice the contrast")
     min_contrast: float = tunable(4.0, 0.0, 100.0, "grey levels, deviation of the averaged image")
     max_saturated: float = tunable(0.6, 0.0, 1.0, "of the image that may be white")
-    max_vertical_px: float = tunable(1.0, 0.1, 10.0, "by which matched features may be off their row")
+    max_vertical_px: float = tunable(0.8, 0.1, 10.0, "by which matched features may be off their row")
     max_edge_px: float = tunable(6.0, 2.0, 20.0, "width of the strongest edges of a sharp image")
     view_period_s: float = tunable(0.4, 0.1, 5.0, "between two checks of both images against each other")
     max_scale_error: float = tunable(0.1, 0.02, 1.0, "by which depths may be too long or short by the vehicle's own motion")

@@ -23,6 +23,8 @@ NOISE_EVERY = 5  # pairs; a camera's noise changes with the light, not from imag
 MOST_DISPARITIES = 256
 COARSE = 6  # the search for what is too near is done in images of a sixth of the size ...
 COARSE_SHARE = 0.5  # ... and up to half of their width
+LOOK = 4  # the coarse disparity image, from which features are followed, is matched in images of a quarter of the size ...
+LOOK_REACH = 0.3  # ... and this share of their width
 SURELY_PX = 6.0  # by which a coarse disparity must be beyond the range: its own error
 
 
@@ -64,37 +66,38 @@ class DisparityRange:
         return self.first + self.count - 1
 
 
+def sgbm(settings: MatcherSettings, search: DisparityRange, speckle_px: int) -> cv2.StereoSGBM:
+    """Return OpenCV's matcher."""
+    smoothness = settings.block_px**2
+    return cv2.StereoSGBM_create(
+        minDisparity=search.first,
+        numDisparities=search.count,
+        blockSize=settings.block_px,
+        P1=8 * smoothness,
+        P2=32 * smoothness,
+        disp12MaxDiff=settings.left_right_px,
+        preFilterCap=31,
+        uniquenessRatio=settings.uniqueness_percent,
+        speckleWindowSize=speckle_px,
+        speckleRange=settings.speckle_range_px,
+        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )
+
+
 class StereoMatcher:
     """Match pairs of one size; not thread-safe."""
 
     def __init__(self, settings: MatcherSettings, search: DisparityRange) -> None:
         self._settings = settings
         self.search = search
-        self._sgbm = self._matcher(search.first, search.count, settings.speckle_px)
+        self._sgbm = sgbm(settings, search, settings.speckle_px)
         self._coarse = self._coarse_for(0)
         self._noise = 0.0
         self._pairs = 0
 
-    def _matcher(self, first: int, count: int, speckle_px: int) -> cv2.StereoSGBM:
-        settings = self._settings
-        smoothness = settings.block_px**2
-        return cv2.StereoSGBM_create(
-            minDisparity=first,
-            numDisparities=count,
-            blockSize=settings.block_px,
-            P1=8 * smoothness,
-            P2=32 * smoothness,
-            disp12MaxDiff=settings.left_right_px,
-            preFilterCap=31,
-            uniquenessRatio=settings.uniqueness_percent,
-            speckleWindowSize=speckle_px,
-            speckleRange=settings.speckle_range_px,
-            mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
-        )
-
     def _coarse_for(self, width: int) -> tuple[int, int, cv2.StereoSGBM]:
         count = max(16, 16 * int(width / COARSE * COARSE_SHARE / 16))
-        return width, count, self._matcher(0, count, self._settings.speckle_px // COARSE**2)
+        return width, count, sgbm(self._settings, DisparityRange(0, count), self._settings.speckle_px // COARSE**2)
 
     def disparity(self, left: Gray, right: Gray) -> NDArray[np.float32]:
         """Return the disparity (h, w) of the left image in pixels; raise ValueError when the sizes differ.
@@ -147,6 +150,20 @@ def _padded(matcher: cv2.StereoSGBM, columns: int, left: Gray, right: Gray) -> N
     pad = max(0, columns)
     wide = [cv2.copyMakeBorder(image, 0, 0, pad, 0, cv2.BORDER_REPLICATE) for image in (left, right)]
     return np.asarray(matcher.compute(*wide)[:, pad:])
+
+
+def coarse_disparity(settings: MatcherSettings, left: Gray, right: Gray, offset_px: float) -> NDArray[np.float32]:
+    """Return the disparity (h, w) in pixels, matched at a quarter of the size: good to a few pixels, at a sixtieth of the effort.
+
+    Searched are disparities from that of infinity, ``offset_px``, to `LOOK_REACH` of the width beyond. NaN where nothing is known.
+    """
+    height, width = left.shape
+    size = (width // LOOK, height // LOOK)
+    search = DisparityRange(int(np.floor(offset_px / LOOK)) - 2, 16 * int(np.ceil(LOOK_REACH * size[0] / 16)))
+    small = [np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8) for image in (left, right)]
+    sixteenths = _padded(sgbm(settings, search, settings.speckle_px // LOOK**2), search.last, *small)
+    pixels = np.where(sixteenths < 16 * search.first, np.float32(np.nan), sixteenths * np.float32(LOOK / 16.0))
+    return np.asarray(cv2.resize(pixels, (width, height), interpolation=cv2.INTER_NEAREST), dtype=np.float32)
 
 
 def noise_level(image: Gray) -> float:
