@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
 
-from lidar_obstacles import CloudJudge, LidarAhead, LidarSettings
-from perception_core import NS, Motion, PoseBuffer
+from lidar_obstacles import CloudJudge, LidarAhead, LidarSettings, MountCheck
+from perception_core import NS, Motion, PoseBuffer, TurnJoiner
 from perception_core.clouds import sweep_of_cloud
 from perception_core.images import GrayConverter
 from perception_core.testing import wall_pair
@@ -59,7 +59,7 @@ def bare_matcher(count: int) -> cv2.StereoSGBM:
 
 def stereo(width: int, height: int, fx: float) -> dict[str, Work]:
     """Measure /zed_depth on raw bytes of both images; view checks come at their period as in flight, at 10 Hz."""
-    cv2.setNumThreads(1)
+    cv2.setNumThreads(ZedSettings().threads)
     left, right = (cv2.resize(image, (width, height)) for image in wall_pair(8.0, seed=1))
     rng = np.random.default_rng(0)
     noise = [rng.integers(-2, 3, left.shape) for _ in range(4)]
@@ -131,12 +131,14 @@ def kitti() -> dict[str, Work]:
 def _lidar(messages: list[bytes]) -> dict[str, Work]:
     settings, known = LidarSettings(), poses()
     judge, ahead = CloudJudge(settings.cloud), LidarAhead(settings.ahead)
+    turns, mounting = TurnJoiner(), MountCheck()
     frame = [0]
 
     def node() -> None:
         frame[0] += 1
-        sweep = sweep_of_cloud(PointCloud2().deserialize(messages[frame[0] % len(messages)]))
+        sweep = turns.joined(sweep_of_cloud(PointCloud2().deserialize(messages[frame[0] % len(messages)])))
         judge.finding(sweep, self_m=settings.body_radius_m)
+        mounting.finding(sweep, np.eye(4), known, self_m=settings.body_radius_m)
         ahead.look(sweep, T_base_lidar=np.eye(4), poses=known, motion=FORWARD)
 
     def bare() -> None:

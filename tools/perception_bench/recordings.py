@@ -18,8 +18,20 @@ import rosbag
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 
-from lidar_obstacles import CloudJudge, LidarAhead, LidarSettings
-from perception_core import NS, Finding, HealthLimits, HealthWatch, Motion, PoseBuffer, StampJudge, Sweep, Verdict, first_trouble
+from lidar_obstacles import CloudJudge, LidarAhead, LidarSettings, MountCheck
+from perception_core import (
+    NS,
+    Finding,
+    HealthLimits,
+    HealthWatch,
+    Motion,
+    PoseBuffer,
+    StampJudge,
+    Sweep,
+    TurnJoiner,
+    Verdict,
+    first_trouble,
+)
 from perception_core.clouds import sweep_of_cloud
 from perception_core.images import GrayConverter
 from perception_core.ros import matrix_of_transform
@@ -163,19 +175,22 @@ class Scanner:
         """Begin as a node does."""
         settings = self._settings
         self._judge, self._ahead, self._stamps = CloudJudge(settings.cloud), LidarAhead(settings.ahead), StampJudge(settings.stamps)
+        self._turns, self._mounting = TurnJoiner(), MountCheck()
         self._rng = np.random.default_rng(0)
 
     def take(self, k: int, mode: SensorMode, last_good: int, *, look: bool) -> tuple[Finding, str]:
         """Return the finding of a sweep, and what it says."""
         recording, given = self._recording, self._recording.sweeps[k]
         sweep = _broken_sweep(mode, recording.sweeps[last_good if mode in REPEATED else k], self._rng)
-        sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0))
+        sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0)).arrived(given.end_ns)
+        sweep = self._turns.joined(sweep)
         stamp = self._stamps.finding(sweep.end_ns, given.end_ns)
-        position_m = self._position_m(sweep.end_ns)
-        finding = first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m, position_m=position_m))
+        position_m, self_m = self._position_m(sweep.end_ns), self._settings.body_radius_m
+        motion, mount = recording.motion(sweep.end_ns), recording.mounts["lidar"]
+        finding = first_trouble(stamp, self._judge.finding(sweep, self_m=self_m, position_m=position_m))
+        finding = self._mounting.finding(sweep, mount, recording.poses, self_m=self_m) if finding.ok else finding
         if not finding.ok or not look:
             return finding, "unknown"
-        motion, mount = recording.motion(sweep.end_ns), recording.mounts["lidar"]
         try:
             ahead = self._ahead.look(sweep, T_base_lidar=mount, poses=recording.poses, motion=motion, gone=self._judge.gone)
         except LookupError:

@@ -118,3 +118,47 @@ def test_where_returns_were_just_lost_is_unknown_unless_an_obstacle_is_seen() ->
     box = np.array([5.0, 0.0, 0.0]) + rng.uniform(-0.2, 0.2, (30, 3))
     seen = look_with([18], left, np.vstack([walls, box]))
     assert (seen.unknown, seen.nearest is not None) == ("", True)
+
+
+def yard(*, elevations_deg, columns=720, gap_deg=None) -> np.ndarray:
+    """Return a sweep over flat ground 2 m below, within walls at 20 m on all sides, for a sensor whose x looks ahead; z up."""
+    azimuth, elevation = (grid.ravel() for grid in np.meshgrid(np.arange(columns) * 360.0 / columns - 180.0, elevations_deg))
+    if gap_deg is not None:
+        seen = (azimuth < gap_deg[0]) | (azimuth > gap_deg[1])
+        azimuth, elevation = azimuth[seen], elevation[seen]
+    a, e = np.radians(azimuth), np.radians(elevation)
+    ray = np.column_stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    with np.errstate(divide="ignore"):
+        ranges = np.minimum(np.where(ray[:, 2] < 0, -2.0 / ray[:, 2], np.inf), 20.0 / np.abs(ray[:, :2]).max(axis=1))
+    return ray * ranges[:, None]
+
+
+def forward(points) -> str:
+    looker, motion = LidarAhead(LidarSettings().ahead), Motion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+    ahead = looker.look(sweep(points), T_base_lidar=np.eye(4), poses=crab(position=(0.0, 0.0, 2.0)), motion=motion)
+    assert ahead.nearest is None
+    return ahead.unknown
+
+
+RINGS = np.linspace(-15.0, 15.0, 16)
+
+
+@pytest.mark.parametrize("rings_deg", [RINGS, [-4.8, -1.6, 1.6, 4.8], np.linspace(-25, 15, 32)])
+def test_a_way_that_is_seen_is_free(rings_deg) -> None:
+    assert forward(yard(elevations_deg=rings_deg)) == ""
+
+
+@pytest.mark.parametrize("begin_deg", [-10.0, -7.0, -5.0, -1.0, 0.0])
+def test_a_gap_that_was_there_from_the_start_is_unknown(begin_deg) -> None:
+    assert "does not see all of the way ahead: 0 returns from" in forward(yard(elevations_deg=RINGS, gap_deg=(begin_deg, begin_deg + 10.0)))
+
+
+@pytest.mark.parametrize("count", [60, 240])
+def test_a_sweep_too_thin_to_show_an_obstacle_is_unknown(count) -> None:
+    full = yard(elevations_deg=np.linspace(-25, 15, 128), columns=1024)
+    assert "the LiDAR does not" in forward(full[np.random.default_rng(count).permutation(len(full))[:count]])
+
+
+@pytest.mark.parametrize("rings_deg", [[0.0], np.linspace(2.0, 88.0, 32)])
+def test_a_sensor_that_does_not_look_down_to_the_corridor_calls_nothing_free(rings_deg) -> None:
+    assert forward(yard(elevations_deg=rings_deg)) == "the LiDAR does not look down to the way ahead: 0 returns from so low"

@@ -91,7 +91,7 @@ def test_the_ground_is_remembered_where_it_rises_away_from_the_take_off() -> Non
         rng = np.random.default_rng(int(10 * x))
         xy = rng.uniform([x - 4, -4], [x + 12, 4], (4000, 2))
         ground = np.column_stack([xy, np.tan(np.radians(8.0)) * xy[:, 0] + rng.normal(0, 0.02, len(xy))])
-        heights = model.heights(corridor_coordinates(ground, origin, EAST), ground, origin, EAST)
+        heights = model.heights(corridor_coordinates(ground, origin, EAST), np.arange(len(ground)), origin, EAST)
         assert heights.max() < 0.2
 
 

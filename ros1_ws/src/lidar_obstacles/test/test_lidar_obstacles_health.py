@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lidar_obstacles import CloudJudge, LidarSettings
-from perception_core import NS, FaultKind, Sweep, Verdict
+from perception_core import NS, FaultKind, Sweep, TurnJoiner, Verdict
 
 ROOT = Path(__file__).resolve().parents[4]
 DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
@@ -181,6 +181,17 @@ def test_an_error_of_the_ranges_is_found_at_5_hz_by_the_vehicles_positions() -> 
     assert faults(0.0, 3.0) == [FaultKind.NONE] * 8
     for by_m in (0.5, -0.5):
         assert faults(by_m, 1.0) == [FaultKind.NONE] * 5 + [FaultKind.RANGE] * 3
+
+
+@pytest.mark.parametrize("by_m", [0.5, -0.5])
+def test_an_error_of_the_ranges_is_found_where_half_turns_are_joined(by_m) -> None:
+    judge, joiner, found = CloudJudge(LidarSettings().cloud), TurnJoiner(), []
+    for k in range(20):
+        points = room(k) if k < 10 else lengthened(room(k), by_m)
+        part = points[(points[:, 1] >= 0.0) == (k % 2 == 0)]
+        half = Sweep(NS + k * NS // 20, part, np.linspace(0.0, 0.05, len(part), dtype=np.float32))
+        found.append(judge.finding(joiner.joined(half), self_m=1.0).fault)
+    assert found == [FaultKind.NONE] * 11 + [FaultKind.RANGE] * 9
 
 
 def test_an_error_of_the_ranges_is_forgotten_when_the_sensor_was_started_again() -> None:

@@ -12,7 +12,7 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config
 from dynamic_reconfigure.srv import Reconfigure
 from std_srvs.srv import SetBool
-from uav_msgs.msg import Obstacle
+from uav_msgs.msg import Obstacle, SensorHealth
 
 from alula_testing.ros1 import NODE_UP_S, wait_until
 from perception_core import NS
@@ -118,6 +118,46 @@ def test_each_fault_is_broken_within_0_45_s_never_free_and_mended_after_1_s(flig
     assert flight.run(3.0, until=lambda: bool(flight.reports))
     for fault in FAULTS:
         check_fault(flight, scanner, fault, obstacles, mended_within_s=1.3)
+
+
+def test_a_driver_that_stamps_the_end_and_counts_from_the_beginning_is_good(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
+    def measure(stamp_ns: int) -> None:
+        points = box_cloud((6.0, 0.0, 0.0), seed=stamp_ns // 1000 % 2**31)
+        flight.publish_cloud(stamp_ns, points, np.linspace(0.0, 0.2, len(points), dtype=np.float32))
+
+    flight.at_10_hz = measure
+    enable()
+    assert flight.run(3.0, until=lambda: len(obstacles) >= 5)
+    assert {report.to for report in flight.reports} == {"OK"}
+    assert all(obstacle.detected for obstacle in obstacles)
+
+
+def test_half_turns_are_one_sensor_and_show_both_sides(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
+    def measure(stamp_ns: int) -> None:
+        points = box_cloud((6.0, 0.0, 0.0), seed=stamp_ns // 1000 % 2**31)
+        left = points[:, 1] >= 0.0
+        flight.publish_cloud(stamp_ns, points[left if stamp_ns // (NS // 10) % 2 else ~left])
+
+    flight.at_10_hz = measure
+    enable()
+    assert flight.run(4.0, until=lambda: len(obstacles) >= 20)
+    assert {report.to for report in flight.reports} == {"OK"}
+    assert all(obstacle.detected for obstacle in obstacles[3:])
+    assert all(abs(obstacle.size_m.y - 0.6) < 0.15 for obstacle in obstacles[3:])
+
+
+def test_an_overturned_sensor_is_unknown_and_never_free(flight: FakeFlight, obstacles: list[Obstacle]) -> None:
+    def measure(stamp_ns: int) -> None:
+        points = box_cloud((0.0, 6.0, 0.0), seed=stamp_ns // 1000 % 2**31)
+        flight.publish_cloud(stamp_ns, points * np.array([1.0, -1.0, -1.0], np.float32))
+
+    flight.at_10_hz = measure
+    flight.target = (0.0, 30.0, 2.0)  # the box is there, and seen on the other side
+    enable()
+    flight.run(3.0)
+    assert (flight.health[-1].verdict, flight.health[-1].fault) == (SensorHealth.UNKNOWN, "calibration")
+    assert obstacles
+    assert all(obstacle.unknown for obstacle in obstacles)
 
 
 def test_parameters_are_changed_in_flight_and_refused_out_of_range(flight: FakeFlight, obstacles: list[Obstacle]) -> None:

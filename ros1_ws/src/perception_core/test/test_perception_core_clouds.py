@@ -67,6 +67,10 @@ MAKERS = {
     "time as absolute float64": ("time", "f8", EPOCH_S + SPAN, SPAN),
     "since power-up": ("timestamp", "f8", 512.25 + SPAN, SPAN),
     "ouster's clock in ns since power-up": ("t", "u4", 3.2e9 + SPAN * 1e9, SPAN),
+    "a counter of ns that overflows": ("t", "u4", (2**32 - 5e7 + SPAN * 1e9) % 2**32, SPAN),
+    "aeva": ("time_offset_ns", "i4", SPAN * 1e9, SPAN),
+    "a name of its own": ("PointTimestamp_us", "u4", SPAN * 1e6, SPAN),
+    "ts": ("ts", "f4", SPAN, SPAN),
 }
 
 
@@ -80,10 +84,25 @@ def test_times_of_the_makers(maker, order) -> None:
     assert abs(sweep.end_ns - STAMP_NS) <= 0.1001 * NS
 
 
-def test_times_in_two_fields() -> None:
+@pytest.mark.parametrize(
+    ("whole", "nano"), [("time_sec", "time_nsec"), ("timestampSecond", "timestampNanosecond"), ("sec", "nsec"), ("t_s", "t_ns")]
+)
+def test_times_in_two_fields(whole, nano) -> None:
     at_ns = STAMP_NS + (SPAN * NS).astype(np.int64)
-    sweep = sweep_of_cloud(cloud([*xyz(), ("time_sec", "u4", at_ns // NS), ("time_nsec", "u4", at_ns % NS)]))
+    sweep = sweep_of_cloud(cloud([*xyz(), (nano, "u4", at_ns % NS), (whole, "u4", at_ns // NS)]))
     assert sweep.times_s == pytest.approx(SPAN, abs=2e-6)
+
+
+@pytest.mark.parametrize(("name", "kind", "first"), [("t", "u4", 3.2e9), ("timestamp", "f8", 512.25), ("timestamp", "f8", EPOCH_S)])
+def test_points_without_a_return_have_no_time(name, kind, first) -> None:
+    span = SPAN * (1e9 if kind == "u4" else 1.0)
+    returned = np.arange(20) % 4 == 0  # of an organised cloud, three of four are empty: zeros throughout
+    columns = [(axis, "f4", np.where(returned, 5.0, 0.0)) for axis in "xyz"]
+    times = np.zeros(20)
+    times[returned] = first + span
+    sweep = sweep_of_cloud(cloud([*columns, (name, kind, times)]))
+    assert sweep.times_s[returned] == pytest.approx(SPAN, abs=2e-6)
+    assert abs(sweep.end_ns - STAMP_NS) <= 0.1001 * NS
 
 
 def test_points_without_a_time_are_dropped_with_those_without_a_place() -> None:

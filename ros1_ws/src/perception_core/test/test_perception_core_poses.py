@@ -63,7 +63,7 @@ def test_standing_still_a_sweep_is_moved_rigidly(count, seed) -> None:
     sweep = Sweep(T0, rng.uniform(-20, 20, (count, 3)).astype(np.float32), rng.uniform(0, 0.1, count).astype(np.float32))
     poses = flight((0.0, 0.0, 0.0), 0.0)
     expected = sweep.points @ sensor()[:3, :3].T + sensor()[:3, 3]
-    assert deskew(sweep, poses, sensor()) == pytest.approx(expected, abs=1e-5)
+    assert deskew(sweep, poses, sensor(), np.zeros(3)) == pytest.approx(expected, abs=1e-5)
 
 
 @given(st.integers(0, 2**31), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
@@ -77,7 +77,7 @@ def test_a_moving_sensor_sees_a_standing_world_where_it_is(seed, yaw_rate, speed
     at = poses.at([T0 + int(float(t) * NS) for t in times])
     seen = np.einsum("nji,nj->ni", at.rotation, world - at.position)
     seen = (seen - mount[:3, 3]) @ mount[:3, :3]
-    straight = deskew(Sweep(T0, seen.astype(np.float32), times), poses, mount)
+    straight = deskew(Sweep(T0, seen.astype(np.float32), times), poses, mount, np.zeros(3))
     assert np.abs(straight - world).max() < 0.002  # metres, at up to 35 m
 
 
@@ -91,7 +91,7 @@ def test_range_limits_drop_points_together_with_their_times() -> None:
 
 def test_an_empty_sweep_stays_empty_without_any_pose() -> None:
     empty = Sweep(T0, np.empty((0, 3), np.float32), np.empty(0, np.float32))
-    assert deskew(empty, PoseBuffer(), np.eye(4)).shape == (0, 3)
+    assert deskew(empty, PoseBuffer(), np.eye(4), np.zeros(3)).shape == (0, 3)
 
 
 def test_a_measurement_waits_for_the_pose_of_its_moment():

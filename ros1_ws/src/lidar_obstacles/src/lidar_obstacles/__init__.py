@@ -3,6 +3,17 @@
 from lidar_obstacles.ahead import AheadSettings, Body, LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge, CloudLimits
 from lidar_obstacles.ground import GroundModel, GroundSettings
+from lidar_obstacles.mounting import MountCheck
 from lidar_obstacles.settings import LidarSettings
 
-__all__ = ["AheadSettings", "Body", "CloudJudge", "CloudLimits", "GroundModel", "GroundSettings", "LidarAhead", "LidarSettings"]
+__all__ = [
+    "AheadSettings",
+    "Body",
+    "CloudJudge",
+    "CloudLimits",
+    "GroundModel",
+    "GroundSettings",
+    "LidarAhead",
+    "LidarSettings",
+    "MountCheck",
+]

@@ -8,12 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidar_obstacles.ground import ASIDE_M, BEHIND_M, GroundModel, GroundSettings
-from perception_core import NS, Ahead, Corridor, Motion, PoseBuffer, Support, Sweep, deskew, direction_of_motion, nearest_obstacle
-from perception_core.corridor import corridor_coordinates
+from perception_core import (
+    NS,
+    Ahead,
+    Corridor,
+    Motion,
+    Nearest,
+    PoseBuffer,
+    Support,
+    Sweep,
+    deskew,
+    direction_of_motion,
+    nearest_obstacle,
+)
 
 Floats = NDArray[np.float64]
+NOTHING_M = 0.05  # from the sensor; a point that is nearer is no return
 BLUR_M = 1.0  # by as much at most a point is moved when its sweep is straightened, within the region that is looked at
-VIEW_DEG = 25.0  # the sensor sees the way ahead if it has returns within this angle of it, seen from above ...
+VIEW_DEG = 10.0  # the sensor sees the way ahead if it has returns from all parts within this angle of it, seen from above ...
+VIEW_PARTS = 4  # a gap of ten degrees leaves one of them empty, wherever it begins
 STEEP_DEG = 60.0  # ... that are not below or above the vehicle
 ASIDE_DEG = 20.0  # from the way ahead to the middle of a sector that lost its returns; an obstacle at 4 m may be as far aside
 
@@ -30,14 +43,14 @@ class Body:
 class AheadSettings:
     """Where to look, what to believe, what is the vehicle itself and what is ground.
 
-    With fewer than ``min_ahead`` returns from the direction of the motion, near or far, it is unknown what is there.
+    With fewer than ``min_ahead`` returns from one of the parts of the view of the way ahead, near or far, it is unknown what is there.
     """
 
     corridor: Corridor
     support: Support
     body: Body
     ground: GroundSettings
-    min_ahead: int = 3
+    min_ahead: int = 4
 
 
 class LidarAhead:
@@ -66,30 +79,53 @@ class LidarAhead:
         position = pose[:3, 3]
         direction = direction_of_motion(position, pose[:3, 0], motion)
         around = self._around(sweep, pose, T_base_lidar, direction)
-        points = deskew(around.near, poses, T_base_lidar)
-        seen = corridor_coordinates(points, position, direction)
-        heights = self._ground.heights(seen, points, position, direction)
-        nearest = nearest_obstacle(points, position, direction, settings.corridor, settings.support, heights_m=heights)
-        if nearest is None and around.ahead < settings.min_ahead:
-            return Ahead(None, f"the LiDAR does not look where the vehicle goes: {around.ahead} returns from there")
+        nearest = self._nearest(deskew(around.near, poses, T_base_lidar, position), position, direction)
+        if nearest is None and around.ahead.min() < settings.min_ahead:
+            return Ahead(None, _not_seen(around.ahead))
+        if nearest is None and around.down < settings.min_ahead:
+            return Ahead(None, f"the LiDAR does not look down to the way ahead: {around.down} returns from so low")
         if nearest is None and gone is not None and _towards(direction @ pose[:3, :3] @ T_base_lidar[:3, :3], gone):
             return Ahead(None, "the LiDAR has just lost its returns from where the vehicle goes")
         return Ahead(nearest)
 
+    def _nearest(self, points: NDArray[np.float32], position: Floats, direction: Floats) -> Nearest | None:
+        """Return the nearest obstacle among points in the map's axes, (N, 3) metres from the vehicle."""
+        corridor = self._settings.corridor
+        seen = points @ _along(direction).astype(np.float32).T
+        within = np.flatnonzero(corridor.surrounds(seen))
+        heights_m = self._ground.heights(seen, within, position, direction)
+        in_map = points.take(within, axis=0) + position
+        return nearest_obstacle(in_map, position, direction, corridor, self._settings.support, heights_m=heights_m)
+
     def _around(self, sweep: Sweep, pose: Floats, T_base_lidar: Floats, direction: Floats) -> _Around:  # noqa: N803 -- T_target_source
         """Select the returns around the way ahead, by one pose for all; the vehicle's own are left out."""
-        body = self._settings.body
-        usable = sweep.within(0.05, float("inf"))
-        x, y, z = _axes(usable.points, T_base_lidar[:3, :3], T_base_lidar[:3, 3])
-        own = (x * x + y * y <= body.radius_m**2) & (np.abs(z) <= body.half_height_m)
-        axes = np.array([direction, [-direction[1], direction[0], 0.0], [0.0, 0.0, 1.0]]) @ pose[:3, :3]
-        ahead, left, up = _axes(usable.points, axes @ T_base_lidar[:3, :3], axes @ T_base_lidar[:3, 3])
-        flat = ahead * ahead + left * left  # squared, as all that is compared with it: a root of each point costs as much as the rest
-        in_view = (ahead >= 0.0) & (ahead * ahead >= np.cos(np.radians(VIEW_DEG)) ** 2 * flat)
-        towards = in_view & (up * up <= np.tan(np.radians(STEEP_DEG)) ** 2 * flat) & ~own
+        axes = _along(direction) @ pose[:3, :3]
+        by_axis = np.ascontiguousarray(sweep.points.T)
+        seen = _axes(by_axis, axes @ T_base_lidar[:3, :3], axes @ T_base_lidar[:3, 3])
+        ahead, left, up = seen
         length_m = self._settings.corridor.length_m
-        near = (ahead >= -BEHIND_M - BLUR_M) & (ahead <= length_m + BLUR_M) & (np.abs(left) <= ASIDE_M + BLUR_M) & ~own
-        return _Around(near=usable.select(near), ahead=int(np.count_nonzero(towards)))
+        near = (ahead >= -BEHIND_M - BLUR_M) & (ahead <= length_m + BLUR_M) & (np.abs(left) <= ASIDE_M + BLUR_M)
+        towards = (ahead >= 0.0) & (np.abs(left) <= np.tan(np.radians(VIEW_DEG)) * ahead)
+        towards &= (up * up) <= np.tan(np.radians(STEEP_DEG)) ** 2 * (ahead * ahead + left * left)
+        # The lowest that must be seen: the corridor's lower edge at its far end, from where the sensor is.
+        sensor = axes @ T_base_lidar[:3, 3]
+        falls = (self._settings.corridor.half_height_m + sensor[2]) / length_m
+        of_ahead, of_left, of_up = seen.take(self._others(np.flatnonzero(towards), by_axis, T_base_lidar), axis=1)
+        down = of_up - sensor[2] <= -falls * np.hypot(of_ahead - sensor[0], of_left - sensor[1])
+        return _Around(
+            near=sweep.select(self._others(np.flatnonzero(near), by_axis, T_base_lidar)),
+            ahead=_parts_of_view(of_ahead, of_left),
+            down=int(np.count_nonzero(down)),
+        )
+
+    def _others(self, chosen: NDArray[np.intp], by_axis: NDArray[np.float32], T_base_lidar: Floats) -> NDArray[np.intp]:  # noqa: N803
+        """Return which of the chosen points (3, N) are returns, and not the vehicle's own."""
+        body, points = self._settings.body, by_axis.take(chosen, axis=1)
+        x, y, z = _axes(points, T_base_lidar[:3, :3], T_base_lidar[:3, 3])
+        own = (x * x + y * y <= body.radius_m**2) & (np.abs(z) <= body.half_height_m)
+        squared = np.einsum("ij,ij->j", points, points)
+        others: NDArray[np.intp] = chosen[~own & (squared >= NOTHING_M**2) & np.isfinite(squared)]
+        return others
 
 
 def _timed(sweep: Sweep) -> Sweep:
@@ -103,8 +139,24 @@ def _timed(sweep: Sweep) -> Sweep:
 
 @dataclass(frozen=True)
 class _Around:
+    """The returns around the way ahead; how many come from each part of its view, from right to left, (VIEW_PARTS,), and from below it."""
+
     near: Sweep
-    ahead: int
+    ahead: NDArray[np.intp]
+    down: int
+
+
+def _parts_of_view(ahead: NDArray[np.float32], left: NDArray[np.float32]) -> NDArray[np.intp]:
+    part = (np.degrees(np.arctan2(left, ahead)) / VIEW_DEG + 1.0) * (VIEW_PARTS / 2.0)
+    return np.bincount(np.clip(part.astype(np.intp), 0, VIEW_PARTS - 1), minlength=VIEW_PARTS)
+
+
+def _not_seen(ahead: NDArray[np.intp]) -> str:
+    if not ahead.any():
+        return "the LiDAR does not look where the vehicle goes: 0 returns from there"
+    worst = int(np.argmin(ahead))
+    low, high = (VIEW_DEG * (2.0 * part / VIEW_PARTS - 1.0) for part in (worst, worst + 1))
+    return f"the LiDAR does not see all of the way ahead: {ahead[worst]} returns from {low:+g} to {high:+g} degrees (left is positive)"
 
 
 def _towards(direction: Floats, sectors: NDArray[np.bool_]) -> bool:
@@ -117,8 +169,13 @@ def _towards(direction: Floats, sectors: NDArray[np.bool_]) -> bool:
     return bool(np.any(np.abs(aside_deg) <= ASIDE_DEG))
 
 
-def _axes(points: NDArray[np.float32], rotation: Floats, origin: Floats) -> NDArray[np.float32]:
-    """Return the points (N, 3) in another frame, coordinate by coordinate, (3, N)."""
-    seen: NDArray[np.float32] = rotation.astype(np.float32) @ points.T
+def _along(direction: Floats) -> Floats:
+    """Return the axes ahead, to the left and up of a horizontal direction (3,), the rows of (3, 3)."""
+    return np.array([direction, [-direction[1], direction[0], 0.0], [0.0, 0.0, 1.0]])
+
+
+def _axes(by_axis: NDArray[np.float32], rotation: Floats, origin: Floats) -> NDArray[np.float32]:
+    """Return points (3, N), coordinate by coordinate, in another frame."""
+    seen: NDArray[np.float32] = rotation.astype(np.float32) @ by_axis
     seen += origin.astype(np.float32)[:, None]
     return seen

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lidar_obstacles.range_noise import RangeNoise
-from lidar_obstacles.range_steps import RangeSteps
+from lidar_obstacles.range_steps import RangeSteps, Seen
 from perception_core import FINE, NS, FaultKind, Finding, Sweep, broken, unsure
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class CloudJudge:
 
     def __init__(self, limits: CloudLimits) -> None:
         self._limits = limits
-        self._previous: NDArray[np.float32] = np.empty((0, 3), dtype=np.float32)
+        self._previous: NDArray[np.float32] = np.empty((3, 0), dtype=np.float32)
         self._recent: deque[_Sectors] = deque(maxlen=RECENT)
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._blind: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
@@ -79,31 +79,31 @@ class CloudJudge:
 
     def finding(self, sweep: Sweep, *, self_m: float, position_m: Floats | None = None) -> Finding:
         """Return what the sweep tells; returns nearer than ``self_m`` are the vehicle's own. Its position (3,) is None while unknown."""
-        stride = max(1, len(sweep.points) // SAMPLE)
-        sample = sweep.points[::stride]
+        stride = max(1, len(sweep.points) // SAMPLE) | 1  # odd: every second ring, or every 16th, is no sample of a sweep
+        sample = np.ascontiguousarray(sweep.points[::stride].T)
         previous, self._previous = self._previous, sample
-        ranges = np.sqrt(np.einsum("ij,ij->i", sample, sample))
+        ranges = np.sqrt(np.einsum("ij,ij->j", sample, sample))
         returned = ranges > self_m
-        outside = np.flatnonzero(np.isfinite(ranges) & returned)
-        points, outside_m = sample.take(outside, axis=0), ranges.take(outside)
-        sectors = _sectors(sample, ranges, stride, self_m)
+        seen = Seen.of(sample, ranges)
+        outside = seen.select(seen.ranges_m > self_m)
+        sectors = _sectors(seen, stride, self_m)
         if self._left_behind(position_m):
             self._forget()
         before = self._lately()
-        count = len(outside) * stride
+        count = len(outside.ranges_m) * stride
         if count < self._limits.min_returns:
             return self._too_few(count, before, self_m)
-        far = self._far(outside_m)
+        far = self._far(outside.ranges_m)
         if far:
             return broken(FaultKind.RANGE, far)
-        if _frozen(sample, previous, np.flatnonzero(returned)):
+        if _frozen(sample, previous, returned):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
         noise_m = self._noise.risen_m(sweep, self_m=self_m)
         if noise_m:
             self._lost_at_m = position_m if self._lost_at_m is None else self._lost_at_m
             return broken(FaultKind.RANGE, f"the ranges scatter by {noise_m:.2f} m where they are smoothest")
         least_m = NEAR * self_m
-        off_m = self._steps.offset_m(points, outside_m, sweep.stamp_ns, least_m=least_m, position_m=position_m)
+        off_m = self._steps.offset_m(outside, sweep.stamp_ns, least_m=least_m, position_m=position_m)
         if off_m:
             became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
             return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
@@ -186,12 +186,9 @@ class _Sectors:
     near: NDArray[np.bool_]
 
 
-def _sectors(sample: NDArray[np.float32], ranges: NDArray[np.float32], stride: int, self_m: float) -> _Sectors:
-    known = np.flatnonzero(np.isfinite(ranges))
-    points, ranges = sample.take(known, axis=0), ranges.take(known)
-    azimuth = np.arctan2(points[:, 1], points[:, 0])
-    sector = ((azimuth + np.pi) * (SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
-    counts, near = (np.bincount(sector[which], minlength=SECTORS) for which in (ranges > self_m, ranges <= NEAR * self_m))
+def _sectors(seen: Seen, stride: int, self_m: float) -> _Sectors:
+    sector = ((seen.azimuth_rad + np.float32(np.pi)) * np.float32(SECTORS / (2.0 * np.pi))).astype(np.intp) % SECTORS
+    counts, near = (np.bincount(sector[which], minlength=SECTORS) for which in (seen.ranges_m > self_m, seen.ranges_m <= NEAR * self_m))
     return _Sectors(counts.astype(np.float64) * stride, 2 * near > np.bincount(sector, minlength=SECTORS))
 
 
@@ -213,12 +210,12 @@ def _together(gone: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return together
 
 
-def _frozen(now: NDArray[np.float32], before: NDArray[np.float32], returned: NDArray[np.intp]) -> bool:
-    """Return whether nearly all of these points (N, 3) that returned are where they were; the rest of the message may change."""
-    if before.shape != now.shape or not len(returned):
+def _frozen(now: NDArray[np.float32], before: NDArray[np.float32], returned: NDArray[np.bool_]) -> bool:
+    """Return whether nearly all of these points (3, N) that returned are where they were; the rest of the message may change."""
+    if before.shape != now.shape or not returned.any():
         return False
-    x, y, z = (now.take(returned, axis=0) == before.take(returned, axis=0)).T
-    return np.count_nonzero(x & y & z) > FROZEN_SHARE * len(returned)
+    x, y, z = now == before
+    return np.count_nonzero(x & y & z & returned) > FROZEN_SHARE * np.count_nonzero(returned)
 
 
 def _angles(lost: NDArray[np.bool_]) -> str:

@@ -43,40 +43,40 @@ class GroundModel:
         self._near = np.hypot(self._centres[:, 0], self._centres[:, 1]) <= UNDER_VEHICLE_M
         self._seen_at_enu_m: Floats | None = None  # where and how high the ground was last seen near the vehicle
 
-    def heights(self, seen: Floats, points_enu_m: Floats, origin_enu_m: Floats, direction: Floats) -> Floats:
-        """Return the height of each point above the ground below it, (N,) metres; infinite outside of the grid.
+    def heights(self, seen: NDArray[np.floating], wanted: NDArray[np.intp], origin_enu_m: Floats, direction: Floats) -> Floats:
+        """Return the height above the ground of the points with these numbers, metres; infinite outside of the grid.
 
-        ``seen`` (N, 3) are the points' corridor coordinates from ``origin_enu_m``, the vehicle's centre, along ``direction``.
+        ``seen`` (N, 3) are all points' corridor coordinates from ``origin_enu_m``, the vehicle's centre, along ``direction``.
         """
         row, column = (np.floor((seen[:, axis] + below_m) / CELL_M) for axis, below_m in enumerate((BEHIND_M, ASIDE_M)))
-        inside = np.flatnonzero((row >= 0) & (row < self._shape[0]) & (column >= 0) & (column < self._shape[1]))
-        flat = (row * self._shape[1] + column).take(inside).astype(np.intp)
-        up_m = points_enu_m[:, 2].take(inside)
+        inside = (row >= 0) & (row < self._shape[0]) & (column >= 0) & (column < self._shape[1])
+        flat = np.where(inside, row * self._shape[1] + column, -1.0).astype(np.intp)
+        up_m = seen[:, 2] + origin_enu_m[2]
+        known = np.flatnonzero(inside)
         lowest: Floats = np.full(self._shape[0] * self._shape[1], np.inf)
-        np.minimum.at(lowest, flat, up_m)
+        np.minimum.at(lowest, flat.take(known), up_m.take(known))
         lowest = _without_ghosts(lowest, self._shape)
-        ground = self._envelope(lowest)
-        ground = np.minimum(ground, self._remembered(origin_enu_m, direction))
+        of_wanted = flat.take(wanted)
+        cells, cell = np.unique(of_wanted, return_inverse=True)
+        ground = np.minimum(self._envelope(lowest, cells), self._remembered(cells, origin_enu_m, direction))
         self._remember(lowest, origin_enu_m, direction)
-        heights = np.full(len(seen), np.inf)
-        heights[inside] = up_m - ground.take(flat)
-        return heights
+        return np.where(of_wanted < 0, np.inf, up_m.take(wanted) - ground.take(cell))
 
-    def _envelope(self, lowest: Floats) -> Floats:
+    def _envelope(self, lowest: Floats, cells: NDArray[np.intp]) -> Floats:
+        """Return how high the ground of these cells can be by the lowest returns of all, (N,)."""
         seen = np.flatnonzero(np.isfinite(lowest))
-        # The cones are symmetric: those of the cells that were seen are rows, which lie together.
-        cones = self._cones.take(seen, axis=0)
-        cones += lowest.take(seen).astype(np.float32)[:, None]
-        envelope: Floats = np.min(cones, axis=0, initial=np.inf).astype(np.float64)
+        cones = self._cones.take(cells, axis=0).take(seen, axis=1)
+        cones += lowest.take(seen).astype(np.float32)
+        envelope: Floats = np.min(cones, axis=1, initial=np.inf).astype(np.float64)
         return envelope
 
-    def _remembered(self, origin: Floats, direction: Floats) -> Floats:
-        """Return how high the ground can be by what was seen near the vehicle before; at first the ground of the take-off is at 0."""
+    def _remembered(self, cells: NDArray[np.intp], origin: Floats, direction: Floats) -> Floats:
+        """Return how high it can be by what was seen near the vehicle before, (N,); at first the ground of the take-off is at 0."""
         if self._seen_at_enu_m is None:
             self._seen_at_enu_m = np.array([origin[0], origin[1], 0.0])
         offset = self._seen_at_enu_m[:2] - origin[:2]
         at = np.array([offset @ direction[:2], offset @ np.array([-direction[1], direction[0]])])
-        bound: Floats = self._seen_at_enu_m[2] + self._rise * np.hypot(*(self._centres - at).T)
+        bound: Floats = self._seen_at_enu_m[2] + self._rise * np.hypot(*(self._centres.take(cells, axis=0) - at).T)
         return bound
 
     def _remember(self, lowest: Floats, origin: Floats, direction: Floats) -> None:
@@ -91,8 +91,12 @@ class GroundModel:
 def _without_ghosts(lowest: Floats, shape: tuple[int, int]) -> Floats:
     """Raise cells that are far below the middle of their neighbours to that."""
     half = WINDOW // 2
+    seen = np.flatnonzero(np.isfinite(lowest))
     grid = np.pad(np.where(np.isfinite(lowest), lowest, np.nan).reshape(shape), half, constant_values=np.nan)
-    windows = np.sort(np.lib.stride_tricks.sliding_window_view(grid, (WINDOW, WINDOW)).reshape(len(lowest), -1), axis=1)
+    of_all = np.lib.stride_tricks.sliding_window_view(grid, (WINDOW, WINDOW)).reshape(len(lowest), -1)
+    windows = np.sort(of_all.take(seen, axis=0), axis=1)
     count = np.sum(np.isfinite(windows), axis=1)
-    middle = windows[np.arange(len(lowest)), np.maximum(count - 1, 0) // 2]  # NaN is sorted to the end
-    return np.where(lowest < middle - GHOST_M, middle, lowest)
+    middle = windows[np.arange(len(seen)), (count - 1) // 2]  # NaN is sorted to the end
+    raised = lowest.copy()
+    raised[seen] = np.where(lowest[seen] < middle - GHOST_M, middle, lowest[seen])
+    return raised

@@ -12,9 +12,10 @@ from uav_msgs.msg import Obstacle
 
 from lidar_obstacles.ahead import LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge
+from lidar_obstacles.mounting import MountCheck
 from lidar_obstacles.settings import LidarSettings
-from perception_core import Ahead, Finding, Sweep, first_trouble
-from perception_core.clouds import sweep_of_cloud, time_field
+from perception_core import FINE, Ahead, Finding, Sweep, TurnJoiner, first_trouble
+from perception_core.clouds import sweep_of_cloud, time_fields
 from perception_core.ros import (
     DoneReporter,
     EnableSwitch,
@@ -33,9 +34,10 @@ CLOUD_BYTES = 1 << 23
 
 @dataclass(frozen=True)
 class _Item:
-    """A good sweep, its frame, and the sectors that have just lost their returns."""
+    """A good sweep, its message's frame and stamp, and the sectors that have just lost their returns."""
 
     frame: str
+    stamp_ns: int
     sweep: Sweep
     gone: NDArray[np.bool_]
 
@@ -47,6 +49,8 @@ class LidarObstaclesNode:
         self._settings = settings
         self._judge = CloudJudge(settings.cloud)
         self._ahead = LidarAhead(settings.ahead)
+        self._turns = TurnJoiner()
+        self._mounting = MountCheck()
         self._obstacle = rospy.Publisher("~obstacle", Obstacle, queue_size=1, tcp_nodelay=True)
         self._done = DoneReporter()
         self._vehicle = Vehicle()
@@ -71,27 +75,35 @@ class LidarObstaclesNode:
     def _on_cloud(self, message: PointCloud2) -> None:
         stamp_ns = message.header.stamp.to_nsec()
         try:
-            sweep = sweep_of_cloud(message)
+            sweep = self._turns.joined(sweep_of_cloud(message).arrived(rospy.Time.now().to_nsec()))
         except ValueError as error:
             self._on_garbage(str(error))
             self._done.done(stamp_ns)
             return
-        if not time_field(message.fields):
+        if not time_fields(message.fields):
             rospy.logwarn_once("the LiDAR's points have no times: sweeps can't be straightened")
-        finding = self._judged(sweep)
+        finding = self._judged(sweep, message.header.frame_id)
         self._health.take(finding)
         if finding.ok and self._switch.enabled:
-            self._worker.offer(_Item(message.header.frame_id, sweep, self._judge.gone))
+            self._worker.offer(_Item(message.header.frame_id, stamp_ns, sweep, self._judge.gone))
             return
         if not finding.ok:
             self._tell(stamp_ns, Ahead(None, finding.reason))
         self._done.done(stamp_ns)
 
-    def _judged(self, sweep: Sweep) -> Finding:
+    def _judged(self, sweep: Sweep, frame: str) -> Finding:
         # The moment of the last return: a sweep stamped at its beginning is not a tenth of a second old when it comes.
         stamp = self._health.stamp(sweep.end_ns)
-        position_m = self._position_m(sweep.end_ns)
-        return first_trouble(stamp, self._judge.finding(sweep, self_m=self._settings.body_radius_m, position_m=position_m))
+        position_m, self_m = self._position_m(sweep.end_ns), self._settings.body_radius_m
+        content = self._judge.finding(sweep, self_m=self_m, position_m=position_m)
+        return first_trouble(stamp, content, self._mounted(sweep, frame, self_m) if stamp.ok and content.ok else FINE)
+
+    def _mounted(self, sweep: Sweep, frame: str, self_m: float) -> Finding:
+        try:
+            mount = self._vehicle.mount(frame)
+        except LookupError:
+            return FINE
+        return self._mounting.finding(sweep, mount, self._vehicle.poses, self_m=self_m)
 
     def _position_m(self, stamp_ns: int) -> NDArray[np.float64] | None:
         try:
@@ -105,12 +117,12 @@ class LidarObstaclesNode:
         try:
             poses, mount = self._vehicle.poses_at(sweep.end_ns), self._vehicle.mount(item.frame)
             ahead = self._ahead.look(sweep, T_base_lidar=mount, poses=poses, motion=self._vehicle.motion, gone=item.gone)
-            self._tell(sweep.stamp_ns, ahead)
+            self._tell(item.stamp_ns, ahead)
         except LookupError as error:
-            self._tell(sweep.stamp_ns, Ahead(None, str(error)))
+            self._tell(item.stamp_ns, Ahead(None, str(error)))
             raise
         finally:
-            self._done.done(sweep.stamp_ns)
+            self._done.done(item.stamp_ns)
 
     def _tell(self, stamp_ns: int, ahead: Ahead) -> None:
         if self._switch.enabled:

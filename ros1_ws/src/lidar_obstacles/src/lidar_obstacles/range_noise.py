@@ -75,8 +75,10 @@ def range_noise_m(sweep: Sweep, look: int, *, self_m: float) -> float:
 
 def _blocks(count: int, look: int) -> NDArray[np.int64]:
     """Return which of so many points are in the blocks of a look."""
+    if count <= BLOCKS * BLOCK_POINTS:
+        return np.arange(count)
     starts = [int((look * TURN + block / BLOCKS) % 1.0 * count) for block in range(BLOCKS)]
-    return np.unique([(start + np.arange(BLOCK_POINTS)) % count for start in starts]) if count else np.empty(0, dtype=np.int64)
+    return np.concatenate([(start + np.arange(BLOCK_POINTS)) % count for start in starts])
 
 
 def _residuals(directions: Floats, inverse: Floats) -> Floats:

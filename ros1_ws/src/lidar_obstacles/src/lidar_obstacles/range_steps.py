@@ -8,6 +8,7 @@ larger room looks the same.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,11 +19,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
+    Floats32 = NDArray[np.float32]
 
 AROUND, UP = 36, 18  # cells of 10 degrees
 CELL_RETURNS = 5
 CELLS = 8  # that both sweeps have returns in; with fewer nothing is said
 LONGEST_PAUSE_S = 1.0  # after which sweeps aren't compared, and an error that was found is forgotten: the sensor was started again
+TURN_S = 0.11  # so far back a sweep is held against earlier ones: where parts of turns are joined, an error comes in parts, too
 QUARTILES = (25.0, 75.0)
 NEAREST = 10.0  # percent of the cells
 FEW = 1.0  # percent of the returns: specks of dust or rain
@@ -32,43 +35,69 @@ STEP_M = 0.15  # that hovering may make of most ranges, with the vehicle's own t
 OBLIQUE = 1.2  # by which the range along a ray changes faster than the distance of a surface that the ray meets at 56 degrees
 
 
+@dataclass(frozen=True)
+class Seen:
+    """Points by direction around the sensor's z axis and its sine above the others, (N,) each, and by range."""
+
+    azimuth_rad: Floats32
+    sine_up: Floats32
+    ranges_m: Floats32
+
+    @classmethod
+    def of(cls, points: Floats32, ranges_m: Floats32) -> Seen:
+        """Return those of the points (3, N) that are finite."""
+        known = np.isfinite(ranges_m)
+        if not known.all():
+            points, ranges_m = points[:, known], ranges_m[known]
+        x, y, z = points
+        return cls(np.arctan2(y, x), z / np.maximum(ranges_m, np.float32(1e-6)), ranges_m)
+
+    def select(self, mask: NDArray[np.bool_]) -> Seen:
+        """Return only these points."""
+        return self if mask.all() else Seen(self.azimuth_rad[mask], self.sine_up[mask], self.ranges_m[mask])
+
+
 class RangeSteps:
     """Compare sweeps in their order, and remember the error that they began with; not thread-safe."""
 
     def __init__(self, max_speed_m_s: float) -> None:
         self._max_speed_m_s = max_speed_m_s
-        self._before: tuple[int, Floats, Floats | None] | None = None
+        self._before: list[tuple[int, Floats, Floats | None]] = []
         self._offset_m = 0.0
 
     def offset_m(
         self,
-        points: NDArray[np.float32],
-        ranges_m: NDArray[np.float32],
+        seen: Seen,
         stamp_ns: int,
         *,
         least_m: float,
         position_m: Floats | None = None,
     ) -> float:
-        """Return by how much the ranges (N,) of the points (N, 3) are too long; 0 where no step was seen, or it was taken back.
+        """Return by how much the ranges are too long; 0 where no step was seen, or it was taken back.
 
         Where the nearest surfaces are nearer than ``least_m``, as on the ground, the sensor may not see the very nearest, and small motions
         change all ranges along the rays by much: nothing new is found there. By the vehicle's position (3,) where it is known, else by
         its speed at most, ranges may change.
         """
-        now = _mean_ranges(points, ranges_m)
+        now = _mean_ranges(seen)
         if np.count_nonzero(np.isfinite(now)) < CELLS:
             return self._offset_m
-        before, self._before = self._before, (stamp_ns, now, position_m)
-        if before is None or not 0 < stamp_ns - before[0] <= LONGEST_PAUSE_S * NS:
-            self._offset_m = 0.0
+        at_once = (stamp_ns, now, position_m)
+        last_ns = self._before[-1][0] if self._before else stamp_ns
+        if not 0 < stamp_ns - last_ns <= LONGEST_PAUSE_S * NS:
+            self._offset_m, self._before = 0.0, [at_once]
             return 0.0
-        limit_m = OBLIQUE * self._max_speed_m_s * (stamp_ns - before[0]) / NS
-        if position_m is not None and before[2] is not None:
-            limit_m = min(limit_m, OBLIQUE * float(np.linalg.norm(position_m - before[2])) + STEP_M)
-        step_m = _step(before[1], now, most_share=limit_m / LEAST_HEIGHT_M)
-        if abs(step_m) > limit_m and np.percentile(ranges_m, FEW) > least_m:
-            offset_m = self._offset_m + step_m
-            self._offset_m = offset_m if abs(offset_m) > limit_m / 2.0 else 0.0
+        before = [each for each in self._before if each[0] == last_ns or stamp_ns - each[0] <= TURN_S * NS]
+        self._before = [*before, at_once]
+        for then_ns, then, then_m in reversed(before):
+            limit_m = OBLIQUE * self._max_speed_m_s * (stamp_ns - then_ns) / NS
+            if position_m is not None and then_m is not None:
+                limit_m = min(limit_m, OBLIQUE * float(np.linalg.norm(position_m - then_m)) + STEP_M)
+            step_m = _step(then, now, most_share=limit_m / LEAST_HEIGHT_M)
+            if abs(step_m) > limit_m and np.percentile(seen.ranges_m, FEW) > least_m:
+                offset_m = self._offset_m + step_m
+                self._offset_m, self._before = offset_m if abs(offset_m) > limit_m / 2.0 else 0.0, [at_once]
+                break
         return self._offset_m
 
 
@@ -91,11 +120,11 @@ def _step(before_m: Floats, now_m: Floats, *, most_share: float) -> float:
     return step_m if alike or max(low, -high) > most_share else 0.0
 
 
-def _mean_ranges(points: NDArray[np.float32], ranges_m: NDArray[np.float32]) -> Floats:
+def _mean_ranges(seen: Seen) -> Floats:
     """Return the mean range in each cell of directions, (AROUND * UP,), NaN where returns are few."""
-    around = np.arctan2(points[:, 1], points[:, 0]) * np.float32(AROUND / (2.0 * np.pi))
-    up = np.arcsin(np.clip(points[:, 2] / ranges_m, -1.0, 1.0)) * np.float32(UP / np.pi)
+    around = seen.azimuth_rad * np.float32(AROUND / (2.0 * np.pi))
+    up = np.arcsin(np.clip(seen.sine_up, -1.0, 1.0)) * np.float32(UP / np.pi)
     cell = np.floor(around).astype(np.intp) % AROUND * UP + np.clip(np.floor(up + UP / 2), 0, UP - 1).astype(np.intp)
     counts = np.bincount(cell, minlength=AROUND * UP)
-    sums = np.bincount(cell, weights=ranges_m, minlength=AROUND * UP)
+    sums = np.bincount(cell, weights=seen.ranges_m, minlength=AROUND * UP)
     return np.where(counts >= CELL_RETURNS, sums / np.maximum(counts, 1), np.nan)

@@ -37,7 +37,7 @@ class LidarSettings:
     slope_deg: float = tunable(10.0, 0.0, 45.0, "of the steepest ground")
     min_points: int = tunable(3, 1, 1000, "returns within half a metre that are an obstacle")
     cell_m: float = tunable(0.25, 0.05, 2.0, "edge of the corridor's cells")
-    min_ahead: int = tunable(3, 0, 1000, "returns from the direction of the motion, or it is unknown")
+    min_ahead: int = tunable(4, 0, 1000, "returns from each five degrees of the view of the way ahead, or it is unknown")
 
     @property
     def health(self) -> HealthLimits:

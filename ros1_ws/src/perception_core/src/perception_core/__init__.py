@@ -15,6 +15,7 @@ from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
 from perception_core.stamps import StampJudge, StampLimits
 from perception_core.sweep import Sweep, deskew, straighten
 from perception_core.tunable import SettingsError, tunable
+from perception_core.turns import TurnJoiner
 
 __all__ = [
     "FINE",
@@ -35,6 +36,7 @@ __all__ = [
     "StampLimits",
     "Support",
     "Sweep",
+    "TurnJoiner",
     "Verdict",
     "broken",
     "corridor_coordinates",

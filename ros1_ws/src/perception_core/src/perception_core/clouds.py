@@ -4,11 +4,13 @@ Times of the points, as the drivers of these makers name and count them (each is
 
 - Velodyne: ``time``, float32 seconds from the stamp, often negative; Ouster: ``t``, uint32 nanoseconds from the first;
 - Livox: ``offset_time``, uint32 nanoseconds from the first, or ``timestamp``, float64 nanoseconds since 1970;
-- Hesai and RoboSense: ``timestamp``, float64 seconds since 1970; Luminar: ``time_sec`` and ``time_nsec`` since 1970.
+- Hesai and RoboSense: ``timestamp``, float64 seconds since 1970; Aeva: ``time_offset_ns``, int32; Luminar: ``time_sec`` and ``time_nsec``
+  since 1970. Other drivers' names are known by what they contain: ``time``, ``stamp``, or seconds and nanoseconds apart.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -24,10 +26,14 @@ if TYPE_CHECKING:
 
 # sensor_msgs/PointField
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-TIME_NAMES = ("time", "t", "timestamp", "offset_time", "time_stamp", "time_offset", "timeOffset", "point_time")
+TIME_NAMES = ("time", "t", "timestamp")  # in this order, before any other name of a time
+OTHER_TIME = re.compile(r".*(time|stamp).*|ts|dt", re.IGNORECASE)
+SECONDS = re.compile(r"(.*?)_?s(ec(ond)?s?)?", re.IGNORECASE)
+NANOSECONDS = re.compile(r"(.*?)_?(ns|n(ano)?sec(ond)?s?)", re.IGNORECASE)
 UNITS_S = (1.0, 1e-3, 1e-6, 1e-9)
 SHORTEST_SWEEP_S, LONGEST_SWEEP_S = 0.005, 1.0
 ABSOLUTE_FROM_S = 60.0  # less is counted from the sweep, not from 1970 or from the clock's start
+COUNTER_BYTES, COUNTER = 4, 2.0**32
 MAX_POINTS = 10_000_000
 
 
@@ -98,15 +104,19 @@ def sweep_of_cloud(message: CloudLike) -> Sweep:
     points = np.empty((message.width * message.height, 3), dtype=np.float32)
     for axis, name in enumerate("xyz"):
         points[:, axis] = table.column(name)
-    return Sweep(stamp_ns=stamp_ns, points=points, times_s=_times_s(table, stamp_ns))
+    return Sweep(stamp_ns=stamp_ns, points=points, times_s=_times_s(table, points, stamp_ns))
 
 
-def time_field(fields: Sequence[FieldLike]) -> str:
-    """Return the name of the field that tells each point's time, or an empty text."""
+def time_fields(fields: Sequence[FieldLike]) -> tuple[str, ...]:
+    """Return the names of the fields that tell each point's time: one, or that of the seconds and that of the nanoseconds, or none."""
     names = [field.name for field in fields if field.datatype in DATATYPES]
-    if {"time_sec", "time_nsec"} <= set(names):
-        return "time_sec"
-    return next((name for name in TIME_NAMES if name in names), "")
+    for name in names:
+        nano = NANOSECONDS.fullmatch(name)
+        whole = [each for each in names if nano and (found := SECONDS.fullmatch(each)) and found[1] == nano[1] and each != name]
+        if whole:
+            return whole[0], name
+    known = [name for name in TIME_NAMES if name in names] + [name for name in names if OTHER_TIME.fullmatch(name)]
+    return tuple(known[:1])
 
 
 def _row_step(message: CloudLike) -> int:
@@ -124,40 +134,61 @@ def _check_size(message: CloudLike) -> None:
         raise ValueError(f"{len(message.data)} bytes for {count} points of {message.point_step}")
 
 
-def _times_s(table: _Table, stamp_ns: int) -> NDArray[np.float32]:
-    name = time_field(table.message.fields)
-    if not name:
-        return np.zeros(table.message.width * table.message.height, dtype=np.float32)
-    if name == "time_sec":
-        seconds = table.column("time_sec").astype(np.int64) - stamp_ns // NS
-        return _checked(seconds + table.column("time_nsec") / NS - stamp_ns % NS / NS, name)
-    raw = table.column(name)
-    known = raw[np.isfinite(raw) & np.any([table.column(axis) != 0 for axis in "xyz"], axis=0)]
-    if not len(known):
+def _times_s(table: _Table, points: NDArray[np.float32], stamp_ns: int) -> NDArray[np.float32]:
+    names = time_fields(table.message.fields)
+    if not names:
+        return np.zeros(len(points), dtype=np.float32)
+    if len(names) > 1:
+        seconds = table.column(names[0]).astype(np.int64) - stamp_ns // NS
+        return _checked(seconds + table.column(names[1]) / NS - stamp_ns % NS / NS, points, names[0])
+    name, raw = names[0], table.column(names[0])
+    kind, counter = raw.dtype.kind, raw.dtype.kind == "u" and raw.dtype.itemsize == COUNTER_BYTES
+    raw = raw.astype(np.float64)
+    first, last = _span(raw, points)
+    if np.isnan(first):
         return np.full(len(raw), np.nan, dtype=np.float32)
-    first, last = float(known.min()), float(known.max())
     for unit in UNITS_S:
         if first * unit > ABSOLUTE_FROM_S and abs(first * unit - stamp_ns / NS) < LONGEST_SWEEP_S:
-            return _checked((raw - stamp_ns / NS / unit) * unit, name)
-    unit = _unit_s(last - first, raw.dtype)
+            return _checked((raw - stamp_ns / NS / unit) * unit, points, name)
+    if counter and last - first > COUNTER / 2:
+        # A counter of nanoseconds in 32 bits overflows every 4.3 s, in this sweep, too: what is small comes after what is large.
+        raw = np.where(raw < COUNTER / 2, raw + COUNTER, raw)
+        first, last = _span(raw, points)
+    unit = _unit_s(last - first, kind)
     # A clock that has nothing to do with the stamp's (seconds since the sensor was switched on): the stamp is the first point's.
     origin = first if abs(first) * unit > LONGEST_SWEEP_S else 0.0
-    return _checked((raw - raw.dtype.type(origin)) * unit, name)
+    return _checked((raw - origin) * unit, points, name)
 
 
-def _unit_s(span: float, dtype: np.dtype[np.float64]) -> float:
+def _span(raw: NDArray[np.float64], points: NDArray[np.float32]) -> tuple[float, float]:
+    """Return the first and the last time of the returns; NaN where none has one. Points without a return often have no time, or 0."""
+    first, last = float(raw.min()), float(raw.max())
+    if np.isfinite(first) and np.isfinite(last) and first:
+        return first, last
+    known = raw[np.isfinite(raw) & _returned(points)]
+    return (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+
+
+def _returned(points: NDArray[np.float32]) -> NDArray[np.bool_]:
+    x, y, z = points.T
+    returned: NDArray[np.bool_] = (x != 0.0) | (y != 0.0) | (z != 0.0)
+    return returned
+
+
+def _unit_s(span: float, kind: str) -> float:
     """Return the unit in which the span is that of a sweep; where several or none fit, floats are seconds and integers nanoseconds."""
-    usual = 1.0 if dtype.kind == "f" else 1e-9
+    usual = 1.0 if kind == "f" else 1e-9
     fitting = [unit for unit in UNITS_S if SHORTEST_SWEEP_S <= span * unit <= LONGEST_SWEEP_S]
     return usual if usual in fitting or not fitting else fitting[0]
 
 
-def _checked(times_s: NDArray[np.float64], name: str) -> NDArray[np.float32]:
-    finite = times_s[np.isfinite(times_s)]
-    if len(finite) and np.ptp(finite) > LONGEST_SWEEP_S:
-        # Points without a return often have no time either: let the bulk decide.
-        low, high = np.percentile(finite, (1.0, 99.0))
+def _checked(times_s: NDArray[np.float64], points: NDArray[np.float32], name: str) -> NDArray[np.float32]:
+    first, last = float(times_s.min()), float(times_s.max())
+    if not last - first <= LONGEST_SWEEP_S:  # also where one is no number
+        of_returns = times_s[np.isfinite(times_s) & _returned(points)]
+        # Points without a return often have no time either; of the others, the bulk decides.
+        low, high = np.percentile(of_returns, (1.0, 99.0)) if len(of_returns) else (0.0, 0.0)
         if high - low > LONGEST_SWEEP_S:
-            raise ValueError(f"the times of the points ({name}) spread over {np.ptp(finite):.3g} s: no sweep takes as long")
+            raise ValueError(f"the times of the points ({name}) spread over {np.ptp(of_returns):.3g} s: no sweep takes as long")
         times_s = np.where((times_s >= low - LONGEST_SWEEP_S) & (times_s <= high + LONGEST_SWEEP_S), times_s, np.nan)
     return times_s.astype(np.float32)

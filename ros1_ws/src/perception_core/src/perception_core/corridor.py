@@ -29,16 +29,19 @@ class Corridor:
     near_m: float = 0.3
     floor_m: float = 0.2
 
-    def contains(self, seen: NDArray[np.float64], height_m: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return which points (N, 3: metres ahead, left, above; and their height over the ground, (N,)) are in the corridor."""
+    def surrounds(self, seen: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """Return which points (N, 3: metres ahead, left, above) are in the corridor, or in the ground that it cuts."""
         inside: NDArray[np.bool_] = (
             (np.abs(seen[:, 1]) <= self.half_width_m)
             & (np.abs(seen[:, 2]) <= self.half_height_m)
             & (seen[:, 0] >= self.near_m)
             & (seen[:, 0] <= self.length_m)
-            & (height_m >= self.floor_m)
         )
         return inside
+
+    def contains(self, seen: NDArray[np.float64], height_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which points (N, 3: metres ahead, left, above; and their height over the ground, (N,)) are in the corridor."""
+        return self.surrounds(seen) & (height_m >= self.floor_m)
 
 
 @dataclass(frozen=True)

@@ -197,10 +197,13 @@ class FakeFlight:
         Image(header=header, height=height, width=width, encoding="mono8", step=width, data=image.tobytes()).serialize(buffer)
         send_raw(self._images[side], framed(buffer.getvalue()[:-100]))
 
-    def publish_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
-        """Publish one cloud of the LiDAR, whose frame is base_link's moved up by 0.1 m."""
+    def publish_cloud(self, stamp_ns: int, points: NDArray[np.float32], times_s: NDArray[np.float32] | None = None) -> None:
+        """Publish one cloud of the LiDAR, whose frame is base_link's moved up by 0.1 m; with the points' times since the stamp, if any."""
         self._measured = True
-        self._cloud.publish(cloud_message(Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="lidar"), points))
+        message = cloud_message(Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="lidar"), points, times_s)
+        if times_s is not None:
+            message.fields[-1].name = "time"
+        self._cloud.publish(message)
 
     def publish_cut_cloud(self, stamp_ns: int, points: NDArray[np.float32]) -> None:
         """Send a cloud whose last bytes are missing, as a message of its own that is complete as far as its length says."""

@@ -1,0 +1,83 @@
+"""Parts of a turn are joined; what lost sectors is not taken for a part."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from perception_core import NS, Sweep, TurnJoiner
+
+
+def arc(first_deg, last_deg, k, *, period_s, count=9000) -> Sweep:
+    """Return the k-th message of a sensor at 10 m from a wall all around, the returns between two angles in its frame."""
+    azimuth = np.radians(np.linspace(first_deg, last_deg, count, endpoint=False))
+    points = 10.0 * np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(count)])
+    return Sweep(NS + int(k * period_s * NS), points.astype(np.float32), np.linspace(0.0, period_s, count, dtype=np.float32))
+
+
+@pytest.mark.parametrize("parts", [2, 3, 6])
+def test_parts_are_joined_to_whole_turns_in_the_order_of_time(parts) -> None:
+    joiner, width, period_s = TurnJoiner(), 360.0 / parts, 0.1 / parts
+    for k in range(4 * parts):
+        part = arc(k % parts * width - 180.0, (k % parts + 1) * width - 180.0, k, period_s=period_s)
+        turn = joiner.joined(part)
+        if k >= parts - 1:
+            assert len(turn.points) == parts * len(part.points)
+            assert (turn.stamp_ns, turn.end_ns) == (part.stamp_ns, part.end_ns)
+            assert np.all(np.diff(turn.times_s) > -1e-6)
+            assert float(turn.times_s[0]) == pytest.approx(period_s - 0.1, abs=1e-6)
+
+
+@pytest.mark.parametrize(("first_deg", "last_deg"), [(-180.0, 180.0), (-35.0, 35.0), (-135.0, 135.0)])
+def test_sweeps_that_look_the_same_way_are_not_joined(first_deg, last_deg) -> None:
+    joiner = TurnJoiner()
+    for k in range(4):
+        sweep = arc(first_deg + 9.0 * k, last_deg + 9.0 * k, k, period_s=0.1)
+        assert joiner.joined(sweep) is sweep
+
+
+@pytest.mark.parametrize(("before_deg", "left_deg"), [(360.0, 180.0), (360.0, 60.0), (360.0, 30.0), (180.0, 60.0)])
+def test_what_is_left_of_a_sweep_that_lost_sectors_is_no_part(before_deg, left_deg) -> None:
+    joiner = TurnJoiner()
+    for k in range(3):
+        joiner.joined(arc(-before_deg / 2.0, before_deg / 2.0, k, period_s=0.1))
+    for k in range(3, 6):
+        rest = arc(-left_deg / 2.0, left_deg / 2.0, k, period_s=0.1)
+        assert joiner.joined(rest) is rest
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_few_points_of_a_sweep_that_was_thinned_are_no_part(seed) -> None:
+    joiner, rng = TurnJoiner(), np.random.default_rng(seed)
+    joiner.joined(arc(-180.0, 180.0, 0, period_s=0.1))
+    whole = arc(-180.0, 180.0, 1, period_s=0.1)
+    thin = whole.select(np.sort(rng.choice(len(whole.points), 60, replace=False)))
+    assert joiner.joined(thin) is thin
+
+
+def test_what_is_left_of_a_half_turn_is_not_filled_up_by_the_half_before() -> None:
+    joiner = TurnJoiner()
+    for k in range(4):
+        joiner.joined(arc(k % 2 * 180.0, k % 2 * 180.0 + 180.0, k, period_s=0.05))
+    rest = arc(60.0, 100.0, 4, period_s=0.05, count=20)
+    assert len(joiner.joined(rest).points) == 9000 + 20  # the other half only
+
+
+def test_halves_of_another_time_are_not_joined() -> None:
+    joiner = TurnJoiner()
+    joiner.joined(arc(0.0, 180.0, 0, period_s=0.05))
+    late = arc(180.0, 360.0, 10, period_s=0.05)
+    assert joiner.joined(late) is late
+    back = arc(0.0, 180.0, 9, period_s=0.05)  # a clock that goes back
+    assert joiner.joined(back) is back
+    nothing = Sweep(NS, np.full((100, 3), np.nan, np.float32), np.zeros(100, np.float32))
+    assert joiner.joined(nothing) is nothing
+
+
+def test_a_sweep_whose_stamp_is_its_end_was_measured_before_it_came() -> None:
+    sweep = arc(-180.0, 180.0, 0, period_s=0.2)
+    assert sweep.arrived(sweep.end_ns) is sweep
+    assert sweep.arrived(sweep.end_ns - NS // 50) is sweep  # the clock of the node is a tick behind
+    assert sweep.arrived(NS - 1) is sweep  # a stamp of the future is a fault
+    for now_ns in (NS, NS + NS // 50):
+        assert abs(sweep.arrived(now_ns).end_ns - NS) < 1000
