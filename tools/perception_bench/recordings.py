@@ -28,6 +28,7 @@ from perception_core import (
     PoseBuffer,
     StampJudge,
     Sweep,
+    SweepStamps,
     TurnJoiner,
     Verdict,
     first_trouble,
@@ -175,15 +176,15 @@ class Scanner:
         """Begin as a node does."""
         settings = self._settings
         self._judge, self._ahead, self._stamps = CloudJudge(settings.cloud), LidarAhead(settings.ahead), StampJudge(settings.stamps)
-        self._turns, self._mounting = TurnJoiner(), MountCheck()
+        self._sweep_stamps, self._turns, self._mounting = SweepStamps(), TurnJoiner(), MountCheck()
         self._rng = np.random.default_rng(0)
 
     def take(self, k: int, mode: SensorMode, last_good: int, *, look: bool) -> tuple[Finding, str]:
         """Return the finding of a sweep, and what it says."""
         recording, given = self._recording, self._recording.sweeps[k]
         sweep = _broken_sweep(mode, recording.sweeps[last_good if mode in REPEATED else k], self._rng)
-        sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0)).arrived(given.end_ns)
-        sweep = self._turns.joined(sweep)
+        sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0))
+        sweep = self._turns.joined(self._sweep_stamps.begun(sweep, given.end_ns))
         stamp = self._stamps.finding(sweep.end_ns, given.end_ns)
         position_m, self_m = self._position_m(sweep.end_ns), self._settings.body_radius_m
         motion, mount = recording.motion(sweep.end_ns), recording.mounts["lidar"]

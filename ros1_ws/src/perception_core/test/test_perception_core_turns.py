@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from perception_core import NS, Sweep, TurnJoiner
+from perception_core import NS, Sweep, SweepStamps, TurnJoiner
 
 
 def arc(first_deg, last_deg, k, *, period_s, count=9000) -> Sweep:
@@ -74,10 +74,28 @@ def test_halves_of_another_time_are_not_joined() -> None:
     assert joiner.joined(nothing) is nothing
 
 
-def test_a_sweep_whose_stamp_is_its_end_was_measured_before_it_came() -> None:
-    sweep = arc(-180.0, 180.0, 0, period_s=0.2)
-    assert sweep.arrived(sweep.end_ns) is sweep
-    assert sweep.arrived(sweep.end_ns - NS // 50) is sweep  # the clock of the node is a tick behind
-    assert sweep.arrived(NS - 1) is sweep  # a stamp of the future is a fault
-    for now_ns in (NS, NS + NS // 50):
-        assert abs(sweep.arrived(now_ns).end_ns - NS) < 1000
+def test_a_driver_that_stamps_the_end_of_its_sweeps_is_known_by_three_of_them() -> None:
+    stamps = SweepStamps()
+    for k in range(6):
+        sweep = arc(-180.0, 180.0, k, period_s=0.2)
+        begun = stamps.begun(sweep, sweep.stamp_ns + NS // 50)
+        if k < 2:
+            assert begun is sweep
+        else:
+            assert abs(begun.end_ns - sweep.stamp_ns) < 1000
+            assert begun.end_ns - begun.stamp_ns == sweep.end_ns - sweep.stamp_ns
+
+
+@pytest.mark.parametrize("came_s", [0.2, 0.18, -0.01])
+def test_sweeps_that_come_at_their_end_and_stamps_of_the_future_are_left_alone(came_s) -> None:
+    stamps = SweepStamps()
+    for k in range(6):
+        sweep = arc(-180.0, 180.0, k, period_s=0.2)
+        assert stamps.begun(sweep, sweep.stamp_ns + int(came_s * NS)) is sweep
+
+
+def test_a_clock_that_is_late_for_a_moment_moves_no_sweep() -> None:
+    stamps = SweepStamps()
+    for k in range(9):
+        sweep = arc(-180.0, 180.0, k, period_s=0.2)
+        assert stamps.begun(sweep, sweep.stamp_ns + int((0.2 if k % 3 else 0.05) * NS)) is sweep

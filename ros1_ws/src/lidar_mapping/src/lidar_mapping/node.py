@@ -22,7 +22,7 @@ from lidar_mapping.readings import ReadingQueue
 from lidar_mapping.settings import MappingSettings
 from lidar_mapping.slam import Slam
 from lidar_mapping.standing import StandingGyro
-from perception_core import NS, Sweep
+from perception_core import NS, Sweep, SweepStamps
 from perception_core.ros import (
     DoneReporter,
     EnableSwitch,
@@ -72,7 +72,8 @@ class LidarMappingNode:
         self._reporter = ResourceReporter("mapping")
         self._done = DoneReporter()
         self._vehicle = Vehicle()
-        self._worker = NewestWorker[tuple[str, Sweep]](self._process)
+        self._stamps = SweepStamps()
+        self._worker = NewestWorker[tuple[str, int, Sweep]](self._process)
         self._switch = EnableSwitch(enabled=settings.enabled, on_change=self._on_switch)
         self._save_service = ToldService("~save", Trigger, self._on_save)
         self._timers = [
@@ -101,7 +102,8 @@ class LidarMappingNode:
 
     def _offered(self, message: PointCloud2) -> bool:
         try:
-            self._worker.offer((message.header.frame_id, sweep_of_cloud(message)))
+            sweep = self._stamps.begun(sweep_of_cloud(message), rospy.Time.now().to_nsec())
+            self._worker.offer((message.header.frame_id, message.header.stamp.to_nsec(), sweep))
         except ValueError as error:
             self._on_garbage(str(error))
             return False
@@ -111,11 +113,12 @@ class LidarMappingNode:
     def _on_garbage(reason: str) -> None:
         rospy.logwarn_throttle(2.0, f"left out: {reason}")
 
-    def _process(self, item: tuple[str, Sweep]) -> None:
+    def _process(self, item: tuple[str, int, Sweep]) -> None:
+        frame, stamp_ns, sweep = item
         try:
-            self._register(*item)
+            self._register(frame, sweep)
         finally:
-            self._done.done(item[1].stamp_ns)
+            self._done.done(stamp_ns)
 
     def _on_imu(self, message: Imu) -> None:
         rates, force = message.angular_velocity, message.linear_acceleration

@@ -14,7 +14,7 @@ from lidar_obstacles.ahead import LidarAhead
 from lidar_obstacles.cloud_health import CloudJudge
 from lidar_obstacles.mounting import MountCheck
 from lidar_obstacles.settings import LidarSettings
-from perception_core import FINE, Ahead, Finding, Sweep, TurnJoiner, first_trouble
+from perception_core import FINE, Ahead, Finding, Sweep, SweepStamps, TurnJoiner, first_trouble
 from perception_core.clouds import sweep_of_cloud, time_fields
 from perception_core.ros import (
     DoneReporter,
@@ -49,7 +49,7 @@ class LidarObstaclesNode:
         self._settings = settings
         self._judge = CloudJudge(settings.cloud)
         self._ahead = LidarAhead(settings.ahead)
-        self._turns = TurnJoiner()
+        self._stamps, self._turns = SweepStamps(), TurnJoiner()
         self._mounting = MountCheck()
         self._obstacle = rospy.Publisher("~obstacle", Obstacle, queue_size=1, tcp_nodelay=True)
         self._done = DoneReporter()
@@ -75,7 +75,7 @@ class LidarObstaclesNode:
     def _on_cloud(self, message: PointCloud2) -> None:
         stamp_ns = message.header.stamp.to_nsec()
         try:
-            sweep = self._turns.joined(sweep_of_cloud(message).arrived(rospy.Time.now().to_nsec()))
+            sweep = self._turns.joined(self._stamps.begun(sweep_of_cloud(message), rospy.Time.now().to_nsec()))
         except ValueError as error:
             self._on_garbage(str(error))
             self._done.done(stamp_ns)

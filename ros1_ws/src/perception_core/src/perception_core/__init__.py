@@ -13,7 +13,7 @@ from perception_core.corridor import (
 from perception_core.health import FINE, FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken, first_trouble, unsure
 from perception_core.poses import NS, PoseBuffer, Poses, PoseUnavailableError
 from perception_core.stamps import StampJudge, StampLimits
-from perception_core.sweep import Sweep, deskew, straighten
+from perception_core.sweep import Sweep, SweepStamps, deskew, straighten
 from perception_core.tunable import SettingsError, tunable
 from perception_core.turns import TurnJoiner
 
@@ -36,6 +36,7 @@ __all__ = [
     "StampLimits",
     "Support",
     "Sweep",
+    "SweepStamps",
     "TurnJoiner",
     "Verdict",
     "broken",

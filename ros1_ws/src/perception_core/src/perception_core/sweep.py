@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 Real = TypeVar("Real", np.float32, np.float64)
 
 KNOT_S = 0.01
+END_STAMPS = 3  # sweeps in a row
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,6 @@ class Sweep:
             last_s = float(known.max()) if len(known) else 0.0
         return self.stamp_ns + int(last_s * NS)
 
-    def arrived(self, now_ns: int) -> Sweep:
-        """Return the sweep as measured before it arrived: some drivers stamp its end, and count the times from its beginning."""
-        lasts_ns = self.end_ns - self.stamp_ns
-        if self.stamp_ns > now_ns or self.end_ns - now_ns <= lasts_ns // 2:
-            return self
-        return Sweep(stamp_ns=self.stamp_ns - lasts_ns, points=self.points, times_s=self.times_s)
-
     def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> Sweep:
         """Return the sweep with only these points."""
         if mask.dtype == np.bool_ and mask.all():
@@ -62,6 +56,23 @@ class Sweep:
         """Return the sweep without points nearer, farther, or not finite; their times go with them, and points without a time go, too."""
         squared = np.einsum("ij,ij->i", self.points, self.points)
         return self.select((squared >= min_range_m**2) & (squared <= max_range_m**2) & np.isfinite(squared) & np.isfinite(self.times_s))
+
+
+class SweepStamps:
+    """Know a driver that stamps the end of its sweeps and counts the points' times from the beginning; not thread-safe.
+
+    By its stamps each sweep would end after it has arrived. One that does is no proof: a busy machine may tell a node the time late.
+    """
+
+    def __init__(self) -> None:
+        self._after_arrival = 0
+
+    def begun(self, sweep: Sweep, now_ns: int) -> Sweep:
+        """Return a sweep, which has just arrived, stamped with its beginning."""
+        lasts_ns = sweep.end_ns - sweep.stamp_ns
+        ends_later = sweep.stamp_ns <= now_ns < sweep.end_ns - lasts_ns // 2
+        self._after_arrival = self._after_arrival + 1 if ends_later else 0
+        return replace(sweep, stamp_ns=sweep.stamp_ns - lasts_ns) if self._after_arrival >= END_STAMPS else sweep
 
 
 def deskew(sweep: Sweep, poses: PoseBuffer, T_base_sensor: Floats, origin_m: Floats) -> Floats32:  # noqa: N803 -- T_target_source
