@@ -146,6 +146,16 @@ def test_a_failure_in_a_pause_is_told_with_what_was_done_when_the_mission_went_o
     assert page.complaints() == []
 
 
+def test_a_vehicle_that_crashed_is_not_told_as_landed(browser: Any, tmp_path: Path) -> None:
+    crashed = {"outcome": "given_up", "reason": "", "landed": False, "crash": "it met the ground at 7.0 m/s", "collisions": 1}
+    page = Page(browser, make_story_report(tmp_path, lost_video(), crashed))
+    page.wait(DRAWN)
+    assert page.run(ANSWERS)[1].split(" | ")[2] == "mission given up; crashed"
+    assert "57.00 sCrashed: it met the ground at 7.0 m/s." in page.text("#lines li")
+    assert "no, it crashed: it met the ground at 7.0 m/s" in page.text("#figures-row")
+    assert page.complaints() == []
+
+
 def test_what_follows_from_one_failure_is_one_row_with_what_the_autopilot_did(browser: Any, tmp_path: Path) -> None:
     page = Page(browser, make_story_report(tmp_path, lost_video(), {"outcome": "given_up", "reason": "", "landed": True, "collisions": 0}))
     page.wait(DRAWN)

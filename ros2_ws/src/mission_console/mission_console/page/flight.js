@@ -18,6 +18,11 @@ function places(run) {
   return { home, landed: at(landing(run)) };
 }
 
+/** How the vehicle came to the ground, as a word for it: what met the ground too fast, leaning, or something else has not landed. */
+function cameDown(run) {
+  return run.facts["/summary"]?.crash ? "crashed" : "landed";
+}
+
 /** Where the vehicle landed, as "12.0 m east, 0.0 m north of home, at waypoint 3"; empty where the record does not tell. */
 function landedWhere(run) {
   const { home, landed } = places(run);

@@ -42,7 +42,8 @@ function keyFigures(run) {
     if (value !== null && value !== undefined) figures.push([label, typeof value === "number" ? `${fixed(value, digits)}${unit ? ` ${unit}` : ""}` : value]);
   };
   const landed = summary.landed ?? (landing(run) === null ? null : true);
-  add("landed", landed ? landedWhere(run) || "yes" : landed === false ? "no" : null);
+  const crash = summary.crash && ["no, it crashed", landedWhere(run), summary.crash].filter(Boolean).join(": ");
+  add("landed", crash || (landed ? landedWhere(run) || "yes" : landed === false ? "no" : null));
   add("in the air", summary.duration_s, "s");
   add("flown", summary.distance_m, "m");
   const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
@@ -288,7 +289,9 @@ function story(run) {
   for (const { name, when_s: when, how } of run.facts["/summary"]?.died ?? []) say(when === null ? run.begin : zero + when, `The process ${name} died: ${how}.`, "bad");
   const landed = landing(run);
   const where = landedWhere(run);
-  if (landed !== null) say(landed, `Landed${where && `, ${where}`}.`);
+  const crash = run.facts["/summary"]?.crash;
+  if (landed !== null && crash) say(landed, `Crashed${where && `, ${where}`}: ${crash}.`, "bad");
+  else if (landed !== null) say(landed, `Landed${where && `, ${where}`}.`);
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
   return lines.sort((one, other) => one.t - other.t);
@@ -385,8 +388,9 @@ function started(run, from, to) {
 function wholeDone(run) {
   const outcome = run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome;
   if (!outcome || outcome === "running") return "";
-  const on = run.facts["/summary"]?.landed;
-  return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), on === true ? "landed" : on === false ? "not landed" : ""].filter(Boolean).join("; ");
+  const { landed: on, crash } = run.facts["/summary"] ?? {};
+  const down = crash ? "crashed" : on === true ? "landed" : on === false ? "not landed" : "";
+  return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), down].filter(Boolean).join("; ");
 }
 
 /** What the whole mission lost, a sentence each. */
