@@ -16,38 +16,24 @@ import cv2
 import numpy as np
 
 from perception_core import FINE, FaultKind, Finding, broken, unsure
-from zed_depth.depth_scale import Landmarks, followed
-from zed_depth.stereo import MatcherSettings, coarse_disparity, noise_level
+from zed_depth.covered_lens import covered_finding
+from zed_depth.depth_scale import Landmarks
+from zed_depth.features import Matches, brighter, features_of, match, match_by_disparity, refine
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     Gray = NDArray[np.uint8]
     Floats = NDArray[np.float64]
 
-FEATURES = 400
-FAST_THRESHOLDS = ((60, 300), (25, 120), (7, 0))  # contrast of the corners, and how many are enough not to look for fainter ones
-ABOVE_NOISE = 2.5  # deviations of the noise: fainter corners are made by it, and match by chance
 FEW_FEATURES = 60
 ENOUGH_FEATURES = 120
 ENOUGH_MATCHES = 20
 AGREE_PX = 2.0
 FIRST_GUESS_SHARE = 0.03  # of the height: by as much the rows of a camera that is off may differ over the image
 FITS = 4
-ROUND_TRIP_PX = 0.7  # by which a feature that is followed to the other image and back may miss its place
-REFINED_PX = (2.0, 1.0)  # along and across the row: by how much the place of a match may change when it is refined
 EDGE_PX = 9
-TILES = (8, 20)  # rows and columns in which both images are compared for a lens that is partly covered,
-TILE_CELLS = 5  # each cut into 5 x 5 averages, which have a third of the pixels' noise or less
-CONTENT, NO_CONTENT = 6.0, 2.0  # grey levels, deviation within a tile
-REACH = 0.2  # of the width: the farthest that content is looked for
-COVERED = 0.08  # of the tiles, without content where the other image has some
-OTHER_LIGHT, OTHER_LIGHT_SHARE = 20.0, 0.2  # grey levels and share of the light by which a tile may differ from the other image's
-WHITE = 245.0  # grey levels: what is as bright may be brighter
 LIGHT_PX = 15  # around a feature: how bright both images are there
-COVERED_LIGHT = 0.04  # of the tiles, as bright as nothing there; good pairs have 0.006
 STRONGEST = 99.5  # percentile of the gradient: the edges that are looked at
 
 
@@ -61,22 +47,6 @@ class ViewLimits:
     max_negative: float = 0.5
     min_parallax_px: float = 0.5
     max_edge_px: float = 6.0
-
-
-@dataclass(frozen=True)
-class Matches:
-    """Matched features: places in the left image (N, 2), and how much lower (N,) and more to the left (N,) they are in the right one."""
-
-    count_left: int
-    count_right: int
-    places: Floats
-    vertical_px: Floats
-    disparity_px: Floats
-
-    @property
-    def fewest(self) -> int:
-        """How many features the image with fewer of them has."""
-        return min(self.count_left, self.count_right)
 
 
 @dataclass(frozen=True)
@@ -96,7 +66,7 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
     if np.array_equal(left, right):
         return View(broken(FaultKind.VIEW, "both cameras deliver the same image"))
     first_guess_px = FIRST_GUESS_SHARE * left.shape[0]
-    features = _features(left), _features(right)
+    features = features_of(left), features_of(right)
     matches = match(*features)
     fit = fit_rows(matches, first_guess_px)
     trouble = _scene_finding(matches, fit, limits)
@@ -109,12 +79,12 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
         return View(trouble)
     gain = _gain(left, right, matches, fit.agree)
     # A feature is followed by its light: as bright as in the left image.
-    sure = refine(left, _brighter(right, 1.0 / gain), matches, fit.agree)
+    sure = refine(left, brighter(right, 1.0 / gain), matches, fit.agree)
     if len(sure.vertical_px) >= ENOUGH_MATCHES:
         fit = replace(fit_rows(sure, first_guess_px), agree=fit.agree)
     # A lens that is partly covered leaves few features, which may seem to be turned: it is looked for first.
     trouble = (
-        _covered_finding(left, right, offset_px, gain)
+        covered_finding(left, right, offset_px, gain)
         or _rows_finding(fit, left.shape, limits)
         or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
     )
@@ -131,69 +101,6 @@ def _scene_finding(matches: Matches, fit: RowFit, limits: ViewLimits) -> Finding
             return unsure(FaultKind.VIEW, f"too little texture to judge the cameras: {told}")
         return broken(FaultKind.VIEW, f"the cameras do not see the same scene: {told}")
     return None
-
-
-@dataclass(frozen=True)
-class Features:
-    """Corners of an image, and their descriptors, (N, 32) or None."""
-
-    keys: Sequence[cv2.KeyPoint]
-    words: Gray | None
-
-    @property
-    def places(self) -> Floats:
-        """Columns and rows, (N, 2)."""
-        return np.array([key.pt for key in self.keys], dtype=np.float64).reshape(-1, 2)
-
-
-def match(left: Features, right: Features) -> Matches:
-    """Match the features of both images, mutually best ones only."""
-    pairs = []
-    if left.words is not None and right.words is not None:
-        pairs = cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(left.words, right.words)
-    places = left.places[[pair.queryIdx for pair in pairs]]
-    moved = right.places[[pair.trainIdx for pair in pairs]] - places
-    return Matches(len(left.keys), len(right.keys), places, moved[:, 1], -moved[:, 0])
-
-
-def match_by_disparity(left: Gray, right: Gray, keys: Sequence[cv2.KeyPoint], offset_px: float) -> Matches:
-    """Return where the corners of the left image are in the right one, looked for from a coarse disparity image on."""
-    places = Features(keys, None).places
-    coarse = coarse_disparity(MatcherSettings(), left, right, offset_px)
-    columns, rows = np.minimum(places.astype(np.intp), [left.shape[1] - 1, left.shape[0] - 1]).T
-    guess_px = coarse[rows, columns].astype(np.float64)
-    known = np.isfinite(guess_px)
-    places, guess_px = places[known], guess_px[known]
-    right = _brighter(right, float(left.mean()) / max(1.0, float(right.mean())))
-    found = followed(left, right, places, places - np.stack([guess_px, np.zeros_like(guess_px)], axis=1), levels=1)
-    seen = np.isfinite(found[:, 0])
-    places, found = places[seen], found[seen]
-    returned = followed(right, left, found, places, levels=1)
-    with np.errstate(invalid="ignore"):  # of those that are not found again
-        same = np.hypot(*(returned - places).T) < ROUND_TRIP_PX
-    moved = (found - places)[same]
-    return Matches(len(keys), len(keys), places[same], moved[:, 1], -moved[:, 0])
-
-
-def refine(left: Gray, right: Gray, matches: Matches, chosen: NDArray[np.bool_]) -> Matches:
-    """Return the chosen matches (N,), less those that can't be found to a fraction of a pixel."""
-    places = matches.places[chosen]
-    guess = np.stack([-matches.disparity_px[chosen], matches.vertical_px[chosen]], axis=1)
-    moved = followed(left, right, places, places + guess, levels=0) - places
-    with np.errstate(invalid="ignore"):
-        usable = np.all(np.abs(moved - guess) < REFINED_PX, axis=1)
-    return Matches(matches.count_left, matches.count_right, places[usable], moved[usable, 1], -moved[usable, 0])
-
-
-def _features(image: Gray) -> Features:
-    """Return the strongest corners of an image."""
-    least = ABOVE_NOISE * noise_level(image)
-    features = Features((), None)
-    for threshold, enough in FAST_THRESHOLDS:
-        features = Features(*cv2.ORB_create(FEATURES, fastThreshold=max(threshold, round(least))).detectAndCompute(image, None))
-        if len(features.keys) >= enough:
-            break
-    return features
 
 
 @dataclass(frozen=True)
@@ -276,71 +183,6 @@ def _gain(left: Gray, right: Gray, matches: Matches, agree: NDArray[np.bool_]) -
         columns, rows = np.clip(where, 0, [image.shape[1] - 1, image.shape[0] - 1]).astype(np.intp).T
         light.append(np.asarray(cv2.blur(image, (LIGHT_PX, LIGHT_PX)))[rows, columns].astype(np.float64))
     return float(np.median((light[1] + 1.0) / (light[0] + 1.0)))
-
-
-def _brighter(image: Gray, gain: float) -> Gray:
-    return np.asarray(cv2.convertScaleAbs(image, alpha=gain), dtype=np.uint8)
-
-
-def _covered_finding(left: Gray, right: Gray, offset_px: float, gain: float) -> Finding | None:
-    """Return that a part of one lens is covered: one image has nothing there, where the other one shows content in the same rows.
-
-    A surface at a disparity from infinity's to `REACH` of the width beyond it must be in both, unless it is out of one's view. What covers
-    a lens shows less content than the other image, or another light, ``gain`` left out, by which the right image is the brighter one. Both
-    lenses covered alike look like a wall without texture.
-    """
-    tiles_left, tiles_right = Tiles.of(left), Tiles.of(right)
-    columns = TILES[1]
-    first = int(np.floor(offset_px * columns / left.shape[1])) - 1
-    disparities = range(first, first + int(np.ceil(REACH * columns)) + 2)
-    sides = (("left", tiles_left, tiles_right, 1, gain), ("right", tiles_right, tiles_left, -1, 1.0 / gain))
-    other_light = 0.0
-    for side, mine, other, step, brighter in sides:
-        # What the left camera sees is as far to the left, or farther, in the right image.
-        starts = [columns + step * tiles for tiles in disparities]
-        nothing = np.all(_in_reach(mine.content, starts, beyond=np.inf) < NO_CONTENT, axis=0) & (other.content >= CONTENT)
-        borne = OTHER_LIGHT + OTHER_LIGHT_SHARE * other.light
-        brightest = np.where(mine.brightest >= WHITE, np.inf, brighter * mine.brightest)
-        darkest = np.minimum(brighter * mine.darkest, WHITE)
-        mine_is_darker = other.light > _in_reach(brightest, starts, beyond=np.inf).max(axis=0) + borne
-        mine_is_brighter = other.light < _in_reach(darkest, starts, beyond=-np.inf).min(axis=0) - borne
-        without_content = float(np.mean(nothing))
-        if without_content > COVERED:
-            told = f"the {side} camera sees nothing where the other one does: {without_content:.0%} of its view is covered"
-            return broken(FaultKind.VIEW, told)
-        other_light = max(other_light, float(np.mean(mine_is_darker | mine_is_brighter)))
-    if other_light > COVERED_LIGHT:
-        return broken(FaultKind.VIEW, f"a lens is partly covered: {other_light:.0%} of the view is much darker or brighter in one image")
-    return None
-
-
-def _in_reach(values: Floats, starts: Sequence[int], *, beyond: float) -> Floats:
-    """Return what those tiles have that may show the same as a tile of the other image, (disparities, rows, columns)."""
-    columns = values.shape[1]
-    wide = np.pad(values, ((0, 0), (columns, columns)), constant_values=beyond)
-    return np.stack([wide[:, start : start + columns] for start in starts])
-
-
-@dataclass(frozen=True)
-class Tiles:
-    """What an image shows tile by tile, (rows, columns) each, noise averaged out; grey levels.
-
-    ``light`` is the mean, ``content`` the deviation, ``darkest`` and ``brightest`` are the extremes of the tile's cells.
-    """
-
-    light: Floats
-    content: Floats
-    darkest: Floats
-    brightest: Floats
-
-    @classmethod
-    def of(cls, image: Gray) -> Tiles:
-        """Cut an image into tiles."""
-        rows, columns = TILES
-        size = (columns * TILE_CELLS, rows * TILE_CELLS)
-        means = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.float64)
-        cells, within = means.reshape(rows, TILE_CELLS, columns, TILE_CELLS), (1, 3)
-        return cls(cells.mean(axis=within), cells.std(axis=within), cells.min(axis=within), cells.max(axis=within))
 
 
 def edge_width_px(image: Gray) -> float:
