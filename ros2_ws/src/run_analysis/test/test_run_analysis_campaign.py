@@ -265,10 +265,10 @@ def test_what_must_not_be_is_trouble(other):
     assert is_troubled(row(**other))
 
 
-@pytest.mark.parametrize("fault", ["pilot@20-40", "pilot@20"])
-def test_a_vehicle_that_the_pilot_took_over_is_not_the_missions_to_land_also_when_it_is_given_back(fault):
+@pytest.mark.parametrize(("fault", "landed"), [("pilot@20-40", True), ("pilot@20", None)])
+def test_a_vehicle_that_the_pilot_took_over_is_the_missions_to_land_only_when_it_is_given_back(fault, landed):
     (row_,) = fly([Flight(0, "inspection", 0, (fault,))], MOCKS, (), "")
-    assert (row_["outcome"], row_["landed"], is_troubled(row_)) == ("given_up", None, False)
+    assert (row_["outcome"], row_["landed"], is_troubled(row_)) == ("given_up", landed, False)
 
 
 def test_a_row_that_was_cut_off_is_flown_again_and_another_campaign_is_kept_out(tmp_path):

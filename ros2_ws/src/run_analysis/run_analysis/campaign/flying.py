@@ -55,16 +55,17 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
-    """Tell whether the vehicle came down; None where it never took off, or was taken away from the mission in the air.
+    """Tell whether the vehicle came down; None where it never took off, or was taken away from the mission in the air and not given back.
 
-    What was taken away is not the mission's any more, also where it is given back: it commands nothing, and others land it.
+    What is taken away others have to land; what is given back the mission lands where it is.
     """
     flight_status, taken = "", False
     for event in events:
         if isinstance(event, TransitionEvent):
             if event.resource == "flight_status":
                 flight_status = event.to_state
-            taken = taken or (event.resource == "SDK_authority" and event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR")
+            if event.resource == "SDK_authority":
+                taken = event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR"
     if not flight_status:
         return None
     return flight_status == "ON_GROUND" or (None if taken else False)
