@@ -55,17 +55,17 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
-    """Tell whether the vehicle came down; None where it never took off, or was taken away from the mission in the air and not given back.
+    """Tell whether the vehicle came down; None where it never took off, or others have to land it.
 
-    What is taken away others have to land; what is given back the mission lands where it is.
+    It is theirs when it was taken away from the mission in the air. One that is given back the mission lands, but for one that was taken
+    during its take-off: after that skill's `violation=reset` no skill is ready any more, and the front lands the vehicle.
     """
     flight_status, taken = "", False
     for event in events:
         if isinstance(event, TransitionEvent):
             if event.resource == "flight_status":
                 flight_status = event.to_state
-            if event.resource == "SDK_authority":
-                taken = event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR"
+            taken = taken or (event.resource == "SDK_authority" and event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR")
     if not flight_status:
         return None
     return flight_status == "ON_GROUND" or (None if taken else False)
