@@ -148,21 +148,29 @@ class Stays(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
 
 
 class Awaits(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
-    """SUCCESS as soon as the condition holds, FAILURE when it has not for a time of mission clock."""
+    """SUCCESS when the condition has held for ``held_s`` without a break, FAILURE when it has not within a time of mission clock."""
 
-    def __init__(self, name: str, condition: Callable[[], bool], limit_s: float, *, blackboard: Blackboard) -> None:
+    def __init__(self, name: str, condition: Callable[[], bool], limit_s: float, *, held_s: float = 0.0, blackboard: Blackboard) -> None:
         super().__init__(name)
         self._condition = condition
         self._limit_s = limit_s
+        self._held_s = held_s
         self._blackboard = blackboard
         self._since_s = 0.0
+        self._holds_since_s: float | None = None
 
     def initialise(self) -> None:
         """Begin to count."""
         self._since_s = self._blackboard.now_s
+        self._holds_since_s = None
 
     def update(self) -> Status:
         """Look and count."""
-        if self._condition():
+        now_s = self._blackboard.now_s
+        if not self._condition():
+            self._holds_since_s = None
+        elif self._holds_since_s is None:
+            self._holds_since_s = now_s
+        if self._holds_since_s is not None and now_s - self._holds_since_s >= self._held_s:
             return Status.SUCCESS
-        return Status.RUNNING if self._blackboard.now_s - self._since_s < self._limit_s else Status.FAILURE
+        return Status.RUNNING if now_s - self._since_s < self._limit_s else Status.FAILURE

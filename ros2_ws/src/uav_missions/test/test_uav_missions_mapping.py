@@ -277,6 +277,23 @@ def test_a_vehicle_that_is_taken_again_while_it_lands_is_left_alone_again():
     assert world.resources["flight_status"] == "ON_GROUND"
 
 
+def test_a_vehicle_that_is_given_back_for_a_moment_after_it_was_taken_again_gets_no_command():
+    world = World(script=lambda handle: "BLOCKED" if handle.skill == "land" else None)
+    flight = Flight(world)
+    flight.fly_until_running("goto_straight", 2)
+    world.take_authority()
+    world.resources["SDK_authority"] = "AVAILABLE"
+    flight.fly(until=lambda: "land" in world.starts(), limit_s=100.0)
+    world.take_authority()
+    commands, taken_s = len(world.starts()), world.now_s
+    flight.fly(until=lambda: world.now_s > taken_s + 2.5)
+    world.resources["SDK_authority"] = "AVAILABLE"
+    flight.fly(until=lambda: world.now_s > taken_s + 4.5)
+    world.resources["SDK_authority"] = "UNAVAILABLE"
+    flight.fly(until=lambda: world.now_s > taken_s + 20.0)
+    assert world.starts()[commands:] == []
+
+
 def test_a_vehicle_that_is_taken_is_waited_for_until_it_has_stood_for_a_while():
     flight = Flight(World())
     world = flight.world

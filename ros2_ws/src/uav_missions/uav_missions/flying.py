@@ -104,13 +104,11 @@ class Flying:
         # For a while: a navigation that was restarted does not know yet that the vehicle is ours.
         taken = Stays("the pilot has control", lambda: not self.obeys(), settings.settle_s, blackboard=self._blackboard)
         # An autopilot that restarts in the air says at once that it stands: the record goes on until it does.
-        landed, given_back = (lasting(each, settings.settle_s, self._blackboard) for each in (self.on_ground, self.ours))
-
-        def over() -> bool:
-            return landed() or given_back()
-
-        what = "the pilot or the autopilot lands it, or gives it back"
-        lands = Awaits(what, over, settings.others_landing_s, blackboard=self._blackboard)
+        ends = [("they land it", self.on_ground), ("they give it back", self.ours)]
+        wait = [
+            Awaits(what, comes, settings.others_landing_s, held_s=settings.settle_s, blackboard=self._blackboard) for what, comes in ends
+        ]
+        lands = Parallel("the pilot or the autopilot acts", policy=ParallelPolicy.SuccessOnOne(), children=wait)
         theirs = Check("is down, or still theirs", lambda: self.on_ground() or not self.ours())
         leave = Sequence("leave it to them", memory=True, children=[taken, FailureIsSuccess("or not", lands), theirs])
         return Selector("land where it is", memory=True, children=[leave, stop])
@@ -189,21 +187,6 @@ def conditions_of_flight(navigation: Client, clients: Iterable[Client], blackboa
         condition("the home point is valid", holds=state("homepoint_status") == "VALID", otherwise="the home point is not valid"),
         condition("the vehicle is on the ground", holds=grounded, otherwise="the vehicle is not on the ground"),
     ]
-
-
-def lasting(condition: Callable[[], bool], duration_s: float, blackboard: RouteBlackboard) -> Callable[[], bool]:
-    """Make a condition: another one has held at each look for this time of mission clock."""
-    since_s: float | None = None
-
-    def holds() -> bool:
-        nonlocal since_s
-        if not condition():
-            since_s = None
-            return False
-        since_s = blackboard.now_s if since_s is None else since_s
-        return blackboard.now_s - since_s >= duration_s
-
-    return holds
 
 
 def beside(name: str, work: Behaviour, companion: Behaviour) -> Parallel:
