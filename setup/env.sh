@@ -15,11 +15,6 @@ case "$1" in
     export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR=/etc/ros
     export ROS_PACKAGE_PATH="$ALULA_ROOT/ros1_ws/src:/usr/share"
     export CMAKE_PREFIX_PATH="$ALULA_STATE/ros1/devel:/usr"
-    export PYTHONPATH="$ALULA_STATE/ros1/devel/lib/python3/dist-packages:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support:$ALULA_ROOT/tools"
-    # Plain Python that both worlds share: what stands below everything, the model, the language, the core of the runtime, what analyses logs, the page, the generated managers.
-    for _alula_package in "$ALULA_ROOT"/ros2_ws/src/{alula_common,skill_model,skill_language,skill_runtime,run_analysis,mission_console} "$ALULA_STATE"/generated/*_managers; do
-      PYTHONPATH="$PYTHONPATH:$_alula_package"
-    done
     export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
     # Loopback, unless the caller has given this machine a name: roscpp takes no peers by name beside a loopback address.
     [ -n "${ROS_HOSTNAME:-}" ] || export ROS_IP="${ROS_IP:-127.0.0.1}"
@@ -31,12 +26,6 @@ case "$1" in
     export AMENT_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export CMAKE_PREFIX_PATH="$_alula_install:$ALULA_STATE/venv2"
     export LD_LIBRARY_PATH="$_alula_install/lib"
-    _alula_site="$(echo "$_alula_install"/lib/python3*/site-packages)"
-    export PYTHONPATH="$_alula_site:$ALULA_ROOT/flight:$ALULA_ROOT/tests/support:$ALULA_ROOT/tools"
-    # colcon links Python packages to their sources (--symlink-install) by hooks of its setup files, which take a second to source.
-    for _alula_package in "$ALULA_ROOT"/ros2_ws/src/*/setup.py "$ALULA_ROOT"/bridge/*/setup.py "$ALULA_STATE"/generated/*/setup.py; do
-      PYTHONPATH="$PYTHONPATH:${_alula_package%/setup.py}"
-    done
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
     export RMW_IMPLEMENTATION=rmw_fastrtps_cpp
     # 64 MB shared-memory segments: the default of 512 kB loses images and makes them slow.
@@ -45,4 +34,4 @@ case "$1" in
     ;;
   *) echo "env.sh: the world is 1 or 2, not '$1'" >&2; return 2 ;;
 esac
-unset _alula_path _alula_install _alula_site _alula_package
+unset _alula_path _alula_install

@@ -60,7 +60,7 @@ tree_digest() { # of all files below the given folders that decide what is built
 }
 
 model_digest() { # of the models and of what generates from them
-  ( cd "$ALULA_ROOT" && find skillsets ros2_ws/src/skill_model ros2_ws/src/skill_language -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
+  ( cd "$ALULA_ROOT" && find skillsets lib/alula/model lib/alula/language -type f \( -name '*.py' -o -name '*.skill' -o -name '*.rl' -o -name '*.yaml' \) \
       -not -path '*/.*' -not -path '*/test/*' -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum | cut -c1-16 )
 }
 
@@ -100,7 +100,8 @@ make_venv() { # WORLD OPTIONS...
   [ "$(head -n 1 "$venv/bin/pip" 2>/dev/null)" = "#!$venv/bin/python3" ] &&
     [ "$("${clean[@]}" "$venv/bin/python3" -c "$version" 2>/dev/null)" = "$(/usr/bin/python3 -c "$version")" ] ||
     { rm -rf "$venv" && "${clean[@]}" /usr/bin/python3 -m venv "$@" "$venv" || return 1; }
-  "${clean[@]}" "$venv/bin/python3" "$ALULA_ROOT/setup/sync_packages.py" "$ALULA_ROOT/setup/ros$world.txt" "${runtime[@]}"
+  "${clean[@]}" "$venv/bin/python3" "$ALULA_ROOT/setup/sync_packages.py" "$ALULA_ROOT/setup/ros$world.txt" "${runtime[@]}" &&
+    "${clean[@]}" "$venv/bin/python3" -m pip --no-input --disable-pip-version-check install --quiet --no-deps --no-build-isolation --editable "$ALULA_ROOT/lib"
 }
 make_venv1() { make_venv 1 --system-site-packages; }
 make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup/repair_wheels.py"; }
@@ -108,16 +109,15 @@ make_venv2() { make_venv 2 && "$ALULA_STATE/venv2/bin/python" "$ALULA_ROOT/setup
 # What a robot's models generate. A robot whose models have errors is left out, and named at each command until it is mended.
 generate() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
-    export PYTHONPATH="$ALULA_ROOT/ros2_ws/src/alula_common:$ALULA_ROOT/ros2_ws/src/skill_model:$ALULA_ROOT/ros2_ws/src/skill_language"
     rm -f "$ALULA_STATE/broken_robots"
     # In place: what is as it was keeps its time stamps, so that a changed skillset rebuilds no other.
-    python -m skill_language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune && exit
+    python -m alula.language.generate "$ALULA_ROOT"/skillsets/*/ --out "$ALULA_STATE/generated" --prune && exit
     local robot good=() try; try=$(mktemp -d) || exit 1
     for robot in "$ALULA_ROOT"/skillsets/*/; do
-      if python -m skill_language.generate "$robot" --out "$try"; then good+=("$robot"); else basename "$robot" >>"$ALULA_STATE/broken_robots"; fi
+      if python -m alula.language.generate "$robot" --out "$try"; then good+=("$robot"); else basename "$robot" >>"$ALULA_STATE/broken_robots"; fi
     done
     rm -rf "$try"
-    [ ${#good[@]} -gt 0 ] && python -m skill_language.generate "${good[@]}" --out "$ALULA_STATE/generated" --prune )
+    [ ${#good[@]} -gt 0 ] && python -m alula.language.generate "${good[@]}" --out "$ALULA_STATE/generated" --prune )
 }
 
 tell_broken_robots() {
@@ -151,17 +151,17 @@ if [ -n "$(missing_packages)" ]; then
   rm -f "$ALULA_STATE/stamps/apt"
 fi
 step_apt() { step apt "$(digest "$ALULA_ROOT/setup/apt.txt")${runtime[*]}" install_packages "Debian packages (ROS 1, build tools)"; }
-step_venv1() { step venv1 "$(digest "$ALULA_ROOT"/setup/{ros1.txt,sync_packages.py})-$ALULA_STATE${runtime[*]}" make_venv1 "Python packages of the ROS 1 world"; }
+step_venv1() { step venv1 "$(digest "$ALULA_ROOT"/setup/{ros1.txt,sync_packages.py} "$ALULA_ROOT"/lib/{setup.py,pyproject.toml})-$ALULA_STATE${runtime[*]}" make_venv1 "Python packages of the ROS 1 world"; }
 step_venv2() {
-  step venv2 "$(digest "$ALULA_ROOT"/setup/{ros2.txt,repair_wheels.py,sync_packages.py})-$ALULA_STATE${runtime[*]}" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
+  step venv2 "$(digest "$ALULA_ROOT"/setup/{ros2.txt,repair_wheels.py,sync_packages.py} "$ALULA_ROOT"/lib/{setup.py,pyproject.toml})-$ALULA_STATE${runtime[*]}" make_venv2 "Python packages of the ROS 2 world (Jazzy wheels)"
 }
 step_generated() { step generated "$(model_digest)" generate "skillsets: interfaces, managers, bridge configuration"; }
 step_ros1() {
   step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")-$(digest "$ALULA_ROOT"/setup/{workspace,build_ros1}.py)" make_ros1 "ROS 1 workspace (catkin_make)"
 }
 step_ros2() {
-  local wheels; wheels=$(digest <(grep -E '^(ros-|colcon-|empy|numpy)' "$ALULA_ROOT/setup/ros2.txt") "$ALULA_ROOT"/setup/{workspace.py,build_ros2.py,interfaces.cmake,repair_wheels.py})
-  step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$wheels-$ALULA_STATE" make_ros2 "ROS 2 workspace (colcon build)"
+  local scripts; scripts=$(digest "$ALULA_ROOT"/setup/{workspace.py,build_ros2.py,interfaces.cmake})
+  step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(cat "$ALULA_STATE/stamps/venv2")-$scripts" make_ros2 "ROS 2 workspace (colcon build)"
 }
 run apt
 together venv1 venv2

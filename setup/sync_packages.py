@@ -3,7 +3,8 @@
 usage: python sync_packages.py REQUIREMENTS [--runtime]
 
 ``--runtime`` leaves out the pins below the line ``# Only to build and to test``.
-A package counts as installed when its version is the pinned one and none of its files is missing. pip and setuptools stay.
+A package counts as installed when its version is the pinned one and none of its files is missing. What no pin
+names is removed, but for pip, setuptools and the library itself.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections.abc import Mapping
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
-KEPT = {"pip", "setuptools"}
+KEPT = {"pip", "setuptools", "alula"}
 TOOLS = "# Only to build and to test"
 MARKER = re.compile(r'(?:python_version *(<|>=) *"(\d+)\.(\d+)")?')
 

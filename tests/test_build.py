@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from alula_common.network import claim_domain
+from alula.common.network import claim_domain
 from alula_testing.cover import cover
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]

@@ -14,8 +14,8 @@ import pytest
 import ruamel.yaml
 from rosbags.highlevel import AnyReader
 
+from alula.model.execution_state import ExecutionState
 from alula_testing.flights import ALULA_ROOT, Flight, start_flight, story
-from skill_model.execution_state import ExecutionState
 
 pytestmark = [pytest.mark.flight, pytest.mark.timeout(1200)]
 Summary = dict[str, Any]

@@ -14,12 +14,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from alula.language.stories import Story
+from alula.runtime.live_story import from_line, to_line
 from alula_testing.misbehaviours import MISBEHAVIOURS
 from alula_testing.stories import MODELS, stories
 from alula_testing.traces import Behaviour, Script, Step, play
 from alula_testing.traces.stage_none import NoneStage
-from skill_language.stories import Story
-from skill_runtime.live_story import from_line, to_line
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 ANSWER_S = 120.0
@@ -94,8 +94,8 @@ json.dump(found, sys.stdout)
 """
 CLIENTS = {
     "ros1": ("skillset_ros1", "SkillsetClient"),
-    "ros2": ("skill_runtime.ros2", "SkillsetClient"),
-    "none": ("skill_runtime.local", "LocalClient"),
+    "ros2": ("skillset_ros2", "SkillsetClient"),
+    "none": ("alula.runtime.local", "LocalClient"),
 }
 
 
@@ -111,7 +111,7 @@ def test_clients_have_the_same_public_interface_in_all_worlds():
     assert {"start", "trigger", "read_data", "input_types", "interrupt_all", "on_event"} <= set(found["none"])
 
 
-STORY_PLAYERS = {"ros1": "skillset_ros1.story_world", "ros2": "skill_runtime.ros2.story_world"}
+STORY_PLAYERS = {"ros1": "skillset_ros1.story_world", "ros2": "skillset_ros2.story_world"}
 STORIES_S = 600.0
 
 

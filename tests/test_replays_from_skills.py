@@ -12,12 +12,12 @@ import pytest
 from mcap.writer import Writer
 
 import alula_flight.replay
-from alula_common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
+from alula.commands import expect
+from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
+from alula.missions.director import Outcome
+from alula.missions.mocked import MockedMission
+from alula.runtime.mock import MockSkill, load_behaviour
 from alula_flight.replay import CANNOT_REPLAY, OTHERWISE, SAME, main
-from run_analysis import expect
-from skill_missions.director import Outcome
-from skill_missions.mocked import MockedMission
-from skill_runtime.mock import MockSkill, load_behaviour
 from uav_missions import mapping, mock_flight
 from uav_missions.route import load_route
 

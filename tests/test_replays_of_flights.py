@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import alula_flight.replay
-from alula_common.record import DECISIONS, FILE, MISSION, read_record
+from alula.common.record import DECISIONS, FILE, MISSION, read_record
 from alula_flight.replay import CANNOT_REPLAY, OTHERWISE, SAME, main
 from uav_missions import mapping
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from radio_link.kernel import KernelError
 from radio_link.kernel import check as check_kernel
 
-from alula_common.network import free_port
-from alula_common.scenarios import Scenario, scenario_names
+from alula.common.network import free_port
+from alula.common.scenarios import Scenario, scenario_names
 from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_sensors, read_world
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.world.config import world_names

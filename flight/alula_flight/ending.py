@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from alula.records.conformance import Monitor
 from alula_flight.deaths import read_deaths
 from alula_flight.spec import RunSpec
-from run_analysis.conformance import Monitor
 
 GIVEN_UP, CANNOT_START = 1, 2
 """Exit codes of a run that did not reach its goal, and of one that could not begin, as the mission's own; 0: accomplished."""

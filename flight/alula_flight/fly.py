@@ -22,11 +22,13 @@ import psutil
 from radio_link.kernel import remove as remove_namespaces
 from radio_link.netem import Radio
 
-from alula_common.network import DomainClaim, NoFreeDomainError, claim_domain
-from alula_common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
-from alula_common.scenarios import load_scenario
-from alula_common.shared_memory import sweep_shared_memory
-from alula_common.signals import Interrupts
+from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain
+from alula.common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
+from alula.common.scenarios import load_scenario
+from alula.common.shared_memory import sweep_shared_memory
+from alula.common.signals import Interrupts
+from alula.records.conformance import Monitor
+from alula.records.models import models_of
 from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
 from alula_flight.deaths import Death, DeathRecord, describe_exit
@@ -34,8 +36,6 @@ from alula_flight.ending import CANNOT_START, GIVEN_UP, finish
 from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
 from alula_flight.spec import RequestError, RunSpec
-from run_analysis.conformance import Monitor
-from run_analysis.models import models_of
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land

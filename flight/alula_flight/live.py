@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from alula_common.record import EVENTS, FILE, RecordFollower
+from alula.common.record import EVENTS, FILE, RecordFollower
+from alula.model.execution_state import ExecutionState
+from alula.records.conformance import Monitor
+from alula.records.run import DEPARTURE
+from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 from alula_flight.deaths import read_deaths
-from run_analysis.conformance import Monitor
-from run_analysis.run import DEPARTURE
-from skill_model.execution_state import ExecutionState
-from skill_runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 
 def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: float = 0.0) -> str | None:

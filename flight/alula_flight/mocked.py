@@ -9,13 +9,13 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from alula_common.robots import behaviour_files
-from alula_common.scenarios import load_scenario
-from alula_common.signals import Interrupts
+from alula.common.robots import behaviour_files
+from alula.common.scenarios import load_scenario
+from alula.common.signals import Interrupts
+from alula.records.conformance import Monitor
 from alula_flight.ending import CANNOT_START, GIVEN_UP
 from alula_flight.live import LiveEvents
 from alula_flight.spec import RunSpec
-from run_analysis.conformance import Monitor
 
 STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at once"
 

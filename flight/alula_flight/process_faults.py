@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from alula_common.faults import MENDED, FaultChange, FaultRequest
+from alula.common.faults import MENDED, FaultChange, FaultRequest
 
 FILE = "process_faults.jsonl"
 KILLED, HUNG = "killed", "hung"

@@ -22,16 +22,16 @@ from pathlib import Path
 
 from sensor_replay.nodes import is_setting
 
-from alula_common.faults import parse_fault
-from alula_common.files import write_text
-from alula_common.record import FILE
-from mission_replay.deciding import BAG, Conditions, bag_of, decide, read_mission
-from mission_replay.kept import same, trace_of, verdict, write_out
-from mission_replay.recorded import Recorded, ReplayError, load
-from mission_replay.replay import Result
-from run_analysis.errors import AnalysisError
-from run_analysis.expectations import Checked, check, junit, load_expectations
-from run_analysis.run import load_run
+from alula.common.faults import parse_fault
+from alula.common.files import write_text
+from alula.common.record import FILE
+from alula.records.errors import AnalysisError
+from alula.records.expectations import Checked, check, junit, load_expectations
+from alula.records.replay.deciding import BAG, Conditions, bag_of, decide, read_mission
+from alula.records.replay.kept import same, trace_of, verdict, write_out
+from alula.records.replay.recorded import Recorded, ReplayError, load
+from alula.records.replay.replay import Result
+from alula.records.run import load_run
 
 SAME, OTHERWISE, CANNOT_REPLAY = 0, 1, 2
 
@@ -141,7 +141,7 @@ def hold(given: Arguments, checked: Sequence[Checked]) -> int:
 
 def perception_alone(given: Arguments, folder: Path) -> int:
     """Tell what the perception says of a bag that belongs to no mission: the transitions that it asks for; return the exit code."""
-    from mission_replay.functional_bag import read_calls  # late: it needs a reader of bags
+    from alula.records.replay.functional_bag import read_calls  # late: it needs a reader of bags
 
     if not given.run.is_file():
         raise ReplayError(f"{given.run}: there is no such bag")

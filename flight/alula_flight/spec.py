@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from alula_common.faults import FaultError, parse_fault
-from alula_common.files import write_json
-from alula_common.scenarios import Scenario, ScenarioError, load_scenario
+from alula.common.faults import FaultError, parse_fault
+from alula.common.files import write_json
+from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula_flight.process_faults import ProcessFault
 from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections

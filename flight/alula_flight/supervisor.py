@@ -18,9 +18,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from alula_common.processes import end_run
-from alula_common.scenarios import load_scenario
-from alula_common.signals import on_end_signal
+from alula.common.processes import end_run
+from alula.common.scenarios import load_scenario
+from alula.common.signals import on_end_signal
 from alula_flight.album import Album
 from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
 from alula_flight.ending import GIVEN_UP, finish

@@ -22,7 +22,7 @@ import rosbag
 import rospy
 import yaml
 
-from alula_common.faults import FaultError
+from alula.common.faults import FaultError
 from sensor_replay import offline
 from sensor_replay.faults import TOPICS, Faults, read_faults
 from sensor_replay.nodes import NODES, node_and_parameter

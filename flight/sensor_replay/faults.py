@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from genpy import Time
 
-from alula_common.faults import FaultRequest, parse_fault
+from alula.common.faults import FaultRequest, parse_fault
 from uav_simulator.sensors import degradation
 from uav_simulator.sensors.faults import SensorMode
 

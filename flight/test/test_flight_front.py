@@ -12,10 +12,12 @@ from pathlib import Path
 import psutil
 import pytest
 
-from alula_common.network import NoFreeDomainError, claim_domain, free_port
-from alula_common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
-from alula_common.record import EVENTS, RecordWriter
-from alula_common.record import FILE as RECORD
+from alula.common.network import NoFreeDomainError, claim_domain, free_port
+from alula.common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
+from alula.common.record import EVENTS, RecordWriter
+from alula.common.record import FILE as RECORD
+from alula.model.execution_state import ExecutionState
+from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula_flight import mocked
 from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
@@ -26,8 +28,6 @@ from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import MockFront, command
 from alula_flight.spec import RequestError, RunSpec
 from alula_flight.verdict import conformance_lines
-from skill_model.execution_state import ExecutionState
-from skill_runtime.core.events import ExecutionEvent, TransitionEvent
 from uav_simulator.world.config import find_world
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from roslaunch.config import load_config_default
 
-from alula_common.scenarios import load_scenario, scenario_names
+from alula.common.scenarios import load_scenario, scenario_names
 
 LAUNCH = Path(__file__).parents[2] / "ros1_ws/src/uav_bringup/launch"
 

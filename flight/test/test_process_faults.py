@@ -10,8 +10,8 @@ import sys
 import psutil
 import pytest
 
-from alula_common.faults import parse_fault
-from alula_common.processes import RUN_ID_VARIABLE
+from alula.common.faults import parse_fault
+from alula.common.processes import RUN_ID_VARIABLE
 from alula_flight.process_faults import FILE, ProcessFault, ProcessFaults
 from alula_flight.spec import RunSpec
 from alula_testing.waits import until

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from alula_common.record import FILE as RECORD
+from alula.common.record import FILE as RECORD
+from alula.records.errors import AnalysisError
 from alula_flight.report import making
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.making import make_report
-from run_analysis.errors import AnalysisError
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, Log, failing_flight, write_bag

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from alula_common.record import EVENTS, FILE, RecordError, RecordWriter
+from alula.common.record import EVENTS, FILE, RecordError, RecordWriter
+from alula.model.execution_state import ExecutionState
+from alula.runtime.core.events import TransitionEvent, event_record, read_event
 from alula_flight.report.events import fold, gaps, in_order, read_history
 from alula_flight.report.files import Problems
-from skill_model.execution_state import ExecutionState
-from skill_runtime.core.events import TransitionEvent, event_record, read_event
 
 sys.path.insert(0, str(Path(__file__).parent))
 from test_report_sample import LIFT_OFF_S, Log, failing_flight

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from alula_common.faults import FaultChange
+from alula.common.faults import FaultChange
 from alula_flight.report.files import Problems
 from alula_flight.report.page import page_entries
 from alula_flight.report.recording import read_recording

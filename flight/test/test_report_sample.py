@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import String
 from uav_msgs.msg import GuidanceState, MappingState, SensorHealth
 
-from alula_common.record import EVENTS, REPORTS, RecordWriter
+from alula.common.record import EVENTS, REPORTS, RecordWriter
 
 Floats = NDArray[np.float64]
 Box = tuple[Sequence[float], Sequence[float]]

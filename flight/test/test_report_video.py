@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from alula_common.faults import FaultChange
-from alula_common.scenarios import load_scenario
+from alula.common.faults import FaultChange
+from alula.common.scenarios import load_scenario
+from alula.records.causes.fault_file import reaches_of
 from alula_flight.report.answers import find_answers
 from alula_flight.report.events import History
 from alula_flight.report.facts import RunFacts
@@ -16,7 +17,6 @@ from alula_flight.report.recording import Recording
 from alula_flight.report.recovery import find_recovery
 from alula_flight.report.timeline import make_timeline
 from alula_flight.report.video import RadioState, Video, radio_lost_s
-from run_analysis.causes.fault_file import reaches_of
 
 LIFT_OFF_S = 100.0
 

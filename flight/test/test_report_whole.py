@@ -14,7 +14,7 @@ import matplotlib.image as mpl_image
 import numpy as np
 import pytest
 
-from alula_common.record import FILE as RECORD
+from alula.common.record import FILE as RECORD
 from alula_flight.report import __main__ as report
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.making import make_report

@@ -21,7 +21,7 @@ from rosbags.interfaces import ConnectionExtRosbag1
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
-from alula_common.record import FILE, TREE, read_record
+from alula.common.record import FILE, TREE, read_record
 
 BAG = "functional.bag"
 TOPICS = {

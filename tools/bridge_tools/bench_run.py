@@ -19,7 +19,7 @@ from typing import Any, Self
 
 import psutil
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from bridge_tools.bench_cases import ROS1_TYPES, Case, ServiceCase, TopicCase, Way
 from ros_bridge.errors import BridgeError
 from ros_bridge.master import Connection, wait_for_master

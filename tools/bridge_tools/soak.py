@@ -26,7 +26,7 @@ from typing import Any
 
 import psutil
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from bridge_tools import two_worlds
 from bridge_tools.fuzz import memory_mb
 

@@ -7,13 +7,13 @@ import random
 import sys
 from collections.abc import Iterator
 
-from alula_common.faults import FaultRequest
+from alula.campaign.mock_flights import load_flights
+from alula.common.faults import FaultRequest
+from alula.model.conditions import data_of
+from alula.model.deadlines import waits
+from alula.model.model import Skillset
+from alula.runtime.core.events import EngineEvent
 from log_mutations.counting import conforms, count, table
-from run_analysis.mock_flights import load_flights
-from skill_model.conditions import data_of
-from skill_model.deadlines import waits
-from skill_model.model import Skillset
-from skill_runtime.core.events import EngineEvent
 
 SCENARIOS = ("mapping", "inspection")
 LONGEST_S = 90.0

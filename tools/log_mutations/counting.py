@@ -6,11 +6,11 @@ import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from alula.model.model import Skillset
+from alula.records.conformance import SkillsetMonitor
+from alula.runtime.core.events import EngineEvent
 from log_mutations.mutations import MUTATIONS, Spoiler
 from log_mutations.witness import legal
-from run_analysis.conformance import SkillsetMonitor
-from skill_model.model import Skillset
-from skill_runtime.core.events import EngineEvent
 
 GoodLogs = Sequence[tuple[Skillset, Sequence[EngineEvent]]]
 

@@ -10,9 +10,9 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from skill_model.execution_state import ExecutionState
-from skill_model.model import Skillset
-from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from alula.model.execution_state import ExecutionState
+from alula.model.model import Skillset
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 
 Log = Sequence[EngineEvent]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from run_analysis.conformance import SkillsetMonitor
-from run_analysis.conformance.beliefs import Ask, Stimulus
-from skill_model.execution_state import ExecutionState as S
-from skill_model.model import Skillset
-from skill_runtime.core import SkillsetEngine
-from skill_runtime.core.events import EngineEvent, TransitionEvent
-from skill_runtime.core.execution import Execution
-from skill_runtime.hooks import SkillHooks
+from alula.model.execution_state import ExecutionState as S
+from alula.model.model import Skillset
+from alula.records.conformance import SkillsetMonitor
+from alula.records.conformance.beliefs import Ask, Stimulus
+from alula.runtime.core import SkillsetEngine
+from alula.runtime.core.events import EngineEvent, TransitionEvent
+from alula.runtime.core.execution import Execution
+from alula.runtime.hooks import SkillHooks
 
 
 class _Hooks(SkillHooks):

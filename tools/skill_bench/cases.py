@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skill_model.expressions import ResourceIs
-from skill_model.model import (
+from alula.model.expressions import ResourceIs
+from alula.model.model import (
     Assignment,
     Effect,
     Interrupt,

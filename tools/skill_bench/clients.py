@@ -13,14 +13,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
+from alula.model.execution_state import ExecutionState
+from alula.runtime.core.events import EngineEvent, TransitionEvent
 from skill_bench.cases import FREE, INPUT, LOST, Case, make_skillset, resource_name, skill_name
 from skill_bench.processes import follow
 from skill_bench.servers import ACTION, BARE_ACTION, BARE_TOPIC, make_interfaces
-from skill_model.execution_state import ExecutionState
-from skill_runtime.core.events import EngineEvent, TransitionEvent
-from skill_runtime.ros2 import SkillHandle, SkillsetClient
-from skill_runtime.ros2.names import EVENTS
-from skill_runtime.ros2.session import Session
+from skillset_ros2 import SkillHandle, SkillsetClient
+from skillset_ros2.names import EVENTS
+from skillset_ros2.session import Session
 
 LIMIT_S = 10.0
 READY_S = 45.0

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
-from alula_common.network import claim_domain
+from alula.common.network import claim_domain
 from skill_bench.cases import Case
 from skill_bench.clients import follow_bare, follow_skills
 from skill_bench.figures import Load, Measured, Samples, idle_percent, join, times_of

@@ -17,15 +17,15 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
 
+from alula.model.model import Skillset
+from alula.model.ros_types import camel
+from alula.runtime.hooks import SkillHooks
 from skill_bench.cases import Case, make_skillset
 from skill_bench.processes import follow
-from skill_model.model import Skillset
-from skill_model.ros_types import camel
-from skill_runtime.hooks import SkillHooks
-from skill_runtime.ros2 import SkillsetNode
-from skill_runtime.ros2.names import EVENTS
-from skill_runtime.ros2.session import Session
-from skill_runtime.ros2.spin import spin_until
+from skillset_ros2 import SkillsetNode
+from skillset_ros2.names import EVENTS
+from skillset_ros2.session import Session
+from skillset_ros2.spin import spin_until
 
 ACTION = Hover
 """One built action, with one number for its goal, serves for all skills."""

@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, TypeVar
 
-from alula_common.located_yaml import Located, read_yaml
+from alula.common.located_yaml import Located, read_yaml
 from ros_bridge import config_values
 from ros_bridge.config import ActionRoute, BridgeConfig, Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.config_values import Reader

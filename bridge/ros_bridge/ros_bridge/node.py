@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from alula_common.files import write_json
+from alula.common.files import write_json
 from ros_bridge import actions, services, topics
 from ros_bridge.config import ActionRoute, ServiceRoute, TopicRoute
 from ros_bridge.conversion import Types

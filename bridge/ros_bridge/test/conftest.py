@@ -9,7 +9,7 @@ from ros_bridge_action_nodes import ActionNode
 from ros_bridge_harness import RUNNING, BridgeProcess, Master, Ros1Peer
 from ros_bridge_nodes import Ros2Node, Ros2Peer
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 
 ENDS_WITHIN_S = 5.0  # by itself; afterwards it would be killed
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from alula.language.robot import BridgedService, BridgedTopic
 from ros_bridge.config import Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.config_file import SERVICE_KEYS, TOPIC_KEYS, load_config, read_config
 from ros_bridge.errors import ConfigError
 from ros_bridge.selection import Selection
-from skill_language.robot import BridgedService, BridgedTopic
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from ros_bridge_harness import BridgeProcess, Master, Ros1Peer, wait_until
 from ros_bridge_nodes import Ros2Peer, open_up
 from std_msgs.msg import String
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 
 
 def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, ros2_domain, tmp_path):

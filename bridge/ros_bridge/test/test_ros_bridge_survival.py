@@ -15,7 +15,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from bridge_tools.fuzz import Fuzzer
 from bridge_tools.hostile import LENGTH, HostilePublisher
 from ros_bridge.tcpros import encode_header

@@ -10,7 +10,7 @@ from ros_bridge_harness import Master, wait_until
 from ros_bridge_nodes import BEST_EFFORT
 from std_msgs.msg import String
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 
 CONFIG = "discover: {all: true}"
 

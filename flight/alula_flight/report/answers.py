@@ -1,4 +1,4 @@
-"""What failed in a run, what followed from each fault, and what the mission did about it (see ``run_analysis.causes``)."""
+"""What failed in a run, what followed from each fault, and what the mission did about it (see ``alula.records.causes``)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypedDict
 
-from alula_common.faults import MENDED, FaultChange, parse_fault
-from alula_common.scenarios import Scenario
+from alula.common.faults import MENDED, FaultChange, parse_fault
+from alula.common.scenarios import Scenario
+from alula.records.causes.answers import Answer, answer_to_fault
+from alula.records.causes.faults import Fault, Traced, faults_asked, trace
+from alula.records.causes.reach import Reach, Reaches
+from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula_flight.deaths import DIED
 from alula_flight.report.events import History
 from alula_flight.report.facts import RunFacts
 from alula_flight.report.phases import Phases
 from alula_flight.report.recording import Recording
-from run_analysis.causes.answers import Answer, answer_to_fault
-from run_analysis.causes.faults import Fault, Traced, faults_asked, trace
-from run_analysis.causes.reach import Reach, Reaches
-from skill_runtime.core.events import EngineEvent, TransitionEvent
 
 RADIO = "radio"
 SAME_MOMENT_S = 1.0
@@ -36,7 +36,7 @@ class FaultAnswer:
 
 
 class AnswerSummary(TypedDict):
-    """A fault, a process that died, or the radio that ended the video, and what followed from it (``run_analysis.causes``).
+    """A fault, a process that died, or the radio that ended the video, and what followed from it (``alula.records.causes``).
 
     ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the
     executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table of a campaign.

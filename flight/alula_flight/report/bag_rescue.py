@@ -7,7 +7,7 @@ from pathlib import Path
 
 import rosbag
 
-from alula_common.files import write_aside
+from alula.common.files import write_aside
 from alula_flight.report.files import Problems, ReportError
 
 BAG = "functional.bag"

@@ -1,6 +1,6 @@
 """From the events of all skillsets to executions of skills and transitions of resources.
 
-Each message on ``/events`` of ``skills.mcap`` is the record of an event (see ``skill_runtime.core.events``). Stamps become seconds
+Each message on ``/events`` of ``skills.mcap`` is the record of an event (see ``alula.runtime.core.events``). Stamps become seconds
 since lift-off only when they are shown: here they are absolute seconds of mission clock.
 """
 
@@ -10,12 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from alula_common.record import EVENTS, Entry, RecordFollower
+from alula.common.record import EVENTS, Entry, RecordFollower
+from alula.model.execution_state import ExecutionState
+from alula.records.causes.told_ends import with_told_ends
+from alula.records.tree import Places, places_in
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
 from alula_flight.report.files import Problems, mapping
-from run_analysis.causes.told_ends import with_told_ends
-from run_analysis.tree import Places, places_in
-from skill_model.execution_state import ExecutionState
-from skill_runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from alula_common.files import write_aside, write_json
-from alula_common.record import FILE as RECORD
-from alula_common.scenarios import Scenario, load_scenario
+from alula.common.files import write_aside, write_json
+from alula.common.record import FILE as RECORD
+from alula.common.scenarios import Scenario, load_scenario
+from alula.records.causes.fault_file import reaches_of
+from alula.records.causes.reach import Reaches
 from alula_flight.report.answers import FaultAnswer, find_answers
 from alula_flight.report.events import History, read_history
 from alula_flight.report.facts import RunFacts
@@ -27,8 +29,6 @@ from alula_flight.report.video import Video, radio_lost_s, read_video
 from alula_flight.report.video_picture import draw_video
 from alula_flight.report.world import TrueSurfaces
 from mission_console.page import write_report
-from run_analysis.causes.fault_file import reaches_of
-from run_analysis.causes.reach import Reaches
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypedDict
 
-from alula_common.faults import FaultChange
+from alula.common.faults import FaultChange
 from alula_flight.report.files import Problems, finite, mapping, read_json, sequence
 from alula_flight.report.recording import Recording, SimulatorAccount, fault_changes
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import takewhile
 
+from alula.runtime.core.events import TransitionEvent
 from alula_flight.report.events import History
 from alula_flight.report.recording import ON_GROUND, GuidanceAccount, Recording
-from skill_runtime.core.events import TransitionEvent
 
 FLIGHT_STATUS = "flight_status"
 TAKEOFF = "takeoff"

@@ -13,7 +13,7 @@ import numpy as np
 import rosbag
 from numpy.typing import NDArray
 
-from alula_common.faults import FaultChange
+from alula.common.faults import FaultChange
 from alula_flight.process_faults import FILE as PROCESS_FAULTS
 from alula_flight.report.bag_rescue import usable_bag
 from alula_flight.report.files import Problems, finite, mapping, sequence

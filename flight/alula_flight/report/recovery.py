@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alula_common.scenarios import Scenario
+from alula.common.scenarios import Scenario
+from alula.records.causes.failures import SkillFailure, skill_failures
+from alula.records.causes.faults import EARLY_S
 from alula_flight.deaths import DIED
 from alula_flight.report.answers import FaultAnswer
 from alula_flight.report.events import History, PastExecution
 from alula_flight.report.phases import Phases
 from alula_flight.report.recording import Recording, Track
-from run_analysis.causes.failures import SkillFailure, skill_failures
-from run_analysis.causes.faults import EARLY_S
 
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 LOST = "LOST"  # how the skills end whose function is not heard of any more

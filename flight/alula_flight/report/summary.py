@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypedDict
 
-from alula_common.faults import parse_fault
-from alula_common.scenarios import load_scenario
+from alula.common.faults import parse_fault
+from alula.common.scenarios import load_scenario
 from alula_flight.report.answers import AnswerSummary, FaultAnswer, injected, summarise_answer
 from alula_flight.report.events import History
 from alula_flight.report.facts import Death, RunFacts

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TypedDict
 
+from alula.runtime.core.events import TransitionEvent
 from alula_flight.report.events import History
 from alula_flight.report.phases import Phases
 from alula_flight.report.recovery import Recovery
 from alula_flight.report.summary import SkillSummary, skills
-from skill_runtime.core.events import TransitionEvent
 
 # The paper's notation does not tell good results from bad ones, the mission does; these names say it by themselves.
 FAILURE_WORDS = ("BLOCKED", "ABORT", "FAIL", "ERROR", "LOST", "TIMEOUT", "REFUSED", "DRIFT", "UNREACH", "STUCK", "REJECT", "INVALID")

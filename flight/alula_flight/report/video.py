@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from alula_common.files import write_aside
+from alula.common.files import write_aside
 from alula_flight.report.events import History
 from alula_flight.report.files import Problems, finite, mapping
 from alula_flight.report.phases import Phases

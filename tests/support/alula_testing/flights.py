@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from alula_common.processes import command_line, end_run, node_name, processes_of_run
-from alula_common.record import EVENTS, FILE, RecordFollower
+from alula.common.processes import command_line, end_run, node_name, processes_of_run
+from alula.common.record import EVENTS, FILE, RecordFollower
 
 ALULA_ROOT = Path(__file__).resolve().parents[3]
 FLIGHT_LIMIT_S = 900.0  # wall clock; several times what a flight takes, so that a hang fails and a slow machine does not

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from skill_runtime.core import Execution
+from alula.runtime.core import Execution
 
 
 class Unprintable:

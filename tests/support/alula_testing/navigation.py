@@ -8,10 +8,10 @@ from typing import Any, Protocol
 from geometry_msgs.msg import Point
 from skillset_interfaces.srv import Transition
 
+from alula.model.execution_state import ExecutionState
+from alula.runtime.handle import SkillHandle
 from alula_testing.recorder import Recorder
 from alula_testing.waits import until
-from skill_model.execution_state import ExecutionState
-from skill_runtime.handle import SkillHandle
 
 S = ExecutionState
 FLYING = {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID", "flight_status": "IN_AIR"}

@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from skill_runtime.core import Execution
-from skill_runtime.hooks import SkillHooks
+from alula.runtime.core import Execution
+from alula.runtime.hooks import SkillHooks
 
 
 class Recorder(SkillHooks):

@@ -12,7 +12,7 @@ from xmlrpc.client import ServerProxy
 
 import pytest
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 
 StartNode = Callable[..., "subprocess.Popen[bytes]"]
 MASTER_START_S = 120.0

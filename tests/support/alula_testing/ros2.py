@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from alula_common.network import claim_domain
+from alula.common.network import claim_domain
 
 
 @pytest.fixture(scope="session")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from skill_language.errors import Diagnostic
-from skill_language.models import check_files
-from skill_language.prove import prove
-from skill_model.model import Skillset
+from alula.language.errors import Diagnostic
+from alula.language.models import check_files
+from alula.model.model import Skillset
+from alula.prove import prove
 
 PAGE = Path(__file__).resolve().parents[3] / "skillsets" / "PROOFS.md"
 SECTION = re.compile(r"^### (ALU\d+): .*?```rl\n(.*?)```", re.MULTILINE | re.DOTALL)

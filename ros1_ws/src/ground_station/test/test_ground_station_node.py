@@ -25,7 +25,7 @@ from uav_msgs.msg import VideoState
 from uav_msgs.srv import Command, Stream
 from video_stream.wire import NS, Seal, VideoPacket
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from alula_testing.ros1 import wait_until
 
 SOURCES = Path(__file__).parents[2]

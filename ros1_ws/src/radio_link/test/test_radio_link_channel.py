@@ -14,7 +14,7 @@ from radio_link.laws import LAWS, LinkBudget, condition_by_law, free_space_db, o
 from radio_link.radio import FAULTS, Radio, by_zones
 from radio_link.vehicle import Vehicle
 
-from alula_common.faults import parse_faults
+from alula.common.faults import parse_faults
 from uav_simulator.world.radio import BoxVolume, CylinderVolume, RadioQuality, RadioZone
 
 IDEAL = Condition(rate_bps=1e6, delay_s=0.05, jitter_s=0.0)

@@ -23,7 +23,7 @@ from radio_link.kernel import KernelChannel, KernelError
 from radio_link.loop import udp_socket
 from radio_link.netem import Direction, Radio
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from alula_testing.ros1 import refusal_of_node
 from alula_testing.waits import until
 

@@ -10,7 +10,7 @@ import rospy
 from radio_link.loop import udp_socket
 from std_msgs.msg import String
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from alula_testing.waits import until
 
 NODE = Path(__file__).parents[1] / "scripts/radio_link_node"

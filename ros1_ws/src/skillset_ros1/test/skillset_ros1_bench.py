@@ -10,9 +10,9 @@ import rospy
 from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 
+from alula.runtime.hooks import SkillHooks
 from alula_testing import waits
 from alula_testing.recorder import Recorder
-from skill_runtime.hooks import SkillHooks
 from skillset_ros1 import SkillsetClient, SkillsetManagers
 
 SOON_S = 30.0

@@ -5,7 +5,7 @@ import sys
 import navigation_interfaces.msg
 from navigation_managers.model import SKILLSET
 
-from skill_runtime.hooks import SkillHooks
+from alula.runtime.hooks import SkillHooks
 from skillset_ros1 import run_skillset
 
 

@@ -14,7 +14,7 @@ import rospy
 from skillset_interfaces.srv import Transition
 from skillset_ros1_bench import SOON_S, until
 
-from skill_model.execution_state import ExecutionState
+from alula.model.execution_state import ExecutionState
 from skillset_ros1 import SkillsetClient
 
 S = ExecutionState

@@ -18,10 +18,10 @@ from skillset_interfaces.srv import Describe, GetData, TriggerEvent, Why
 from skillset_ros1_bench import SOON_S, Navigation, on_thread, until
 from uav_msgs.msg import GuidanceState
 
+from alula.model.execution_state import ExecutionState
+from alula.model.json_form import from_json
+from alula.runtime.waiting import CannotWaitError
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals
-from skill_model.execution_state import ExecutionState
-from skill_model.json_form import from_json
-from skill_runtime.waiting import CannotWaitError
 from skillset_ros1.actions import RESULTS_KEPT
 
 S = ExecutionState

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from alula_common.faults import parse_faults
+from alula.common.faults import parse_faults
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.flown import SimulatedAutopilotVehicle
 from uav_simulator.simulation import Simulation

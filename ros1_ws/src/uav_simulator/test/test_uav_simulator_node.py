@@ -21,7 +21,7 @@ from tf2_msgs.msg import TFMessage
 from uav_msgs.srv import SetSensor
 from uav_simulator_ardupilot import InThread, Peer
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from alula_testing.ros1 import NODE_UP_S, wait_until
 from uav_simulator.autopilot.link_server import LinkServer
 from uav_simulator.flown import SimulatedAutopilotVehicle

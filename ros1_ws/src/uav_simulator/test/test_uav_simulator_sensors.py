@@ -7,7 +7,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from alula_common.faults import parse_faults
+from alula.common.faults import parse_faults
 from uav_simulator.errors import ConfigError
 from uav_simulator.sensors import degradation
 from uav_simulator.sensors.faults import FAULTS, SensorBoard, SensorMode

@@ -14,8 +14,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula_common.network import free_port
-from alula_common.runs import LATEST, live_runs
+from alula.common.network import free_port
+from alula.common.runs import LATEST, live_runs
 from mission_console.admission import Admission, is_loopback
 from mission_console.server import Console
 

@@ -13,10 +13,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from alula_common.faults import FaultError, parse_fault
-from alula_common.processes import end_run
-from alula_common.runs import load_run, runs_folder
-from alula_common.scenarios import scenario_names
+from alula.common.faults import FaultError, parse_fault
+from alula.common.processes import end_run
+from alula.common.runs import load_run, runs_folder
+from alula.common.scenarios import scenario_names
 
 ANSWER_S = 5.0
 """How long (wall clock) the mission may take to answer."""
@@ -155,7 +155,7 @@ def _set_paused(folder: Path, *, paused: bool) -> str:
 
 def _ask_mission(folder: Path, kind: Any, service: str, request: Any) -> Any:
     """Call a service of the mission of a run; raise ActError."""
-    from skill_runtime.ros2.session import Session
+    from skillset_ros2.session import Session
 
     session = Session("mission_console", domain=load_run(folder).domain)
     try:

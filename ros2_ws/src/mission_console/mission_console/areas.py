@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from alula_common.flight_limits import FLIGHT_LIMITS
+from alula.common.flight_limits import FLIGHT_LIMITS
 
 QUALITIES = ("good", "degraded", "critical")
 FENCE = {"radius_m": FLIGHT_LIMITS.fence_radius_m, "z": [FLIGHT_LIMITS.fence_floor_m, FLIGHT_LIMITS.fence_height_m]}

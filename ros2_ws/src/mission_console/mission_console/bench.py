@@ -24,9 +24,9 @@ from typing import Any
 import psutil
 from websockets.asyncio.client import ClientConnection, connect
 
-from alula_common.files import write_json
-from alula_common.network import free_port
-from alula_common.record import DATA, EVENTS, FILE, TREE, RecordWriter
+from alula.common.files import write_json
+from alula.common.network import free_port
+from alula.common.record import DATA, EVENTS, FILE, TREE, RecordWriter
 
 QUICK_HOURS, QUICK_S = 0.5, 10.0
 

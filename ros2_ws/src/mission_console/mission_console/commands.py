@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from alula_common.runs import NoRunError, load_run
+from alula.common.runs import NoRunError, load_run
 from mission_console import acts
 from mission_console.acts import ActError
 from mission_console.hands import QUESTIONS, Hands

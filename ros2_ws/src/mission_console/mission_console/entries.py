@@ -1,6 +1,6 @@
 """What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock; without a time for what holds for the whole run.
 
-Topics of the record (``alula_common.record``) keep their names and contents, with three exceptions. Of the tree the page gets the shape
+Topics of the record (``alula.common.record``) keep their names and contents, with three exceptions. Of the tree the page gets the shape
 once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what the
 mission needs to start, met or not; of the reports none, because the events tell how executions go.
 """
@@ -11,8 +11,8 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from alula_common.files import strict
-from alula_common.record import DATA, REPORTS, TICKS, TREE, Entry
+from alula.common.files import strict
+from alula.common.record import DATA, REPORTS, TICKS, TREE, Entry
 
 RUN = "/run"
 """What was asked for: the values of ``run.json``, and the ``name`` of its folder."""

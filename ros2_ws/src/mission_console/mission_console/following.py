@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from alula_common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
+from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
 from mission_console import journal
 from mission_console.areas import areas_of
 from mission_console.clouds import CloudError, packed, read_points

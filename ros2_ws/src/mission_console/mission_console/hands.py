@@ -7,17 +7,17 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from alula.model.execution_state import ExecutionState
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.plain import to_plain
 from mission_console.acts import ActError
-from skill_model.execution_state import ExecutionState
 from skill_panel.form import Field, FormError, fields, values
-from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.plain import to_plain
 
 if TYPE_CHECKING:
+    from alula.runtime.core.records import ExecutionRecord
+    from alula.runtime.handle import SkillHandle
     from skill_panel.view import ResourceRow, SkillRow, SkillsetView
     from skill_panel.watcher import Watched
-    from skill_runtime.core.records import ExecutionRecord
-    from skill_runtime.handle import SkillHandle
 
 ANSWER_S = 5.0
 """How long (wall clock) managers may take to answer."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from alula_common.record import Entry
+from alula.common.record import Entry
 
 
 class LinesFollower:

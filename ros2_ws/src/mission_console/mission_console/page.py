@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from alula_common.files import write_text
+from alula.common.files import write_text
 from mission_console.entries import PICTURE, Wire, written
 from mission_console.following import RunFollower
 

@@ -21,8 +21,8 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from alula_common.runs import NoRunError, runs_folder
-from alula_common.scenarios import scenario_names
+from alula.common.runs import NoRunError, runs_folder
+from alula.common.scenarios import scenario_names
 from mission_console import acts, commands, journal
 from mission_console.admission import Admission
 from mission_console.feed import Feed, place_of

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from alula_common.record import DATA, EVENTS, FILE, MISSION, TREE, RecordWriter
+from alula.common.record import DATA, EVENTS, FILE, MISSION, TREE, RecordWriter
 
 LIFT_OFF_S = 12.0
 HOSTILE = "<img src=x onerror=\"document.title='owned'\"></script><script>document.title='owned'</script>"

@@ -14,7 +14,7 @@ from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
 
-from alula_common.network import free_port
+from alula.common.network import free_port
 from mission_console.admission import Admission
 from mission_console.server import FEED, Console
 

@@ -11,7 +11,7 @@ from mission_console_page import DRAWN, Page
 from mission_console_records import LIFT_OFF_S, failing_story, transition
 from mission_console_reports import make_report
 
-from alula_common.record import EVENTS
+from alula.common.record import EVENTS
 from mission_console.page import PARTS
 
 LEAST = 4.5

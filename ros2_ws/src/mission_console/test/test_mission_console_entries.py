@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 from mission_console_records import HOSTILE, failing_story, tree, write_map, write_record
 
-from alula_common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
+from alula.common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
 from mission_console.areas import FENCE, areas_of
 from mission_console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
 from mission_console.entries import AREAS, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter

@@ -14,7 +14,7 @@ from mission_console_records import HOSTILE, LIFT_OFF_S, failing_story, write_re
 from mission_console_reports import SUMMARY
 from mission_console_serving import WAIT_S, served
 
-from alula_common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
+from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
 from mission_console.acts import ActError, Flight
 
 

@@ -11,7 +11,7 @@ from mission_console_page import DRAWN, SIZES, UNNAMED, Page
 from mission_console_records import HOSTILE, LIFT_OFF_S, Story, execution, failing_story, lost_video, transition, tree
 from mission_console_reports import make_report, make_story_report
 
-from alula_common.record import EVENTS, MISSION, OPERATOR, TREE
+from alula.common.record import EVENTS, MISSION, OPERATOR, TREE
 from mission_console.page import REPORT, write_report
 
 ANSWERS = (

@@ -11,7 +11,7 @@ from mission_console_page import DRAWN, Page
 from mission_console_records import LIFT_OFF_S, failing_story, overtaken
 from mission_console_reports import make_report, make_story_report
 
-from alula_common.record import DATA, MISSION
+from alula.common.record import DATA, MISSION
 from mission_console.page import REPORT, write_report
 
 TIMES = "[...document.querySelectorAll('.chain')].map((one) => [...one.querySelectorAll('button')].map((b) => parseFloat(b.textContent)))"

@@ -18,7 +18,7 @@ from mission_console_serving import WAIT_S, Bench, answer_to, heard, serve
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from alula_common.record import EVENTS
+from alula.common.record import EVENTS
 from mission_console import acts, commands, server
 from mission_console.__main__ import main
 from mission_console.acts import ActError, Flight, read_flight

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from alula_common.runs import NoRunError, Run, find_run, live_runs
+from alula.common.runs import NoRunError, Run, find_run, live_runs
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watcher, all_found, skillsets_in
-from skill_runtime.ros2.session import Session
+from skillset_ros2.session import Session
 
 DOMAINS = range(233)
 LIST_S = 3.0

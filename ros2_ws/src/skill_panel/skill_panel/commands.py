@@ -16,15 +16,15 @@ from typing import Any
 
 import yaml
 
-from alula_common.record import EVENTS, FILE, RecordFollower
-from alula_common.runs import LATEST, NoRunError, find_run, load_run
-from alula_common.signals import Interrupts, on_end_signal
-from alula_common.suggestions import nearest
+from alula.common.record import EVENTS, FILE, RecordFollower
+from alula.common.runs import LATEST, NoRunError, find_run, load_run
+from alula.common.signals import Interrupts, on_end_signal
+from alula.common.suggestions import nearest
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.core.events import event_record
+from alula.runtime.waiting import NoAnswerError
 from skill_panel.__main__ import DOMAINS, LIST_S, place_of
 from skill_panel.watcher import all_found, skillsets_in
-from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.core.events import event_record
-from skill_runtime.waiting import NoAnswerError
 
 DONE, NOT_DONE, WRONG = 0, 1, 2
 ANSWER_S = 10.0
@@ -248,8 +248,8 @@ def write(value: object, text: str, *, as_json: bool) -> None:
 def drive(options: argparse.Namespace, out: Out) -> int:
     """Connect to the skillsets and do the command."""
     # Late: a wrong command line needs no middleware.
-    from skill_runtime.ros2.robot import Robot
-    from skill_runtime.ros2.session import Session
+    from skillset_ros2.robot import Robot
+    from skillset_ros2.session import Session
 
     place = place_of(options)
     session = Session("alula", domain=place.domain)

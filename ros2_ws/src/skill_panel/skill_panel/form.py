@@ -9,8 +9,8 @@ from typing import Any
 
 import yaml
 
-from skill_model.model import Parameter, Skill
-from skill_model.units import KIND_OF_UNIT
+from alula.model.model import Parameter, Skill
+from alula.model.units import KIND_OF_UNIT
 
 FLOATS = ("float64", "float32")
 UNIT_OF_NAME: Mapping[str, str] = {

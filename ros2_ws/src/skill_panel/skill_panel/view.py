@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
-from skill_model.model import Resource, Skillset
-from skill_model.situation import Situation
-from skill_runtime.core.events import EngineEvent, ExecutionEvent
-from skill_runtime.core.records import SkillRecord
-from skill_runtime.core.why import unmet
+from alula.model.model import Resource, Skillset
+from alula.model.situation import Situation
+from alula.runtime.core.events import EngineEvent, ExecutionEvent
+from alula.runtime.core.records import SkillRecord
+from alula.runtime.core.why import unmet
 
 NANOSECONDS = 1e9
 LOG_LINES = 1000

@@ -11,18 +11,18 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from skill_model.model import Skillset
+from alula.model.model import Skillset
+from alula.runtime.core.events import EngineEvent
+from alula.runtime.core.records import SkillRecord
+from alula.runtime.core.why import Why
+from alula.runtime.handle import SkillHandle
+from alula.runtime.views import DataReading
+from alula.runtime.waiting import Pending
 from skill_panel.view import SkillsetView
-from skill_runtime.core.events import EngineEvent
-from skill_runtime.core.records import SkillRecord
-from skill_runtime.core.why import Why
-from skill_runtime.handle import SkillHandle
-from skill_runtime.ros2.actions import execution_id
-from skill_runtime.ros2.client import SkillsetClient
-from skill_runtime.ros2.names import action_module, action_type
-from skill_runtime.ros2.session import Session
-from skill_runtime.views import DataReading
-from skill_runtime.waiting import Pending
+from skillset_ros2.actions import execution_id
+from skillset_ros2.client import SkillsetClient
+from skillset_ros2.names import action_module, action_type
+from skillset_ros2.session import Session
 
 DESCRIBE = "skillset_interfaces/srv/Describe"
 LOOK_S = 0.5

@@ -3,8 +3,8 @@
 import navigation_interfaces.action
 from navigation_managers.model import SKILLSET
 
-from skill_runtime.hooks import SkillHooks
-from skill_runtime.ros2 import run_skillset
+from alula.runtime.hooks import SkillHooks
+from skillset_ros2 import run_skillset
 
 
 class Patient(SkillHooks):

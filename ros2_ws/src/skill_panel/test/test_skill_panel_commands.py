@@ -12,10 +12,10 @@ import navigation_managers.model as navigation
 import perception_managers.model as perception
 import pytest
 
-from alula_common.record import EVENTS, FILE, RecordWriter
+from alula.common.record import EVENTS, FILE, RecordWriter
+from alula.runtime.mock import load_behaviour, mock_world
 from skill_panel import commands
 from skill_panel.commands import COMMANDS, CommandError, main, parse
-from skill_runtime.mock import load_behaviour, mock_world
 
 
 class Shell:
@@ -94,8 +94,8 @@ class LateGraph:
         self._appear_s = appear_s
         self._began_s = time.monotonic()
         monkeypatch.setattr(commands, "skillsets_in", self._look)
-        monkeypatch.setattr("skill_runtime.ros2.robot.Robot", self._robot)
-        monkeypatch.setattr("skill_runtime.ros2.session.Session", lambda *_, **__: SimpleNamespace(node=None, close=lambda: None))
+        monkeypatch.setattr("skillset_ros2.robot.Robot", self._robot)
+        monkeypatch.setattr("skillset_ros2.session.Session", lambda *_, **__: SimpleNamespace(node=None, close=lambda: None))
 
     def _look(self, *_: object) -> list[tuple[str, str]]:
         passed_s = time.monotonic() - self._began_s

@@ -205,7 +205,7 @@ def test_the_list_says_what_runs(skillset, ros2_domain, tmp_path):
 def test_the_mission_clock_is_followed_also_when_it_is_heard_late(skillset, watcher):
     from rosgraph_msgs.msg import Clock
 
-    from skill_runtime.ros2.session import Session
+    from skillset_ros2.session import Session
 
     assert wait_for(lambda: bool(watcher.watched), READY_S)
     assert watcher.now_ns > 1_000_000_000_000_000_000, "no clock was published yet"

@@ -6,10 +6,10 @@ import xml.etree.ElementTree as ET
 import pytest
 from uav_missions_fakes import World, clients, make_blackboard
 
-from skill_missions.director import EXIT_CODES, Director, Outcome
-from skill_missions.drawing import draw
-from skill_missions.pausing import PauseRefusedError
-from skill_model.execution_state import ExecutionState
+from alula.missions.director import EXIT_CODES, Director, Outcome
+from alula.missions.drawing import draw
+from alula.missions.pausing import PauseRefusedError
+from alula.model.execution_state import ExecutionState
 from uav_missions.mapping import MappingMission, conditions
 
 READY = {

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from alula_common.faults import FaultRequest, parse_fault
-from alula_common.scenarios import load_scenario
-from skill_missions.director import Outcome
-from skill_missions.mocked import MockedMission
-from skill_runtime.core import ExecutionEvent
-from skill_runtime.mock import load_behaviour
+from alula.common.faults import FaultRequest, parse_fault
+from alula.common.scenarios import load_scenario
+from alula.missions.director import Outcome
+from alula.missions.mocked import MockedMission
+from alula.runtime.core import ExecutionEvent
+from alula.runtime.mock import load_behaviour
 from uav_missions import mock_flight
 from uav_missions.inspection import plan
 from uav_missions.plan import plan_of

@@ -18,7 +18,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool
 from uav_skills_rig import Rig
 
-from alula_common.record import EVENTS, OPERATOR, read_record
+from alula.common.record import EVENTS, OPERATOR, read_record
 
 CLOCKS_APART_S = 0.1
 """Managers under load stamp by a clock message that is some ticks old."""

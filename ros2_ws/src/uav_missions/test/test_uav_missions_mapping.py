@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 from uav_missions_fakes import SQUARE, State, World, clients, make_blackboard
 
-from skill_missions.leaves import SkillLeaf
+from alula.missions.leaves import SkillLeaf
 from uav_missions.mapping import MappingMission
 
 

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from alula_common.faults import FaultRequest
-from alula_common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
-from skill_missions.director import Outcome
-from skill_missions.mocked import MockedMission
-from skill_runtime.core import ExecutionEvent
-from skill_runtime.mock import load_behaviour
+from alula.common.faults import FaultRequest
+from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
+from alula.missions.director import Outcome
+from alula.missions.mocked import MockedMission
+from alula.runtime.core import ExecutionEvent
+from alula.runtime.mock import load_behaviour
 from uav_missions import mock_flight
 from uav_missions.mapping import plan as mapping_plan
 from uav_missions.route import Route, load_route

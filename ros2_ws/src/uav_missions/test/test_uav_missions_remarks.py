@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 from uav_missions_fakes import World, make_blackboard
 
-from skill_missions.blackboard import Failure
-from skill_model.execution_state import ExecutionState
+from alula.missions.blackboard import Failure
+from alula.model.execution_state import ExecutionState
 from uav_missions.remarks import AuthorityRemarks, note_health
 
 LOST = Failure("fly", "navigation.goto", ExecutionState.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority", "")

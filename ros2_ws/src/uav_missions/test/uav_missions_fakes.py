@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from skill_missions.pending import PendingInterrupts
-from skill_model.execution_state import ExecutionState as State
-from skill_runtime.handle import SkillHandle
-from skill_runtime.waiting import Pending
+from alula.missions.pending import PendingInterrupts
+from alula.model.execution_state import ExecutionState as State
+from alula.runtime.handle import SkillHandle
+from alula.runtime.waiting import Pending
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.mapping import Clients
 from uav_missions.route import Route

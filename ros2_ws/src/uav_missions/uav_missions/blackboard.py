@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from skill_missions.blackboard import Blackboard
+from alula.missions.blackboard import Blackboard
 from uav_missions.remarks import AUTHORITY_INVARIANT, holder_of_the_vehicle
 from uav_missions.route import Route, Waypoint
 

@@ -11,11 +11,11 @@ from py_trees.common import ParallelPolicy
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import FailureIsSuccess
 
-from skill_missions.conditions import Condition, condition
-from skill_missions.decorators import RetryAfter, Until
-from skill_missions.leaves import Awaits, Check, Do, SkillLeaf, Stays
-from skill_missions.skillset import Client
-from skill_model.execution_state import ExecutionState
+from alula.missions.conditions import Condition, condition
+from alula.missions.decorators import RetryAfter, Until
+from alula.missions.leaves import Awaits, Check, Do, SkillLeaf, Stays
+from alula.missions.skillset import Client
+from alula.model.execution_state import ExecutionState
 from uav_missions.blackboard import RouteBlackboard, WaypointWriter
 from uav_missions.remarks import AUTHORITY
 from uav_missions.route import wrap_rad

@@ -51,10 +51,10 @@ from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 from py_trees.decorators import SuccessIsFailure
 
-from skill_missions.conditions import Condition, condition
-from skill_missions.leaves import Check, Do, SkillLeaf
-from skill_missions.plan import MissionPlan
-from skill_missions.skillset import Client
+from alula.missions.conditions import Condition, condition
+from alula.missions.leaves import Check, Do, SkillLeaf
+from alula.missions.plan import MissionPlan
+from alula.missions.skillset import Client
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.flying import FlightSettings, Flying, beside, conditions_of_flight, is_on, sees
 from uav_missions.plan import route_plan

@@ -13,14 +13,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula_common.faults import FaultError, FaultRequest, changes_of, parse_fault, spans_of
-from alula_common.files import write_json
-from alula_common.scenarios import ScenarioError, load_scenario
-from skill_missions.director import EXIT_CODES, End, Outcome
-from skill_missions.mocked import MockedMission
-from skill_model.model import Skillset
-from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.mock import load_behaviour
+from alula.common.faults import FaultError, FaultRequest, changes_of, parse_fault, spans_of
+from alula.common.files import write_json
+from alula.common.scenarios import ScenarioError, load_scenario
+from alula.missions.director import EXIT_CODES, End, Outcome
+from alula.missions.mocked import MockedMission
+from alula.model.model import Skillset
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.mock import load_behaviour
 from uav_missions.plan import ROBOT, plan_of, write_route
 from uav_missions.route import Route, RouteError, load_route
 

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from alula_common.files import write_json
-from alula_common.scenarios import Scenario
-from skill_missions.director import Mission
-from skill_missions.pending import PendingInterrupts
-from skill_missions.plan import MissionPlan
-from skill_missions.skillset import Client, Clock
+from alula.common.files import write_json
+from alula.common.scenarios import Scenario
+from alula.missions.director import Mission
+from alula.missions.pending import PendingInterrupts
+from alula.missions.plan import MissionPlan
+from alula.missions.skillset import Client, Clock
 from uav_missions import remarks
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.flying import FlightSettings

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from uav_msgs.msg import GuidanceState, SensorHealth
 
-    from skill_missions.blackboard import Blackboard
+    from alula.missions.blackboard import Blackboard
 
 SENSORS = {"perception.zed_status": "/zed_depth/health", "perception.lidar_status": "/lidar_obstacles/health"}
 AUTHORITY = "navigation.SDK_authority"

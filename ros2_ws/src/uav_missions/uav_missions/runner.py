@@ -1,4 +1,4 @@
-"""The mission's process: its arguments, and the node `/mission` (``skill_missions.node``).
+"""The mission's process: its arguments, and the node `/mission` (``skillset_ros2.mission_node``).
 
 usage: mission --scenario mapping --out DIR --route FILE [--ros-args ...]
 
@@ -14,9 +14,9 @@ from pathlib import Path
 
 import rclpy.utilities
 
-from alula_common.scenarios import ScenarioError, load_scenario
-from skill_missions.director import EXIT_CODES, Outcome
-from skill_missions.node import run_mission
+from alula.common.scenarios import ScenarioError, load_scenario
+from alula.missions.director import EXIT_CODES, Outcome
+from skillset_ros2.mission_node import run_mission
 from uav_missions.plan import plan_of, write_route
 from uav_missions.route import RouteError, load_route
 

@@ -31,7 +31,7 @@ class Rig:
         from rclpy.node import Node
         from rclpy.parameter import Parameter
 
-        from skill_runtime.ros2 import SkillsetClient, SkillsetNode
+        from skillset_ros2 import SkillsetClient, SkillsetNode
 
         self._ready = False
         self.nodes = []

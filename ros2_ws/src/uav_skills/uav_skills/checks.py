@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from alula_common.flight_limits import FLIGHT_LIMITS
+from alula.common.flight_limits import FLIGHT_LIMITS
 
 MAX_DURATION_S = 600.0
 

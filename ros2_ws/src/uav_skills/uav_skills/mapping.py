@@ -15,8 +15,8 @@ from uav_skills.watched import WatchedSkill
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from skill_runtime.core.execution import Execution
-    from skill_runtime.hooks import SkillHooks
+    from alula.runtime.core.execution import Execution
+    from alula.runtime.hooks import SkillHooks
     from uav_skills.decisions import Verdict
 
 

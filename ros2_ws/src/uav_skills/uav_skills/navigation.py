@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from uav_msgs.msg import GuidanceState
 
-    from skill_runtime.core.execution import Execution
-    from skill_runtime.hooks import SkillHooks
+    from alula.runtime.core.execution import Execution
+    from alula.runtime.hooks import SkillHooks
 
 LOCK_RATE_RAD_S = 0.6
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from skill_runtime.ros2 import run_skillset
+from skillset_ros2 import run_skillset
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from rclpy.node import Node
 
-    from skill_runtime.hooks import SkillHooks
+    from alula.runtime.hooks import SkillHooks
 
 
 def serve(skillset: str, make_hooks: Callable[[Node], Mapping[str, SkillHooks]]) -> None:

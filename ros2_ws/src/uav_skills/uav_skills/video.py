@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
     from video_managers.inputs import StreamInputs
 
-    from skill_runtime.core.execution import Execution
-    from skill_runtime.hooks import SkillHooks
+    from alula.runtime.core.execution import Execution
+    from alula.runtime.hooks import SkillHooks
     from uav_skills.decisions import Verdict
 
 

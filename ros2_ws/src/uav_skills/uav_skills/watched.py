@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING
 
-from skill_runtime.hooks import SkillHooks
+from alula.runtime.hooks import SkillHooks
 
 if TYPE_CHECKING:
-    from skill_runtime.core.execution import Execution
+    from alula.runtime.core.execution import Execution
     from uav_skills.calls import Answer
     from uav_skills.decisions import Verdict
     from uav_skills.functional import FunctionalPart

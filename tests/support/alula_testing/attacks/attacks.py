@@ -9,10 +9,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from alula.model.execution_state import ExecutionState
+from alula.runtime.handle import SkillHandle
 from alula_testing.attacks.graph import PATIENCE_S, Graph, LiveGraph
 from alula_testing.navigation import FLYING
-from skill_model.execution_state import ExecutionState
-from skill_runtime.handle import SkillHandle
 
 Found = dict[str, Any]
 SOON_S = 30.0

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from alula.runtime.core import Execution
+from alula.runtime.hooks import SkillHooks
 from alula_testing.misbehaviours import MISBEHAVIOURS, Misbehaviour
-from skill_runtime.core import Execution
-from skill_runtime.hooks import SkillHooks
 
 TAME = Misbehaviour("", lambda _: None)
 After = Callable[[float, Callable[[], object]], object]

@@ -8,8 +8,8 @@ from typing import Any
 from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 
+from alula.runtime.local import LocalWorld
 from alula_testing.attacks.hooks import tame_hooks
-from skill_runtime.local import LocalWorld
 
 PATIENCE_S = 60.0
 

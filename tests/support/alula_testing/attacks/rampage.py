@@ -15,10 +15,10 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from alula.runtime.core.events import EngineEvent, ExecutionEvent
+from alula.runtime.handle import SkillHandle
 from alula_testing.attacks.stages import LiveStage, LocalStage, Stage
 from alula_testing.attacks.worlds import WORLDS
-from skill_runtime.core.events import EngineEvent, ExecutionEvent
-from skill_runtime.handle import SkillHandle
 
 CLIENTS = 8
 END_S = 60.0

@@ -14,9 +14,9 @@ from typing import Any
 from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 
+from alula.runtime.hooks import SkillHooks
 from alula_testing.attacks.graph import READY
 from alula_testing.attacks.hooks import hanging, random_hooks, tame_hooks
-from skill_runtime.hooks import SkillHooks
 
 HOOK_TIMEOUT_S = 2.0
 HANGS_S = 3.0
@@ -53,7 +53,7 @@ def main() -> None:
         return
     import navigation_interfaces.action as actions
 
-    from skill_runtime.ros2 import run_skillset
+    from skillset_ros2 import run_skillset
 
     run_skillset(SKILLSET, actions, make_hooks, arguments=["--ros-args", "-p", f"hook_timeout_s:={HOOK_TIMEOUT_S}"] if hasty else [])
 

@@ -16,12 +16,12 @@ from typing import IO, Any, Protocol
 from navigation_managers.hooks import ABSTRACT_HOOKS
 from navigation_managers.model import SKILLSET
 
-from alula_common.shared_memory import sweep_shared_memory
+from alula.common.shared_memory import sweep_shared_memory
+from alula.runtime.local import LocalManagers, LocalWorld
 from alula_testing.attacks.graph import PATIENCE_S, LiveGraph
 from alula_testing.attacks.hooks import random_hooks
 from alula_testing.navigation import FLYING
 from alula_testing.ros1 import end_process
-from skill_runtime.local import LocalManagers, LocalWorld
 
 LOOK_S = 0.02
 SWEPT_AFTER_S = 5.0

@@ -29,7 +29,7 @@ def ros1() -> Iterator[LiveGraph]:
 @contextmanager
 def ros2() -> Iterator[LiveGraph]:
     """Claim a DDS domain, and initialise rclpy in it."""
-    from alula_common.network import claim_domain
+    from alula.common.network import claim_domain
 
     claim = claim_domain()
     os.environ["ROS_DOMAIN_ID"] = str(claim.domain)
@@ -38,7 +38,7 @@ def ros2() -> Iterator[LiveGraph]:
     from rclpy.node import Node
 
     from alula_testing.ros2 import spin
-    from skill_runtime.ros2 import SkillsetClient
+    from skillset_ros2 import SkillsetClient
 
     rclpy.init()
     executors: list[Any] = []

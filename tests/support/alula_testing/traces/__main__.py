@@ -28,7 +28,7 @@ def ros1() -> Iterator[MakeStage]:
 @contextmanager
 def ros2() -> Iterator[MakeStage]:
     """Claim a DDS domain, and initialise rclpy in it."""
-    from alula_common.network import claim_domain
+    from alula.common.network import claim_domain
 
     claim = claim_domain()
     os.environ["ROS_DOMAIN_ID"] = str(claim.domain)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from alula.runtime.core.execution import Execution
+from alula.runtime.hooks import SkillHooks
 from alula_testing.misbehaviours import MISBEHAVIOURS
 from alula_testing.traces.script import Behaviour
-from skill_runtime.core.execution import Execution
-from skill_runtime.hooks import SkillHooks
 
 After = Callable[[float, Callable[[], object]], object]
 

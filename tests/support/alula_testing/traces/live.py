@@ -6,9 +6,9 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from alula.runtime.codecs import event_of
+from alula.runtime.core.events import event_record
 from alula_testing import waits
-from skill_runtime.codecs import event_of
-from skill_runtime.core.events import event_record
 
 PATIENCE_S = 90.0
 

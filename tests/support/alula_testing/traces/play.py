@@ -8,11 +8,11 @@ from typing import Any
 
 from navigation_managers.hooks import ABSTRACT_HOOKS
 
+from alula.model.execution_state import ExecutionState
+from alula.runtime.handle import SkillHandle
 from alula_testing.traces.hooks import After, ScriptedHooks
 from alula_testing.traces.script import Script, Step
 from alula_testing.traces.stage import Client, MakeStage, Stage
-from skill_model.execution_state import ExecutionState
-from skill_runtime.handle import SkillHandle
 
 Trace = dict[str, Any]
 _EVENT_FIELDS = {

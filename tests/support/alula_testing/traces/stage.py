@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from skill_runtime.core.engine import SkillsetEngine
-from skill_runtime.handle import SkillHandle
-from skill_runtime.hooks import SkillHooks
+from alula.runtime.core.engine import SkillsetEngine
+from alula.runtime.handle import SkillHandle
+from alula.runtime.hooks import SkillHooks
 
 Hooks = Mapping[str, SkillHooks]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from navigation_managers.model import SKILLSET
 
+from alula.runtime.core.events import EngineEvent, event_record
+from alula.runtime.local import LocalWorld
 from alula_testing.traces.stage import Client, HooksFactory
-from skill_runtime.core.events import EngineEvent, event_record
-from skill_runtime.local import LocalWorld
 
 PATIENCE_S = 10.0
 

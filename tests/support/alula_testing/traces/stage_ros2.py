@@ -17,8 +17,8 @@ from skillset_interfaces.srv import SetPaused, Transition, Why
 from alula_testing.ros2 import end_spinning, spin
 from alula_testing.traces import live
 from alula_testing.traces.stage import Client, HooksFactory
-from skill_runtime.ros2 import SkillsetClient, SkillsetNode
-from skill_runtime.ros2.names import EVENTS
+from skillset_ros2 import SkillsetClient, SkillsetNode
+from skillset_ros2.names import EVENTS
 
 NUMBERS = itertools.count()
 

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import String
 from uav_msgs.msg import GuidanceState
 
-from alula_common.faults import FaultError, parse_faults
+from alula.common.faults import FaultError, parse_faults
 from perception_core.ros import read_settings
 from radio_link import netem
 from radio_link.conditions import Quality

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from alula_common.faults import FaultRequest
+from alula.common.faults import FaultRequest
 from radio_link.channel import Channel, Condition
 from radio_link.conditions import PRESETS, Both, Quality
 from radio_link.laws import Point

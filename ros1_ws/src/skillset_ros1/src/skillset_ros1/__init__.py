@@ -1,6 +1,6 @@
 """The skillset interface over rospy: ``SkillsetManagers``, ``SkillsetClient``, service calls with time limits, and the main function."""
 
-from skill_runtime.handle import SkillHandle
+from alula.runtime.handle import SkillHandle
 from skillset_ros1.calls import ServiceCallError, call, call_and_wait
 from skillset_ros1.client import SkillsetClient
 from skillset_ros1.main import run_skillset

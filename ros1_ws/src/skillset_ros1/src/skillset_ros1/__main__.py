@@ -13,7 +13,7 @@ from typing import Any
 
 import rospy
 
-from skill_runtime.core.errors import SkillRuntimeError
+from alula.runtime.core.errors import SkillRuntimeError
 from skillset_ros1.main import run_skillset
 from skillset_ros1.names import interfaces_of
 

@@ -15,10 +15,10 @@ from actionlib import ActionServer, ServerGoalHandle
 from actionlib_msgs.msg import GoalID, GoalStatus
 from std_msgs.msg import Header
 
-from skill_model.execution_state import ExecutionState
-from skill_runtime.action_messages import ActionMessages
-from skill_runtime.core.events import ExecutionEvent
-from skill_runtime.middleware import Goal, GoalListener, OnError, OnValue
+from alula.model.execution_state import ExecutionState
+from alula.runtime.action_messages import ActionMessages
+from alula.runtime.core.events import ExecutionEvent
+from alula.runtime.middleware import Goal, GoalListener, OnError, OnValue
 from skillset_ros1.base import RospyBase
 from skillset_ros1.convert import TYPES, fields_of
 from skillset_ros1.names import QUEUE, ActionTypes

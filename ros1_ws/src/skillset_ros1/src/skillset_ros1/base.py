@@ -9,10 +9,10 @@ from typing import Any
 
 import rospy
 
-from skill_runtime.middleware import OnValue
-from skill_runtime.timers import Job, Timer
-from skill_runtime.waiting import Waiter
-from skill_runtime.workers import Workers
+from alula.runtime.middleware import OnValue
+from alula.runtime.timers import Job, Timer
+from alula.runtime.waiting import Waiter
+from alula.runtime.workers import Workers
 from skillset_ros1.loop import Loop
 from skillset_ros1.names import now_ns
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import rospy
 
-from skill_runtime.core.errors import SkillRuntimeError
+from alula.runtime.core.errors import SkillRuntimeError
 
 DEFAULT_TIMEOUT_S = 2.0
 AGAIN_S = 0.1

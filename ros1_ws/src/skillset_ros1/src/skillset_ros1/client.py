@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from skill_runtime.client import Client
+from alula.runtime.client import Client
 from skillset_ros1.middleware import RospyMiddleware
 from skillset_ros1.names import place
 

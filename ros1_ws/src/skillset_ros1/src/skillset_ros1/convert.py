@@ -1,14 +1,15 @@
-"""Fields of ROS 1 messages; what fits into them is as in the ROS 2 world (``skill_runtime.plain``)."""
+"""Fields of ROS 1 messages; what fits into them is as in the ROS 2 world (``alula.runtime.plain``)."""
 
 from __future__ import annotations
 
+import importlib
 import re
 from typing import Any
 
 import genpy
 
-from skill_model.ros_types import INTEGER_RANGES
-from skill_runtime.plain import FieldTypes
+from alula.model.ros_types import INTEGER_RANGES
+from alula.runtime.plain import FieldTypes
 
 _ARRAY = re.compile(r"\[\d*\]$")
 
@@ -22,8 +23,15 @@ def _element_of(kind: str) -> str:
     return _ARRAY.sub("", kind) if _ARRAY.search(kind) else ""
 
 
+def message_class(type_name: str) -> Any:
+    """Return the class of ``geometry_msgs/Point`` or ``geometry_msgs/msg/Point``; raise ImportError or AttributeError."""
+    package, name = type_name.split("/", maxsplit=1)[0], type_name.rsplit("/", maxsplit=1)[-1]
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
 TYPES = FieldTypes(
     fields_of,
+    message_class,
     _element_of,
     floats={"float32", "float64"},
     integers={**INTEGER_RANGES, "byte": INTEGER_RANGES["uint8"], "char": INTEGER_RANGES["uint8"]},

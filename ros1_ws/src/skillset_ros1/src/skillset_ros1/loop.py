@@ -10,8 +10,8 @@ from collections.abc import Callable
 import rospy
 from rospy.rostime import get_rostime_cond
 
-from skill_runtime.timers import Job, Timer, TimerQueue
-from skill_runtime.waiting import CannotWaitError
+from alula.runtime.timers import Job, Timer, TimerQueue
+from alula.runtime.waiting import CannotWaitError
 from skillset_ros1.names import now_ns
 
 LONGEST_WAIT_S = 0.25

@@ -10,9 +10,9 @@ from types import FrameType, ModuleType
 import rosgraph
 import rospy
 
-from skill_model.model import Skillset
-from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.managers import DataBindings
+from alula.model.model import Skillset
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.managers import DataBindings
 from skillset_ros1.managers import HooksFactory, SkillsetManagers, check_alone
 
 CHECK_S = 0.5

@@ -9,11 +9,11 @@ from types import ModuleType
 import rosgraph
 import rospy
 
-from skill_model.model import Skillset
-from skill_runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, SkillsetEngine
-from skill_runtime.core.errors import SkillRuntimeError
-from skill_runtime.hooks import SkillHooks
-from skill_runtime.managers import DataBindings, Managers, generated_bindings
+from alula.model.model import Skillset
+from alula.runtime.core.engine import DEFAULT_TIMEOUT_S, HOOK_TIMEOUT_S, SkillsetEngine
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.hooks import SkillHooks
+from alula.runtime.managers import DataBindings, Managers, generated_bindings
 from skillset_ros1.middleware import RospyMiddleware
 from skillset_ros1.names import place
 

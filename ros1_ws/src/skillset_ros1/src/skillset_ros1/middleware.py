@@ -13,15 +13,18 @@ from types import ModuleType
 from typing import Any
 
 import rospy
+import skillset_interfaces.msg
+import skillset_interfaces.srv
 from roslib.message import get_message_class
 from std_msgs.msg import Header
 
-from skill_runtime.codecs import SERVICES, codec_of, set_stamp, stamp_ns_of
-from skill_runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
-from skill_runtime.timers import Job
+from alula.runtime.codecs import Codecs, set_stamp, stamp_ns_of
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from alula.runtime.timers import Job
 from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
 from skillset_ros1.calls import call
+from skillset_ros1.convert import message_class
 from skillset_ros1.names import QUEUE, action_types, now_ns
 
 ALIVE_PERIOD_S = 0.5
@@ -50,19 +53,20 @@ class RospyMiddleware(RospyBase):
     def __init__(self, skillset: str, place: str, interfaces: ModuleType | None = None) -> None:
         super().__init__(skillset, place, f"the client of {skillset}" if interfaces is None else f"the managers of {skillset}")
         self._interfaces = interfaces
+        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class)
 
     # --- topics ------------------------------------------------------------------------------------------------------
 
     def advertise(self, topic: Topic) -> RospyPublisher:
         """Open a topic for publishing."""
-        codec = codec_of(topic)
+        codec = self._codecs.topic(topic)
         publisher = RospyPublisher(self.name(topic.name), codec.kind, functools.partial(codec.encode, self._skillset), topic.depth)
         self._parts.append(publisher.unregister)
         return publisher
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
         """Follow a topic; the type of a data comes with each message."""
-        codec = codec_of(topic)
+        codec = self._codecs.topic(topic)
         take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
         if topic.outside:
             self.listen(topic.name, codec.kind, take, queue_size=SOURCE_QUEUE)
@@ -85,7 +89,7 @@ class RospyMiddleware(RospyBase):
 
     def serve(self, service: str, handler: Serve) -> None:
         """Serve a service; each call has a thread of rospy's, which waits for its answer."""
-        codec = SERVICES[service]
+        codec = self._codecs.services[service]
 
         def answer(request: Any) -> Any:
             replies: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -112,7 +116,7 @@ class RospyMiddleware(RospyBase):
         once: bool = False,  # noqa: ARG002 - no answer gets lost that its caller could ask for again
     ) -> None:
         """Call a service."""
-        codec = SERVICES[service]
+        codec = self._codecs.services[service]
         reply: OnValue = lambda response: self.submit(lambda: on_reply(codec.decode(response), 1))  # noqa: E731
         error: OnError = lambda reason: self.submit(lambda: on_error(reason))  # noqa: E731
         message = codec.kind._request_class(**request)  # noqa: SLF001 - genpy's way to tell

@@ -9,7 +9,7 @@ from typing import Any
 
 import rospy
 
-from skill_model.ros_types import camel
+from alula.model.ros_types import camel
 
 QUEUE = 2000
 """Messages that wait for a slow subscriber; more than the history of the events, which is sent in one go."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from alula_common.flight_limits import FLIGHT_LIMITS
+from alula.common.flight_limits import FLIGHT_LIMITS
 from perception_core import tunable
 from perception_core.tunable import KEY, Range
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields, replace
 
-from alula_common.located_yaml import choices
+from alula.common.located_yaml import choices
 from uav_simulator.errors import ConfigError
 
 

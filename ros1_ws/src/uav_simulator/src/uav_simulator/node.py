@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
-from alula_common.faults import FaultError, parse_faults
+from alula.common.faults import FaultError, parse_faults
 from uav_simulator import ros_messages
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError

@@ -18,7 +18,7 @@ class Settings:
     seed: int = 0
     world: str = "yard"  # name of a world that comes with the simulator, or a world file
     world_path: str = ""  # where the true surfaces are written as PLY; empty: nowhere
-    faults: str = ""  # between commas; how each is written: alula_common.faults, what there is: sensors.faults
+    faults: str = ""  # between commas; how each is written: alula.common.faults, what there is: sensors.faults
     # The body's autopilot: simulated (the simulator's own autopilot), ardupilot (its JSON interface), or followed:URL (it is where the
     # autopilot at a MAVLink connection says, on that one's clock).
     vehicle: str = "simulated"

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from alula_common.faults import FaultRequest
+from alula.common.faults import FaultRequest
 from uav_simulator.autopilot.estimator import PERFECT
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import ContactMonitor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from alula_common.located_yaml import choices
+from alula.common.located_yaml import choices
 from uav_simulator.errors import ConfigError
 
 DEFAULTS: dict[str, float] = {

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from alula_common.faults import FaultRequest
-from alula_common.located_yaml import choices
+from alula.common.faults import FaultRequest
+from alula.common.located_yaml import choices
 from uav_simulator.errors import ConfigError
 
 
@@ -73,7 +73,7 @@ class SensorBoard:
     """The sensors' modes. Set from a service's thread, read from the simulation's."""
 
     def __init__(self, faults: Sequence[FaultRequest]) -> None:
-        """``faults`` of the sensors, as `alula_common.faults` reads them with FAULTS."""
+        """``faults`` of the sensors, as `alula.common.faults` reads them with FAULTS."""
         self._lock = threading.Lock()
         self._modes = dict.fromkeys(FAULTS, SensorMode.OK)
         self._pending = [change for fault in faults for change in _changes(fault)]

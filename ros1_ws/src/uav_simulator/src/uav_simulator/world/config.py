@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from alula_common.located_yaml import Located, choices, read_yaml
+from alula.common.located_yaml import Located, choices, read_yaml
 from uav_simulator.errors import ConfigError
 from uav_simulator.frames import Vec3
 from uav_simulator.world.radio import BoxVolume, CylinderVolume, RadioQuality, RadioZone, SphereVolume, Volume

@@ -1,0 +1,1 @@
+"""Alula without ROS: the skill language, its proofs, managers, missions, records of runs and the operator's page."""

@@ -1,0 +1,111 @@
+"""``./alula campaign``: flies a campaign, goes on where it stopped, and ends with the failure coverage.
+
+Ends with 0: all flown, 1: flown, and flights had trouble, 2: could not start, or could not write its folder any more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.campaign.coverage import Coverage, cover, processes
+from alula.campaign.failures import ways_to_fail
+from alula.campaign.mock_flights import load_flights
+from alula.campaign.plan import MOCKS, Campaign, load_campaign
+from alula.campaign.running import run
+from alula.campaign.table import ROWS, Table
+from alula.campaign.telling import as_page, as_text
+from alula.common.files import write_json, write_text
+from alula.common.runs import runs_folder
+from alula.common.scenarios import load_scenario
+from alula.records.causes.fault_file import reaches_of
+from alula.records.errors import AnalysisError
+from uav_missions.mock_flight import drone
+
+FLOWN, TROUBLE, CANNOT_START = 0, 1, 2
+SHOW_EVERY_S = 1.0
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(
+        prog="alula campaign", description="Fly many flights with faults, and tell what answered each failure."
+    )
+    parser.add_argument("file", type=Path, help="the campaign (docs/records.md)")
+    parser.add_argument("--out", type=Path, help="its folder (default: runs/campaign-NAME); one that was interrupted goes on")
+    parser.add_argument(
+        "--dask", metavar="URL", help="have it flown by the workers of a Dask scheduler, as in tcp://host:8786 (default: here)"
+    )
+    return parser.parse_args(arguments)
+
+
+def check_faults(campaign: Campaign) -> None:
+    """Refuse faults that the mocks of a scenario don't have, and a robot's file of faults that is wrong; raises AnalysisError."""
+    for name in campaign.scenarios:
+        reaches_of(load_scenario(name).skillsets)
+    if campaign.over == MOCKS:
+        scenarios = {name: load_flights(name, campaign.behaviour) for name in campaign.scenarios}
+        for flight in campaign.flights:
+            scenarios[flight.scenario].check(flight.requests)
+
+
+class Teller:
+    """Says on standard error how far a campaign is, once a second."""
+
+    def __init__(self, flights: int, begun: int) -> None:
+        self._flights = flights
+        self._begun = begun
+        self._since = self._said = time.monotonic()
+
+    def __call__(self, done: int) -> None:
+        """Say it."""
+        now = time.monotonic()
+        if now - self._said >= SHOW_EVERY_S or done == self._flights:
+            self._said = now
+            rate = (done - self._begun) / max(now - self._since, 1e-9)
+            left_s = (self._flights - done) / max(rate, 1e-9)
+            sys.stderr.write(f"{done} of {self._flights} flights, {rate:.1f} a second, {left_s:.0f} s left\n")
+            sys.stderr.flush()
+
+
+def finish(table: Table, out: Path, title: str) -> Coverage:
+    """Order the table and write the coverage beside it."""
+    table.finish()
+    coverage = cover([table.rows[number] for number in sorted(table.rows)], ways_to_fail(drone(), processes()))
+    write_json(out / "coverage.json", coverage.as_dict())
+    write_text(out / "coverage.txt", as_text(coverage))
+    write_text(out / "coverage.html", as_page(coverage, title))
+    return coverage
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Fly; return the exit code."""
+    given = parse(sys.argv[1:] if arguments is None else arguments)
+    out = given.out or runs_folder() / f"campaign-{given.file.stem}"
+    try:
+        campaign = load_campaign(given.file)
+        check_faults(campaign)
+        table = Table(out, campaign)
+        if table.rows:
+            sys.stderr.write(f"{len(table.rows)} of {len(campaign.flights)} flights are in {out / ROWS}\n")
+        run(campaign, table, out, Teller(len(campaign.flights), len(table.rows)), given.dask)
+        coverage = finish(table, out, f"Campaign {given.file.stem}")
+    except AnalysisError as error:
+        sys.stderr.write(f"alula campaign: {error}\n")
+        return CANNOT_START
+    except OSError as error:
+        sys.stderr.write(f"alula campaign: {out}: can't be written any more: {error.strerror or error}\n")
+        return CANNOT_START
+    except KeyboardInterrupt:
+        sys.stderr.write(f"interrupted; the same command goes on from {out / ROWS}\n")
+        return TROUBLE
+    sys.stdout.write(as_text(coverage))
+    sys.stderr.write(f"{out / 'coverage.html'}\n")
+    return TROUBLE if coverage.troubled else FLOWN
+
+
+if __name__ == "__main__":
+    sys.exit(main())

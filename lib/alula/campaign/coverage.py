@@ -1,0 +1,109 @@
+"""The failure coverage of a campaign: each way to fail against what answered it, how often, how late at worst; and what was never tried."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from alula.campaign.failures import FAULT, KINDS, Way, name_of
+from alula.common.faults import parse_fault
+from alula.missions.director import EXIT_CODES
+
+Row = Mapping[str, Any]
+CODE_OF = {outcome.value: code for outcome, code in EXIT_CODES.items()}
+"""How ``./alula fly`` ends, by a row's outcome."""
+
+
+@dataclass
+class Cover:
+    """What became of one way to fail. ``answers`` counts the branches that answered; clearance is of whole flights."""
+
+    way: Way
+    answers: Counter[str] = field(default_factory=Counter)
+    outcomes: Counter[str] = field(default_factory=Counter)
+    worst_after_s: float | None = None
+    worst_clearance_m: float | None = None
+
+    @property
+    def times(self) -> int:
+        """How often it came about."""
+        return self.answers.total()
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it for JSON."""
+        found = {"kind": self.way.kind, "name": self.way.name, "times": self.times, "answers": dict(self.answers.most_common())}
+        worst = {"worst_recovery_s": self.worst_after_s, "worst_clearance_m": self.worst_clearance_m}
+        return {**found, "outcomes": dict(self.outcomes.most_common()), **worst}
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """The matrix and the flights that it is of."""
+
+    covers: Sequence[Cover]
+    flights: int
+    outcomes: Mapping[str, int]
+    troubled: Sequence[int]
+    """Flights that did not come to an end or conform, left something open, collided, did not land, had problems, or an exit code that
+    does not say their outcome."""
+
+    @property
+    def never(self) -> list[Way]:
+        """What no flight has tried."""
+        return [cover.way for cover in self.covers if not cover.times]
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it for JSON."""
+        tried = [cover.as_dict() for cover in self.covers if cover.times]
+        never = [vars(way) for way in self.never]
+        return {"flights": self.flights, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "tried": tried, "never": never}
+
+
+def cover(rows: Iterable[Row], ways: Iterable[Way]) -> Coverage:
+    """Count what became of each way to fail."""
+    covers = {way: Cover(way) for way in ways}
+    outcomes: Counter[str] = Counter()
+    troubled: list[int] = []
+    flights = 0
+    for row in rows:
+        flights += 1
+        outcomes[str(row["outcome"])] += 1
+        if is_troubled(row):
+            troubled.append(int(row["flight"]))
+        for asked in row["faults"]:  # one that never came, because the flight was over before, has not been tried
+            way = Way(FAULT, name_of(parse_fault(asked)))
+            covers.setdefault(way, Cover(way))
+        for failure in row["failures"]:
+            way = Way(failure["kind"], failure["name"])
+            _count(covers.setdefault(way, Cover(way)), row, str(failure["answered_by"]), failure["after_s"])
+    ordered = sorted(covers.values(), key=lambda one: (KINDS.index(one.way.kind), one.way.name))
+    return Coverage(ordered, flights, dict(outcomes.most_common()), troubled)
+
+
+def is_troubled(row: Row) -> bool:
+    """Tell whether something is wrong with a flight, whatever failed in it."""
+    unfinished = row["outcome"] in {"not_started", "running", None}
+    wrong = row["open"] or row["collisions"] or row["landed"] is False or row["problems"]
+    return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, CODE_OF.get(str(row["outcome"]))})
+
+
+def _count(one: Cover, row: Row, answer: str, after_s: float | None) -> None:
+    one.answers[answer] += 1
+    one.outcomes[str(row["outcome"])] += 1
+    if after_s is not None:
+        one.worst_after_s = max(after_s, one.worst_after_s or 0.0)
+    clearance_m = row["min_clearance_m"]
+    if clearance_m is not None:
+        one.worst_clearance_m = clearance_m if one.worst_clearance_m is None else min(clearance_m, one.worst_clearance_m)
+
+
+def processes(root: Path | None = None) -> list[str]:
+    """Return the names of the processes of a flight, as the launch files start them; the recorder is none of the robot's."""
+    folder = (root or Path(os.environ.get("ALULA_ROOT", "."))) / "ros1_ws" / "src" / "uav_bringup" / "launch"
+    nodes = (node.get("name", "") for file in sorted(folder.glob("*.launch")) for node in ET.parse(file).iter("node"))  # noqa: S314 - ours
+    return sorted({name for name in nodes if name and name != "record" and "$" not in name})

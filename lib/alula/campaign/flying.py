@@ -1,0 +1,162 @@
+"""Flies the flights of a campaign, in whatever process, and makes a row of each. A row says nothing of the machine or the time of day."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from alula.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, failures_in, name_of, ways_to_fail
+from alula.campaign.mock_flights import MockFlights, load_flights
+from alula.campaign.plan import SIMULATOR, Flight
+from alula.common.record import RecordError, read_record
+from alula.common.scenarios import load_scenario
+from alula.records.causes.fault_file import reaches_of
+from alula.records.causes.faults import Fault, faults_asked
+from alula.records.causes.reach import Reaches
+from alula.records.causes.told_ends import with_told_ends
+from alula.records.conformance import Monitor
+from alula.records.errors import AnalysisError
+from alula.records.models import models_of
+from alula.records.run import Run, lift_off_of, load_run, origin_of
+from alula.records.tree import Places, places_in
+from alula.runtime.core.events import EngineEvent, TransitionEvent
+from alula.runtime.mock import Behaviour
+
+Row = dict[str, Any]
+
+
+def fly(flights: Sequence[Flight], over: str, behaviour: tuple[str, ...], out: str) -> list[Row]:
+    """Fly one after another; return a row of each. ``out`` is the campaign's folder: flights in the simulator leave theirs there."""
+    if over == SIMULATOR:
+        return [_simulated(flight, Path(out)) for flight in flights]
+    return [_mocked(flight, behaviour) for flight in flights]
+
+
+@functools.cache
+def _scenario(name: str, behaviour: tuple[str, ...]) -> tuple[MockFlights, list[Way]]:
+    flights = load_flights(name, tuple(map(Path, behaviour)))
+    return flights, ways_to_fail(flights.skillsets)
+
+
+def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
+    scenario, ways = _scenario(flight.scenario, behaviour)
+    flown = scenario.fly(flight.requests, flight.seed)
+    monitor = Monitor(scenario.skillsets)
+    landed = _landed(flown.events)
+    found = {"outcome": flown.end.outcome.value, "reason": flown.end.reason, "landed": landed, "open": list(flown.open)}
+    found |= {"problems": list(flown.notes), "collisions": None, "min_clearance_m": None, "died": [], "exit_code": None}
+    return _row(flight, found, _Evidence(flown.events, flown.places, first_s=flown.faults, behaviour=scenario.behaviour), monitor, ways)
+
+
+def _landed(events: Sequence[EngineEvent]) -> bool | None:
+    """Tell whether the vehicle came down; None where it never took off, or others have to land it.
+
+    It is theirs when it was taken away from the mission in the air. One that is given back the mission lands, but for one that was taken
+    during its take-off: after that skill's `violation=reset` no skill is ready any more, and the front lands the vehicle.
+    """
+    flight_status, taken = "", False
+    for event in events:
+        if isinstance(event, TransitionEvent):
+            if event.resource == "flight_status":
+                flight_status = event.to_state
+            taken = taken or (event.resource == "SDK_authority" and event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR")
+    if not flight_status:
+        return None
+    return flight_status == "ON_GROUND" or (None if taken else False)
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """What a flight has left.
+
+    Attributes:
+        events: of its managers.
+        places: where in the tree executions were started.
+        known: the events, and the ends that only the mission was told of; None: there are none of these.
+        first_s: when mocks say that each fault came first.
+        behaviour: of the mocks.
+    """
+
+    events: Sequence[EngineEvent]
+    places: Places
+    known: Sequence[EngineEvent] | None = None
+    first_s: Mapping[str, float] | None = None
+    behaviour: Behaviour | None = None
+
+
+def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Monitor, ways: Sequence[Way]) -> Row:
+    """Return a row; ``found`` is how the flight went besides its events."""
+    for event in left.events:
+        monitor.take(event)
+    events = left.events if left.known is None else left.known
+    origin_s = origin_of(events)
+    reaches = _reaches(flight.scenario)
+    asked = faults_asked(flight.requests, events, lift_off_of(events), reaches, first_s=left.first_s, behaviour=left.behaviour)
+    begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
+    died = [(Way(PROCESS, one["name"]), _ended(one, events, reaches)) for one in found["died"]]
+    every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
+    every += failures_in(events, ways, left.places)
+    return {
+        "flight": flight.number,
+        "scenario": flight.scenario,
+        "seed": flight.seed,
+        "faults": list(flight.faults),
+        **found,
+        "duration_s": round(events[-1].stamp_s - events[0].stamp_s, 6) if events else 0.0,
+        "events": len(left.events),
+        "conforms": monitor.verdict.conforms,
+        "failures": [as_dict(failure, origin_s) for failure in every],
+    }
+
+
+def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], reaches: Reaches) -> Fault:
+    """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
+    begun_s = min((event.stamp_s for event in events), default=0.0)
+    at_s = begun_s if died["when_s"] is None else origin_of(events) + died["when_s"]
+    return Fault(died["name"], at_s, reach=reaches.of(died["name"]))
+
+
+@functools.cache
+def _reaches(scenario: str) -> Reaches:
+    return reaches_of(load_scenario(scenario).skillsets)
+
+
+# --- in the simulator ---------------------------------------------------------------------------------------------------
+
+
+def _simulated(flight: Flight, out: Path) -> Row:
+    """Fly as a user does; the flight's folder stays."""
+    folder = out / f"flight-{flight.number:05d}"
+    for number in range(2, 1000):  # one that a crash has left half done stays as it is
+        if not folder.exists():
+            break
+        folder = out / f"flight-{flight.number:05d}-{number}"
+    words = [str(Path(os.environ["ALULA_ROOT"]) / "alula"), "fly", flight.scenario, "--seed", str(flight.seed), "--rate", "0"]
+    if flight.world is not None:
+        words += ["--world", str(flight.world.absolute())]
+    for fault in flight.faults:
+        words += ["--fail", fault]
+    done = subprocess.run([*words, "--out", str(folder)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        said = (done.stderr.strip() or done.stdout.strip()).splitlines()
+        summary = {"outcome": "not_started", "reason": said[-1] if said else ""}
+    try:
+        run, record = load_run(folder), read_record(folder)
+    except (AnalysisError, RecordError):  # no skill was ever started
+        run, record = Run(folder, ()), []
+    names = dict.fromkeys(event.skillset for event in run.events)
+    ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
+    found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}
+    found |= {"open": [one["id"] for one in summary.get("skills") or () if one["id"] not in ended]}
+    found |= {"problems": summary.get("problems") or [], "died": summary.get("died") or [], "exit_code": done.returncode}
+    models = models_of(names)
+    left = _Evidence(run.events, places_in(record), with_told_ends(run.events, record))
+    return _row(flight, found, left, Monitor(models), ways_to_fail(models))

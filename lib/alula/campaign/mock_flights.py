@@ -1,0 +1,84 @@
+"""Flights of the drone over mocks, many in one process: what does not change between them is read once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from alula.common.faults import FaultError, FaultRequest
+from alula.common.robots import behaviour_files
+from alula.common.scenarios import Scenario, ScenarioError, load_scenario
+from alula.missions.director import End
+from alula.missions.mocked import MockedMission
+from alula.model.model import Skillset
+from alula.records.errors import AnalysisError
+from alula.records.tree import Places, tip_of
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.core.events import EngineEvent
+from alula.runtime.mock import Behaviour, load_behaviour
+from uav_missions.mock_flight import drone
+from uav_missions.plan import plan_of
+from uav_missions.route import Route, RouteError, load_route
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A flight over mocks: what happened, how it ended, what went wrong in the mocks themselves, and what is open."""
+
+    events: Sequence[EngineEvent]
+    end: End
+    notes: Sequence[str]
+    open: Sequence[str]
+    faults: dict[str, float] = field(default_factory=dict)
+    """When each fault came, seconds of mission clock; those that came to nothing are missing."""
+    places: Places = field(default_factory=Places)
+    """Where in the tree its executions were started."""
+
+
+@dataclass(frozen=True)
+class MockFlights:
+    """A scenario, ready to be flown."""
+
+    scenario: Scenario
+    skillsets: tuple[Skillset, ...]
+    behaviour: Behaviour
+    waypoints: tuple[tuple[float, float, float], ...]
+
+    def check(self, faults: Sequence[FaultRequest]) -> None:
+        """Refuse faults that the mocks don't have.
+
+        Raises:
+            AnalysisError: there is none of this name.
+        """
+        try:
+            for fault in faults:
+                self.behaviour.fault(fault)
+        except (FaultError, SkillRuntimeError) as error:
+            raise AnalysisError(str(error)) from None
+
+    def fly(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> Flown:
+        """Fly once."""
+        plan = plan_of(self.scenario, Route(list(self.waypoints)))
+        mission = MockedMission(self.skillsets, self.behaviour, plan, faults=faults, seed=seed)
+        end = mission.run()
+        places = Places(mission.places, tip_of(mission.director.view().as_dict()))
+        return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)
+
+
+def load_flights(name: str, behaviour: Sequence[Path] = ()) -> MockFlights:
+    """Read what flights of a scenario need: the drone's own mocks, with behaviour files on top of them.
+
+    Raises:
+        AnalysisError: a file is missing or wrong, with its place.
+    """
+    root = Path(os.environ.get("ALULA_ROOT", "."))
+    try:
+        scenario = load_scenario(name)
+        route = load_route(root / "ros1_ws" / "src" / "uav_simulator" / "worlds" / f"{scenario.world}.yaml")
+        files = [*behaviour_files(scenario.skillsets), *behaviour]
+        known = load_behaviour(files, drone()).of(frozenset(scenario.skillsets))
+    except (ScenarioError, RouteError, SkillRuntimeError) as error:
+        raise AnalysisError(str(error)) from None
+    return MockFlights(scenario, tuple(drone(scenario.skillsets)), known, tuple(route.waypoints))

@@ -1,0 +1,246 @@
+"""Reads a campaign: which scenarios, seeds, faults and times, listed or drawn. The same file gives the same flights."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+
+from alula.common.faults import FaultError, FaultRequest, parse_fault
+from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.scenarios import scenario_names
+from alula.records.errors import AnalysisError
+
+KEYS = ("about", "over", "scenarios", "seeds", "faults", "flights", "seed", "draw", "worlds", "behaviour", "at_once")
+DRAW = ("faults", "most", "in_turn", "at_s", "lasts_s")
+MOCKS, SIMULATOR = "mocks", "simulator"
+MOST_FLIGHTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight of a campaign; ``faults`` as on the command line of ``fly``; ``world`` is a file, None: the scenario's own."""
+
+    number: int
+    scenario: str
+    seed: int
+    faults: tuple[str, ...]
+    world: Path | None = None
+
+    @property
+    def requests(self) -> list[FaultRequest]:
+        """The faults as values."""
+        return [parse_fault(text) for text in self.faults]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Flights, numbered from 0, and over what they are flown; ``at_once`` is how many at a time, None: one a core."""
+
+    over: str
+    flights: tuple[Flight, ...]
+    behaviour: tuple[Path, ...] = ()
+    at_once: int | None = None
+    scenarios: tuple[str, ...] = field(default=())
+
+    def as_dict(self) -> dict[str, object]:
+        """Return what decides the table: a campaign goes on only where this is the same."""
+        flights = [{**asdict(flight), "world": flight.world and flight.world.read_text(encoding="utf-8")} for flight in self.flights]
+        return {"over": self.over, "behaviour": [path.read_text(encoding="utf-8") for path in self.behaviour], "flights": flights}
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Read a file.
+
+    Raises:
+        AnalysisError: it can't be read or is wrong; the message names file and line.
+    """
+    document = read_yaml(path, AnalysisError)
+    if document is None:
+        raise AnalysisError(f"{path}: is empty; a campaign may have {', '.join(KEYS)}")
+    said = document.record("a campaign", KEYS)
+    for wanted, other in (("flights", "faults"), ("draw", "faults"), ("draw", "seeds"), ("flights", "seeds")):
+        if wanted in said and other in said:
+            raise said[other].wrong(f"`{other}` lists flights, `{wanted}` draws them; write one of both")
+    over = _choice(said["over"], (MOCKS, SIMULATOR)) if "over" in said else MOCKS
+    scenarios = tuple(_choice(part, scenario_names()) for part in said["scenarios"].elements()) if "scenarios" in said else ("mapping",)
+    drawn = "draw" in said or "flights" in said
+    for key in ("scenarios", "seeds", "faults"):
+        if key in said and not said[key].elements():
+            raise said[key].wrong(f"`{key}` lists nothing, so there is no flight; leave it out, or name one")
+    flights = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
+    if over == SIMULATOR and "behaviour" in said:
+        raise said["behaviour"].wrong("`behaviour` says what mocks do; the simulator has none")
+    if over == MOCKS and "worlds" in said:
+        raise said["worlds"].wrong("`worlds` says where the simulator flies; mocks have none")
+    worlds = said["worlds"].record("`worlds`", scenarios) if "worlds" in said else {}
+    files = {scenario: _file(path, part, "a world file") for scenario, part in worlds.items()}
+    return Campaign(
+        over=over,
+        flights=tuple(replace(flight, world=files.get(flight.scenario)) for flight in flights),
+        behaviour=tuple(_file(path, part, "a behaviour file") for part in said["behaviour"].elements()) if "behaviour" in said else (),
+        at_once=_whole(said["at_once"], "`at_once`", 1, 64) if "at_once" in said else (1 if over == SIMULATOR else None),
+        scenarios=scenarios,
+    )
+
+
+def _choice(part: Located, known: Sequence[str]) -> str:
+    word = part.text("a name")
+    if word not in known:
+        raise part.wrong(f"there is no `{word}`; there are {choices(word, known)}")
+    return word
+
+
+def _whole(part: Located, what: str, low: int, high: int) -> int:
+    number = part.number(what, low, high)
+    if number != int(number):
+        raise part.wrong(f"{what} should be a whole number, not {number:g}")
+    return int(number)
+
+
+def _file(path: Path, part: Located, what: str) -> Path:
+    file = path.parent / part.text(what)
+    if not file.is_file():
+        raise part.wrong(f"there is no file {file}")
+    return file
+
+
+# --- listed -------------------------------------------------------------------------------------------------------------
+
+
+def _listed(said: dict[str, Located], scenarios: Sequence[str]) -> list[Flight]:
+    seeds = [_whole(part, "a seed", 0, 2**31 - 1) for part in said["seeds"].elements()] if "seeds" in said else [0]
+    lists = [part.elements() for part in said["faults"].elements()] if "faults" in said else [[]]
+    faults = [tuple(_fault(one, one.text("a fault")) for one in several) for several in lists]
+    every = itertools.product(scenarios, seeds, faults)
+    return [Flight(number, *one) for number, one in enumerate(every)]
+
+
+def _fault(part: Located, text: str) -> str:
+    try:
+        return str(parse_fault(text))
+    except FaultError as error:
+        raise part.wrong(str(error)) from None
+
+
+# --- drawn --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A fault to draw: what and how; it lasts as long as ``lasts_s`` says, where that is None as long as the draw says."""
+
+    what: str
+    how: str
+    lasts_s: float | None = None
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """What is drawn for a flight: when each fault comes and how long it lasts.
+
+    Which faults come is drawn, too: up to ``most`` of ``faults``. With ``in_turn``, the flights of a scenario take its lists one after
+    another instead, and begin again after the last one.
+    """
+
+    faults: Mapping[str, tuple[_Kind, ...]]
+    in_turn: Mapping[str, tuple[tuple[_Kind, ...], ...]]
+    most: int
+    at_s: tuple[float, float]
+    lasts_s: tuple[float, float] | None
+
+    def flight(self, scenario: str, turn: int, chance: random.Random) -> tuple[str, ...]:
+        """Draw the faults of the scenario's flight ``turn``, from 0: none, one or several, in the order of time."""
+        several = [self._fault(kind, chance) for kind in self._kinds(scenario, turn, chance)]
+        return tuple(str(fault) for fault in sorted(several, key=lambda fault: (fault.begin_s or 0.0, fault.what)))
+
+    def _kinds(self, scenario: str, turn: int, chance: random.Random) -> Iterator[_Kind]:
+        if self.in_turn:
+            lists = self.in_turn[scenario]
+            yield from lists[turn % len(lists)]
+        else:
+            for _ in range(chance.randint(0, self.most)):
+                yield chance.choice(self.faults[scenario])
+
+    def _fault(self, kind: _Kind, chance: random.Random) -> FaultRequest:
+        begin_s, lasts_s = round(chance.uniform(*self.at_s), 1), kind.lasts_s
+        if lasts_s is None and self.lasts_s is not None and chance.random() < 0.5:
+            lasts_s = chance.uniform(*self.lasts_s)
+        return FaultRequest(kind.what, kind.how, begin_s, None if lasts_s is None else round(begin_s + lasts_s, 1))
+
+
+def _drawn(document: Located, said: dict[str, Located], scenarios: Sequence[str]) -> Iterator[Flight]:
+    for key in ("flights", "draw"):
+        if key not in said:
+            raise document.wrong(f"a campaign that draws needs `{key}`")
+    count = _whole(said["flights"], "`flights`", 1, MOST_FLIGHTS)
+    seed = _whole(said["seed"], "`seed`", 0, 2**31 - 1) if "seed" in said else 0
+    draw = _draw(said["draw"], scenarios)
+    turns = Counter[str]()
+    for number in range(count):
+        # One generator a flight: another number of flights leaves the first ones as they were.
+        chance = random.Random(f"{seed} {number}")  # noqa: S311 - nothing here is secret
+        scenario = scenarios[number % len(scenarios)]
+        yield Flight(number, scenario, chance.randrange(2**31), draw.flight(scenario, turns[scenario], chance))
+        turns[scenario] += 1
+
+
+def _draw(part: Located, scenarios: Sequence[str]) -> _Draw:
+    said = part.record("`draw`", DRAW)
+    if ("faults" in said) == ("in_turn" in said):
+        raise part.wrong("`draw` needs `faults`, of which it draws, or `in_turn`, lists of faults that flights take one after another")
+    if "in_turn" in said and "most" in said:
+        raise said["most"].wrong("`most` says how many of `faults` are drawn; `in_turn` draws none")
+    faults, in_turn = (_by_scenario(said[key], key, scenarios) if key in said else {} for key in ("faults", "in_turn"))
+    lists = {scenario: tuple(tuple(map(_kind, one.elements())) for one in part.elements()) for scenario, part in in_turn.items()}
+    for scenario, one in lists.items():
+        if not one:
+            raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` is flights without faults")
+    for scenario, several in faults.items():
+        if not several.elements():
+            raise several.wrong(f"`faults` has none to draw for {scenario}; for flights without faults write `in_turn: [[]]`")
+    return _Draw(
+        faults={scenario: tuple(map(_kind, part.elements())) for scenario, part in faults.items()},
+        in_turn=lists,
+        most=_whole(said["most"], "`most`", 0, 100) if "most" in said else 1,
+        at_s=_span(said["at_s"], "`at_s`") if "at_s" in said else (0.0, 90.0),
+        lasts_s=_span(said["lasts_s"], "`lasts_s`") if "lasts_s" in said else None,
+    )
+
+
+def _by_scenario(part: Located, key: str, scenarios: Sequence[str]) -> dict[str, Located]:
+    """Return the faults to draw from by scenario: a list is for all of them."""
+    given = part.record(f"`{key}`", scenarios) if part.is_mapping else dict.fromkeys(scenarios, part)
+    for scenario in scenarios:
+        if scenario not in given:
+            raise part.wrong(f"`{key}` says nothing of {scenario}")
+    return given
+
+
+def _kind(part: Located) -> _Kind:
+    """Read ``radio:out``, or ``{radio:out: 5}`` for a fault that lasts 5 s."""
+    if not part.is_mapping:
+        return _timeless(part, part.text("a fault"))
+    entries = list(part.entries("a fault").items())
+    if len(entries) != 1:
+        raise part.wrong("a fault with its time is `{NAME: SECONDS}`")
+    ((name, lasts),) = entries
+    return _timeless(part, name, lasts.number("how long a fault lasts", 0.1, 1e5))
+
+
+def _timeless(part: Located, text: str, lasts_s: float | None = None) -> _Kind:
+    name = _fault(part, text)
+    if "@" in name:
+        raise part.wrong(f"`{name}` has a time; times are drawn, from `at_s`")
+    what, _, how = name.partition(":")
+    return _Kind(what, how, lasts_s)
+
+
+def _span(part: Located, what: str) -> tuple[float, float]:
+    numbers = [one.number(what, 0.0, 1e5) for one in part.elements()]
+    if len(numbers) != 2 or numbers[0] > numbers[1]:
+        raise part.wrong(f"{what} should be [from, to] in seconds")
+    return numbers[0], numbers[1]

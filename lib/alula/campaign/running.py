@@ -1,0 +1,59 @@
+"""Has the flights of a campaign flown by Dask, here or on other machines, and puts the rows into the table as they come."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from alula.campaign.flying import fly
+from alula.campaign.plan import SIMULATOR, Campaign, Flight
+from alula.campaign.table import Table
+from alula.records.errors import AnalysisError
+
+TOGETHER = 10
+"""Mock flights that are handed over at a time: a flight takes tens of milliseconds."""
+CONNECT_S = 30.0
+
+Progress = Callable[[int], None]
+"""Gets how many flights are in the table."""
+
+
+def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: str | None = None) -> None:
+    """Fly what is missing in the table.
+
+    Raises:
+        AnalysisError: there is no Dask scheduler at the address.
+    """
+    left = [flight for flight in campaign.flights if flight.number not in table.rows]
+    if not left:
+        return
+    from dask import config  # late: it takes a second, and a finished campaign does not need it
+    from distributed import Client, LocalCluster, as_completed
+
+    # Dask samples what its workers do a hundred times a second; that is looked at nowhere.
+    with config.set({"distributed.worker.profile.enabled": False}), ExitStack() as stack:
+        try:
+            if dask is None:
+                workers = min(campaign.at_once or os.cpu_count() or 1, len(left))
+                # Loopback only, no dashboard: nothing of a campaign can be reached from outside.
+                cluster = stack.enter_context(
+                    LocalCluster(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50)
+                )
+                client = stack.enter_context(Client(cluster))
+            else:
+                client = stack.enter_context(Client(dask, timeout=CONNECT_S))
+        except (OSError, TimeoutError, ValueError) as error:
+            raise AnalysisError(f"--dask {dask}: can't be used: {error}") from None
+        behaviour = tuple(str(path.absolute()) for path in campaign.behaviour)
+        parts = list(_parts(left, 1 if campaign.over == SIMULATOR else TOGETHER))
+        futures = client.map(fly, parts, over=campaign.over, behaviour=behaviour, out=str(out.absolute()), pure=False)
+        for _, rows in as_completed(futures, with_results=True):
+            table.add(rows)
+            progress(len(table.rows))
+
+
+def _parts(flights: Sequence[Flight], size: int) -> Iterator[Sequence[Flight]]:
+    for begin in range(0, len(flights), size):
+        yield flights[begin : begin + size]

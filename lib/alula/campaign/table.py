@@ -1,0 +1,86 @@
+"""The table of a campaign: a line of JSON a flight, written when it is over, so that no crash loses more than the flights under way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from alula.campaign.plan import Campaign
+from alula.common.files import strict, write_json, write_text
+from alula.records.errors import AnalysisError
+
+ROWS, PLAN = "flights.jsonl", "campaign.json"
+COLUMNS = frozenset(
+    ("flight", "faults", "outcome", "landed", "open", "problems", "collisions", "min_clearance_m", "conforms", "exit_code", "failures")
+)
+"""What the coverage reads of a row."""
+
+Row = Mapping[str, Any]
+
+
+class Table:
+    """The rows in a folder. What a crash has cut off is flown again.
+
+    Raises:
+        AnalysisError: the folder has another campaign in it, or can't be used.
+    """
+
+    def __init__(self, folder: Path, campaign: Campaign) -> None:
+        self._path = folder / ROWS
+        self.rows: dict[int, Row] = {}
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._claim(folder, campaign)
+            self._read({flight.number for flight in campaign.flights})
+            self._file: BinaryIO = self._path.open("ab")
+        except OSError as error:
+            raise AnalysisError(f"{folder}: can't hold a campaign: {error.strerror or error}") from None
+
+    def _claim(self, folder: Path, campaign: Campaign) -> None:
+        plan = folder / PLAN
+        asked = json.loads(json.dumps(campaign.as_dict()))
+        if not plan.is_file():
+            if any(folder.iterdir()):
+                raise AnalysisError(f"{folder}: is not empty and holds no campaign; choose another folder with --out")
+            write_json(plan, asked)
+        elif _json(plan.read_bytes()) != asked:
+            raise AnalysisError(f"{folder}: holds another campaign; choose another folder with --out, or remove this one")
+
+    def _read(self, numbers: Collection[int]) -> None:
+        """Read the rows that are whole, and leave no others in the file."""
+        lines = self._path.read_bytes().splitlines(keepends=True) if self._path.is_file() else []
+        whole = [row for line in lines if line.endswith(b"\n") and _is_row(row := _json(line), numbers)]
+        self.rows = {row["flight"]: row for row in whole}
+        if len(whole) < len(lines):
+            write_text(self._path, b"".join(map(_line, whole)).decode())
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Write rows, through to the disk."""
+        for row in rows:
+            self.rows[int(row["flight"])] = row
+            self._file.write(_line(row))
+        self._file.flush()
+
+    def finish(self) -> None:
+        """Put the rows in the order of the flights: however often it was interrupted, the table is the same."""
+        self._file.close()
+        write_text(self._path, b"".join(_line(self.rows[number]) for number in sorted(self.rows)).decode())
+
+
+def _json(text: bytes) -> Any:
+    """Return what a text says, None where it is no JSON."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _is_row(row: Any, numbers: Collection[int]) -> bool:
+    """Tell whether this is what the coverage needs of one of these flights."""
+    return isinstance(row, dict) and row.keys() >= COLUMNS and isinstance(row["flight"], int) and row["flight"] in numbers
+
+
+def _line(row: Row) -> bytes:
+    return json.dumps(strict(row), allow_nan=False).encode() + b"\n"

@@ -1,0 +1,1 @@
+"""Commands of ``alula``: each module has a ``main(words) -> exit code``."""

@@ -1,0 +1,160 @@
+"""`./alula check FILE...`: read models, say what is wrong with them, and prove the rest.
+
+A model without errors is handed to the prover; what that finds is told with the rest, on standard output. With ``--to`` the models
+are printed there instead, and findings go to standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from time import monotonic
+
+from alula.language.errors import Diagnostic, Severity, has_errors, render
+from alula.language.models import ModelFile, check_files, models_in
+from alula.language.notation import Notation
+from alula.language.printer import print_file
+from alula.model.model import Skillset
+
+UNREADABLE = "ALU0"
+FILES_HELP = "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input"
+EXIT_CODES = """
+exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of syntax) or a property fails; 2 a file can't be read
+(not there, no UTF-8 text, too large), or the arguments are wrong
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check the files named on the command line; return the exit code."""
+    options = _parser().parse_args(arguments)
+    paths = dict.fromkeys(path for given in options.files for path in models_in(given))
+    files = check_files(list(paths), sys.stdin.buffer)
+    if options.proofs and options.to is None:
+        _prove(files, options.time, closed_world=options.closed_world)
+    for file in files:
+        file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
+    findings = [finding for file in files for finding in file.findings]
+    code = exit_code(findings)
+    if options.to is not None:
+        return _convert(files, Notation(options.to), code)
+    _write(_as_json(files, code) if options.json else _as_text(files))
+    return code
+
+
+def exit_code(findings: Sequence[Diagnostic]) -> int:
+    """Return 0, 1 or 2 (``EXIT_CODES``)."""
+    if any(finding.severity is Severity.ERROR and finding.code.startswith(UNREADABLE) for finding in findings):
+        return 2
+    return 1 if has_errors(findings) else 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    description = "Read skill models, say what is wrong with them and where, and prove the rest."
+    parser = argparse.ArgumentParser(prog="alula check", description=description, epilog=EXIT_CODES)
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help=FILES_HELP,
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print one JSON object: each finding's place, code, counterexample",
+    )
+    parser.add_argument(
+        "--closed-world", action="store_true", help="nothing takes an arrow that no effect of the model takes and that is not extern"
+    )
+    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
+    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
+    parser.add_argument("--play", type=int, metavar="N", help="play the story with this number in running managers (see `--play 1 --help`)")
+    parser.add_argument("--strict", action="store_true", help="make errors of warnings")
+    parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
+    return parser
+
+
+def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> None:
+    """Add the prover's findings about every skillset of a file that is free of errors."""
+    # The prover brings its solvers along, which a conversion should not wait for.
+    from alula.prove import prove
+
+    for file in files:
+        if has_errors(file.findings) or file.damaged:
+            continue
+        found: list[Diagnostic] = []
+        end = monotonic() + timeout_s
+        for number, skillset in enumerate(file.skillsets):
+            if number and monotonic() >= end:
+                found.append(_not_begun(file.skillsets[number:], timeout_s))
+                break
+            found += prove(skillset, closed_world=closed_world, timeout_s=max(0.0, end - monotonic()))
+        file.add(found)
+
+
+def stories_of(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> list[tuple[Skillset, Diagnostic]]:
+    """Prove the files; return each finding that tells a story, in the order of the output, with its skillset."""
+    _prove(files, timeout_s, closed_world=closed_world)
+    return [
+        (max((one for one in file.skillsets if one.span.line <= finding.span.line), key=lambda one: one.span.line), finding)
+        for file in files
+        for finding in file.findings
+        if finding.story.steps
+    ]
+
+
+def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
+    """Return the prover's own finding for a lack of time, for skillsets that it was not even asked about."""
+    severity = Severity.ERROR if any(skillset.properties for skillset in skillsets) else Severity.WARNING
+    message = f"nothing is proved of this skillset and {len(skillsets) - 1} more: the {timeout_s:g} s for the file are over"
+    return Diagnostic("ALU540", message, skillsets[0].span, severity, "allow more with `--time`, or divide the file")
+
+
+def _convert(files: Sequence[ModelFile], notation: Notation, code: int) -> int:
+    """Print what could be read whole in a notation, findings beside it; one of several files begins with its name."""
+    for file in files:
+        if file.findings:
+            sys.stderr.write(render(file.findings) + "\n")
+    whole = [file for file in files if not file.damaged]
+    for file in whole:
+        title = f"// {file.path}\n" if len(files) > 1 else ""
+        types = [kind.name for kind in file.document.types] if file.document else []
+        _write(title + print_file(file.declared, notation, types).rstrip("\n"))
+    # A model with errors of meaning is converted, too, but not silently.
+    return code
+
+
+def _strict(finding: Diagnostic) -> Diagnostic:
+    return replace(finding, severity=Severity.ERROR)
+
+
+def _write(text: str) -> None:
+    """Write to the standard output whatever its encoding; names and paths may hold anything."""
+    encoding = sys.stdout.encoding or "utf-8"
+    sys.stdout.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+
+
+def _as_json(files: Sequence[ModelFile], code: int) -> str:
+    found = [{"file": file.path, "findings": [f.as_json() for f in file.findings]} for file in files]
+    return json.dumps({"exit_code": code, "files": found}, indent=2)
+
+
+def _as_text(files: Sequence[ModelFile]) -> str:
+    parts: list[str] = []
+    stories = 0
+    for file in files:
+        errors = sum(finding.severity is Severity.ERROR for finding in file.findings)
+        warnings = len(file.findings) - errors
+        counts = [f"{n} {word}{'s' if n > 1 else ''}" for n, word in ((errors, "error"), (warnings, "warning")) if n]
+        for finding in file.findings:
+            stories += bool(finding.story.steps)
+            story = f"      = story {stories}: `--play {stories}` plays it in running managers\n" if finding.story.steps else ""
+            parts.append(f"{finding.render()}\n{story}")
+        parts.append(f"{file.path}: {', '.join(counts) or 'ok'}")
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,58 @@
+"""``./alula compare``: runs side by side. Ends with 0: they decided alike, 1: they did not, 2: one can't be read."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.common.files import strict, write_aside
+from alula.records.comparing import compare, load_side
+from alula.records.comparing.telling import as_dict, lines
+from alula.records.errors import AnalysisError
+
+ALIKE, DIFFERENT, UNREADABLE = 0, 1, 2
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(prog="alula compare", description="Show runs side by side, and whether their missions decided alike.")
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folders of runs, or their logs; two or more")
+    parser.add_argument("--json", action="store_true", help="print the comparison as JSON")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="draw it, too")
+    given = parser.parse_args(arguments)
+    if len(given.runs) < 2:
+        parser.error("one run alone can't be compared; name two or more")
+    return given
+
+
+def names(paths: Sequence[Path]) -> list[str]:
+    """Return short names that differ where the paths do."""
+    short = [path.resolve().name for path in paths]
+    return short if len(set(short)) == len(short) else [str(path) for path in paths]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compare; return the exit code."""
+    given = parse(sys.argv[1:] if arguments is None else arguments)
+    try:
+        compared = compare([load_side(path, name) for path, name in zip(given.runs, names(given.runs), strict=True)])
+        if given.svg is not None:
+            from alula.records.comparing.picture import draw  # late: matplotlib takes a moment
+
+            try:
+                write_aside(given.svg, lambda aside: draw(compared, aside))
+            except OSError as error:
+                raise AnalysisError(f"--svg {given.svg}: can't be written: {error.strerror or error}") from None
+    except (AnalysisError, OSError, ValueError) as error:
+        sys.stderr.write(f"alula compare: {error}\n")
+        return UNREADABLE
+    text = json.dumps(strict(as_dict(compared)), indent=2) if given.json else "\n".join(lines(compared))
+    sys.stdout.write(text + "\n")
+    return ALIKE if compared.alike else DIFFERENT
+
+
+if __name__ == "__main__":
+    sys.exit(main())

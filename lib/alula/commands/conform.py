@@ -1,0 +1,83 @@
+"""``./alula conform``: holds a log against the models of its skillsets. Ends with 0: it conforms, 1: it does not, 2: it can't be read."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from alula.model.errors import UnsupportedModelError
+from alula.records.conformance import Monitor, Verdict
+from alula.records.errors import AnalysisError
+from alula.records.logs import Log, read_log
+from alula.records.models import models_of
+
+CONFORMS, DIFFERS, UNREADABLE = 0, 1, 2
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(prog="alula conform", description="Hold a log of skillset events against the models.")
+    parser.add_argument("log", type=Path, help="a run's folder, skills.mcap, a bag with Event messages, or events.jsonl")
+    parser.add_argument(
+        "--model", type=Path, action="append", default=[], metavar="FILE", help="hold it against this model (default: the managers' own)"
+    )
+    parser.add_argument("--json", action="store_true", help="print the verdict as JSON")
+    return parser.parse_args(arguments)
+
+
+def judge(log: Log, models: Sequence[Path] = ()) -> Verdict:
+    """Hold a log against models.
+
+    Raises:
+        AnalysisError: a model is missing, has errors or can't be executed.
+    """
+    try:
+        monitor = Monitor(models_of(log.skillsets, models))
+    except UnsupportedModelError as error:
+        raise AnalysisError(str(error)) from None
+    for entry in log.entries:
+        monitor.take(entry.event, entry.life)
+    return monitor.verdict
+
+
+def lines(log: Log, verdict: Verdict) -> Iterator[str]:
+    """Yield the verdict as text."""
+    if verdict.conforms:
+        yield f"{log.path}: conforms: {verdict.events} events of {', '.join(log.skillsets)}"
+    else:
+        yield f"{log.path}: does not conform"
+    for finding in verdict.findings:
+        yield f"  {finding}"
+        yield "    would have been allowed: " + "; ".join(finding.allowed)
+    for name, stamps in verdict.restarts.items():
+        yield f"  {name} was restarted at {', '.join(f'{stamp_s:.3f} s' for stamp_s in stamps)}"
+    if verdict.open:
+        yield f"  open at the end: {', '.join(verdict.open)}"
+    if verdict.owed:
+        yield f"  it ends within a step; {'; '.join(verdict.owed)} should follow"
+    if log.cut:
+        yield f"  read up to its break: {log.cut}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Judge; return the exit code."""
+    given = parse(sys.argv[1:] if arguments is None else arguments)
+    try:
+        log = read_log(given.log)
+        verdict = judge(log, given.model)
+    except AnalysisError as error:
+        sys.stderr.write(f"alula conform: {error}\n")
+        return UNREADABLE
+    if given.json:
+        text = json.dumps({"log": str(log.path), **verdict.as_dict(), "cut": log.cut}, indent=2)
+    else:
+        text = "\n".join(lines(log, verdict))
+    sys.stdout.write(text + "\n")
+    return CONFORMS if verdict.conforms else DIFFERS
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""``./alula expect``: writes expectations from a run, or holds a run against them. Ends with 0 (fulfilled), 1 (not), 2 (unreadable)."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.common.files import write_text
+from alula.records.errors import AnalysisError
+from alula.records.expectations import Checked, check, expectations_of, junit, load_expectations
+from alula.records.run import load_run
+
+FULFILLED, FAILED, UNREADABLE = 0, 1, 2
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(prog="alula expect", description="Write expectations from a run, or hold a run against them.")
+    parser.add_argument("run", type=Path, help="a run's folder, or its log")
+    parser.add_argument("--check", type=Path, metavar="FILE", help="hold the run against this file instead of writing one")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="with --check: write the results as JUnit XML, too")
+    given = parser.parse_args(arguments)
+    if given.junit is not None and given.check is None:
+        parser.error("--junit tells of a --check; add --check FILE")
+    return given
+
+
+def report(checked: Sequence[Checked]) -> int:
+    """Print what failed and how many were fulfilled; return the exit code."""
+    failed = [one for one in checked if one.problem]
+    for one in failed:
+        sys.stdout.write(f"{one}\n")
+    sys.stdout.write(f"{len(checked) - len(failed)} of {len(checked)} expectations fulfilled\n")
+    return FAILED if failed else FULFILLED
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write or check; return the exit code."""
+    given = parse(sys.argv[1:] if arguments is None else arguments)
+    try:
+        if given.check is None:
+            sys.stdout.write(expectations_of(load_run(given.run)))
+            return FULFILLED
+        expectations = load_expectations(given.check)
+        checked = check(expectations, load_run(given.run))
+        if given.junit is not None:
+            write_text(given.junit, junit(str(given.run), checked))
+    except (AnalysisError, OSError) as error:
+        sys.stderr.write(f"alula expect: {error}\n")
+        return UNREADABLE
+    return report(checked)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

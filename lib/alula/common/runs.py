@@ -1,0 +1,77 @@
+"""The runs of this checkout that are under way, and where their ROS 2 side can be talked to."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from alula.common.network import is_claimed
+from alula.common.processes import processes_of_run
+
+LATEST = "latest"
+
+
+class NoRunError(Exception):
+    """There is no such run, or it has ended; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run's folder, the DDS domain that it has claimed, and the id that its processes carry; empty: not known."""
+
+    folder: Path
+    domain: int
+    run_id: str = ""
+
+    @property
+    def live(self) -> bool:
+        """Tell whether the domain is held, and by this run: domains are used again, and what is sent there reaches the run that has it."""
+        return is_claimed(self.domain) and (not self.run_id or bool(processes_of_run(self.run_id)))
+
+
+def runs_folder() -> Path:
+    """Return the folder that runs are put into when nothing else is asked for."""
+    return Path(os.environ.get("ALULA_ROOT", ".")) / "runs"
+
+
+def load_run(folder: Path) -> Run:
+    """Read a run's folder; raise NoRunError."""
+    try:
+        known = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        return Run(folder, int(known["domain"]), str(known.get("run_id", "")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise NoRunError(f"{folder} is no run's folder: it has no run.json that names a domain") from error
+
+
+def live_runs(folder: Path | None = None) -> list[Run]:
+    """Return the runs under way, the newest first."""
+    found: list[tuple[float, Run]] = []
+    for path in (runs_folder() if folder is None else folder).glob("*/run.json"):
+        try:
+            found.append((path.stat().st_mtime, load_run(path.parent)))
+        except (OSError, NoRunError):
+            continue
+    # Domains are used again: the last run that was given one is the one that holds it.
+    newest: dict[int, Run] = {}
+    for _, run in sorted(found, key=lambda pair: pair[0], reverse=True):
+        newest.setdefault(run.domain, run)
+    return [run for run in newest.values() if run.live]
+
+
+def find_run(which: str) -> Run:
+    """Return the run of a folder, or the ``latest`` one that is under way.
+
+    Raises:
+        NoRunError: there is none, or it has ended.
+    """
+    if which == LATEST:
+        runs = live_runs()
+        if not runs:
+            raise NoRunError(f"no run is under way in {runs_folder()}; start one (./alula fly mapping), or name its folder (--run DIR)")
+        return runs[0]
+    run = load_run(Path(which))
+    if not run.live:
+        raise NoRunError(f"the run in {which} has ended: it does not hold its domain {run.domain} any more")
+    return run

@@ -1,0 +1,35 @@
+"""Hints for a name that is not known; ``python -m alula.common.suggestions NAME KNOWN...`` prints one."""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from collections.abc import Iterable, Sequence
+
+_FEW = 8
+_MANY = 500
+"""More names than this are not looked through for a hint: it has to come at once."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return a hint that names the known name nearest to this one, or lists the few there are, or is empty."""
+    candidates = sorted(set(known))[:_MANY]
+    # Names are compared without case: AVAILABLE for available is the commonest slip.
+    folded: dict[str, str] = {}
+    for candidate in candidates:
+        folded.setdefault(candidate.lower(), candidate)
+    match = difflib.get_close_matches(name.lower()[:80], folded, n=1, cutoff=0.6)
+    if match:
+        return f"did you mean `{folded[match[0]]}`?"
+    if 0 < len(candidates) <= _FEW:
+        return f"there is {quoted(candidates)}"
+    return ""
+
+
+def quoted(names: Sequence[str]) -> str:
+    """Return names in backquotes, comma separated."""
+    return ", ".join(f"`{name}`" for name in names)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(nearest(sys.argv[1], sys.argv[2:]))

@@ -1,0 +1,1 @@
+"""What editors ask about skill models: a language server over the standard streams, and what answers it."""

@@ -1,0 +1,65 @@
+"""`python -m alula.language.generate ROBOT_FOLDER... --out DIR`: make ROS 2 packages and bridge configurations.
+
+Ends with 0 when all was written, 2 when a model, a side file or the output folder is not as it should be; then nothing
+was changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.language.errors import Diagnostic, LanguageError
+from alula.language.generate.robot_files import robot_files
+from alula.language.generate.writer import prune, write_files
+from alula.language.load import load_robot
+from alula.model.span import Span
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Generate for the folders named on the command line; return the exit code."""
+    parser = argparse.ArgumentParser(prog="alula generate", description="Make interfaces, managers and the bridge's configuration.")
+    parser.add_argument("robots", nargs="+", metavar="FOLDER", type=Path, help="a robot: *.skill, types.yaml, bindings.yaml")
+    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder to put packages and configurations into")
+    parser.add_argument("--prune", action="store_true", help="remove whatever else is in DIR: what is left of models that are gone")
+    options = parser.parse_args(arguments)
+    try:
+        files = _all_files(options.robots)
+        changed = write_files(files, options.out)
+        if options.prune:
+            prune(files, options.out)
+    except LanguageError as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    except OSError as error:
+        sys.stderr.write(f"{options.out}: can't be written: {error.strerror or error}\n")
+        return 2
+    for entry in sorted({path.split("/", 1)[0] for path in files}):
+        sys.stdout.write(f"{options.out / entry}{'' if entry in changed else ' (as it was)'}\n")
+    return 0
+
+
+def _all_files(folders: Sequence[Path]) -> dict[str, str]:
+    """Return the files of all robots; raise LanguageError with the findings of all."""
+    findings: list[Diagnostic] = []
+    files: dict[str, str] = {}
+    for folder in folders:
+        try:
+            made = robot_files(load_robot(folder))
+        except LanguageError as error:
+            findings += error.diagnostics
+            continue
+        entries = {path.split("/", 1)[0] for path in made}
+        for entry in sorted(entries & {path.split("/", 1)[0] for path in files}):
+            message = f"`{entry}` would be generated for two robots; skillsets of all robots need different names"
+            findings.append(Diagnostic("ALU404", message, Span(str(folder), 0, 0, 0)))
+        files |= made
+    if findings:
+        raise LanguageError(findings)
+    return files
+
+
+if __name__ == "__main__":
+    sys.exit(main())

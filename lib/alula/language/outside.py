@@ -1,0 +1,51 @@
+"""Arrows that nothing in the model takes: no effect leads to their target, and they are not extern.
+
+In a dialect without `extern` the functional layer takes them. A fault that is out of reach only because nothing takes an
+arrow is not safe, so the search counts them as taken from outside, unless the user says that the model is all there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from alula.model.model import Effect, Resource, Skillset
+
+Arrow = tuple[str, str, str]
+"""Resource, source and target."""
+
+
+def untaken(skillset: Skillset) -> frozenset[Arrow]:
+    """Return the arrows to states that no effect leads to and no extern arrow either."""
+    taken = {(change.resource, change.target) for effect in _effects(skillset) for change in effect.assignments}
+    return frozenset(
+        (resource.name, arrow.source, arrow.target)
+        for resource in skillset.resources
+        for arrow in resource.transitions
+        if not arrow.extern and arrow.source != arrow.target and (resource.name, arrow.target) not in taken
+    )
+
+
+def opened(skillset: Skillset, arrows: frozenset[Arrow]) -> Skillset:
+    """Return the skillset with these arrows extern as well."""
+    return replace(skillset, resources=tuple(_opened(resource, arrows) for resource in skillset.resources))
+
+
+def _opened(resource: Resource, arrows: frozenset[Arrow]) -> Resource:
+    known = {(arrow.source, arrow.target) for arrow in resource.transitions if arrow.extern}
+    added = tuple(
+        replace(arrow, extern=True)
+        for arrow in resource.transitions
+        if (resource.name, arrow.source, arrow.target) in arrows and not arrow.extern and (arrow.source, arrow.target) not in known
+    )
+    return replace(resource, transitions=resource.transitions + added) if added else resource
+
+
+def _effects(skillset: Skillset) -> Iterator[Effect]:
+    for event in skillset.events:
+        yield event.effect
+    for skill in skillset.skills:
+        yield skill.start
+        yield skill.interrupt.effect
+        yield from (invariant.effect for invariant in skill.invariants)
+        yield from (result.effect for result in skill.results)

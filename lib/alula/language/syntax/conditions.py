@@ -1,0 +1,176 @@
+"""Conditions of both notations.
+
+The paper's: `resource = (a == S and not b != T)`, `data = (battery.level > 0.2)`, and both joined by and, or, not, =>.
+The Robot Language's and every property: the same without the words `resource = (...)` and `data = (...)` around it.
+
+From loose to tight: `=>` (to the right), `or`, `and`, `not`, then comparisons and parentheses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NoReturn
+
+from alula.language.lexer import Kind, Token, string_value
+from alula.language.syntax.cursor import OPERATOR_WORDS, Cursor, SyntaxFault
+from alula.language.syntax.quantities import quantity
+from alula.model.expressions import And, Comparison, Constant, DataIs, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from alula.model.span import Span
+
+MAX_DEPTH = 40
+"""Nesting beyond this is a mistake or an attack; it also keeps the recursion within Python's limit."""
+
+Atom = Callable[[int], Expression]
+_COMPARISONS = tuple(comparison.value for comparison in Comparison)
+_EQUALITIES = ("==", "!=")
+_NO_EXECUTION = frozenset({*_COMPARISONS, ".", ":", "{", "->"})
+"""What tells that `running` is a name of its own and does not belong to the name before it."""
+
+
+def paper_condition(cursor: Cursor) -> Expression:
+    """Read a condition of the paper's notation, as it stands behind `name:` in a precondition or invariant."""
+    return _Reader(cursor, bare=False).implication(0)
+
+
+def bare_condition(cursor: Cursor) -> Expression:
+    """Read a condition of the Robot Language, or of a property in either notation."""
+    return _Reader(cursor, bare=True).implication(0)
+
+
+class _Reader:
+    """Reads one condition; ``atom`` changes with where we are: outside, in `resource = (...)` or in `data = (...)`."""
+
+    def __init__(self, cursor: Cursor, *, bare: bool) -> None:
+        self.cursor = cursor
+        self.atom: Atom = self._bare_atom if bare else self._predicate
+        self._enclosed = 0
+
+    def implication(self, depth: int) -> Expression:
+        """Read `premise => conclusion`, which groups to the right."""
+        if depth > MAX_DEPTH:
+            self._too_deep()
+        premise = self._disjunction(depth)
+        if not self.cursor.accept("=>"):
+            return premise
+        return Implies(premise, self.implication(depth + 1), span=_span(premise))
+
+    def _disjunction(self, depth: int) -> Expression:
+        operands = [self._conjunction(depth)]
+        while self.cursor.accept("or"):
+            operands.append(self._conjunction(depth))
+        return operands[0] if len(operands) == 1 else Or(tuple(operands), span=_span(operands[0]))
+
+    def _conjunction(self, depth: int) -> Expression:
+        operands = [self._negation(depth)]
+        while self.cursor.accept("and"):
+            operands.append(self._negation(depth))
+        return operands[0] if len(operands) == 1 else And(tuple(operands), span=_span(operands[0]))
+
+    def _negation(self, depth: int) -> Expression:
+        if depth > MAX_DEPTH:
+            self._too_deep()
+        if token := self.cursor.accept("not"):
+            return Not(self._negation(depth + 1), span=self.cursor.span(token))
+        if token := self.cursor.accept("true", "false"):
+            return Constant(token.text == "true", span=self.cursor.span(token))
+        if self.cursor.at("("):
+            return self._parenthesised(depth + 1)
+        return self.atom(depth)
+
+    def _parenthesised(self, depth: int) -> Expression:
+        self.cursor.expect("(")
+        self._enclosed += 1
+        inner = self.implication(depth)
+        self._enclosed -= 1
+        if not self.cursor.accept(")"):
+            raise self.cursor.fail("`)`", "`and`", "`or`", "`=>`")
+        return inner
+
+    # --- the paper's predicates -----------------------------------------------------------------------------------
+
+    def _predicate(self, depth: int) -> Expression:
+        """Read `resource = (...)` or `data = (...)`."""
+        if not self.cursor.at("resource", "data"):
+            raise self.cursor.fail("`resource`", "`data`", "`not`", "`(`", hint=self._predicate_hint())
+        word = self.cursor.advance()
+        self.cursor.expect("=", hint=f"a condition is written `{word.text} = (...)`")
+        outside, self.atom = self.atom, (self._resource_atom if word.text == "resource" else self._data_atom)
+        try:
+            return self._parenthesised(depth + 1)
+        finally:
+            self.atom = outside
+
+    def _predicate_hint(self) -> str:
+        if self.cursor.ahead().text in _EQUALITIES:
+            return "put it into `resource = (...)`, or `data = (...)` if it is about data"
+        return ""
+
+    def _resource_atom(self, _depth: int) -> Expression:
+        first = self.cursor.name("a resource")
+        self._refuse_assignment()
+        operator = self.cursor.expect(*_EQUALITIES)
+        return self._is_state(first, operator)
+
+    def _data_atom(self, _depth: int) -> Expression:
+        first = self.cursor.name("data")
+        return self._is_value(first, self._path())
+
+    # --- atoms without the words ----------------------------------------------------------------------------------
+
+    def _bare_atom(self, depth: int) -> Expression:
+        cursor = self.cursor
+        if cursor.at("resource", "data") and cursor.ahead().text == "=" and cursor.ahead(2).text == "(":
+            return self._predicate(depth)
+        first = cursor.name("a condition")
+        if cursor.at("running") and cursor.ahead().text not in _NO_EXECUTION:
+            return SkillRuns(first.text, span=cursor.span(first, cursor.advance()))
+        path = self._path()
+        if not path and cursor.at(*_EQUALITIES) and cursor.ahead().kind is Kind.NAME and cursor.ahead().text not in OPERATOR_WORDS:
+            return self._is_state(first, cursor.advance())
+        if not path:
+            self._refuse_assignment()
+        return self._is_value(first, path)
+
+    def _refuse_assignment(self) -> None:
+        if self.cursor.at("=") and self.cursor.ahead().kind is Kind.NAME:
+            raise self.cursor.fail("`==`", "`!=`", hint="states are compared with `==`")
+
+    def _is_state(self, first: Token, operator: Token) -> Expression:
+        state = self.cursor.name("a state")
+        return ResourceIs(first.text, state.text, operator.text == "!=", span=self.cursor.span(first, state))
+
+    def _path(self) -> tuple[str, ...]:
+        path: list[str] = []
+        while self.cursor.accept("."):
+            path.append(self.cursor.name("a field").text)
+        return tuple(path)
+
+    def _is_value(self, first: Token, path: tuple[str, ...]) -> Expression:
+        last = self.cursor.previous
+        if not self.cursor.at(*_COMPARISONS):
+            # A truth value may stand alone.
+            return DataIs(first.text, path, Comparison.EQ, value=True, span=self.cursor.span(first, last))
+        comparison = Comparison(self.cursor.advance().text)
+        value, unit = self._value()
+        return DataIs(first.text, path, comparison, value, unit, span=self.cursor.span(first, self.cursor.previous))
+
+    def _value(self) -> tuple[float | str | bool, str]:
+        cursor = self.cursor
+        if token := cursor.accept("true", "false"):
+            return token.text == "true", ""
+        if cursor.here.kind is Kind.STRING:
+            return string_value(cursor.advance()), ""
+        if cursor.here.kind is not Kind.NUMBER:
+            other = cursor.here.kind is Kind.NAME and cursor.previous.text in _EQUALITIES
+            hint = "states are compared with a resource's name alone; those of another skillset can't be asked" if other else ""
+            raise cursor.fail("a number", 'a string in `"`', "`true`", "`false`", hint=hint)
+        return quantity(cursor, enclosed=self._enclosed > 0)
+
+    def _too_deep(self) -> NoReturn:
+        message = f"the condition is nested more than {MAX_DEPTH} deep"
+        self.cursor.source.report("ALU105", message, self.cursor.span(self.cursor.here))
+        raise SyntaxFault
+
+
+def _span(expression: Expression) -> Span:
+    return expression.span

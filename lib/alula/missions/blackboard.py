@@ -1,0 +1,67 @@
+"""What the nodes of one tree share.
+
+py_trees' own blackboard is one for the whole process, so two trees (or two tests) would write into each other's; this one is
+typed, and each mission has its own: derive from it to add what the leaves of a mission tell one another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from alula.missions.pending import PendingInterrupts
+from alula.missions.skillset import NANOSECONDS, Clock
+from alula.model.execution_state import ExecutionState
+
+
+@dataclass(frozen=True)
+class Failure:
+    """How a skill ended that should have succeeded; ``result`` names a result, a precondition or an invariant."""
+
+    leaf: str
+    skill: str
+    state: ExecutionState
+    result: str
+    message: str
+
+    def sentence(self) -> str:
+        """Return what a person wants to read."""
+        ended = self.state is ExecutionState.TERMINATED
+        what = self.result if ended else f"{self.state.value} {self.result}".strip()
+        why = self.message.removeprefix(f"{self.result}: ") if self.result else self.message
+        return f"{self.skill}: {what}" + (f" ({why})" if why else "")
+
+
+@dataclass(kw_only=True)
+class Blackboard:
+    """The mission's memory."""
+
+    clock_ns: Clock
+    pending: PendingInterrupts
+    failures: list[Failure] = field(default_factory=list)
+    reason: str = ""
+    remarks: dict[str, str] = field(default_factory=dict)
+    """Why a resource is as it is, in the robot's own words, by ``skillset.resource``."""
+
+    @property
+    def now_s(self) -> float:
+        """Mission clock."""
+        return self.clock_ns() / NANOSECONDS
+
+    def values(self) -> Mapping[str, object]:
+        """Return what is on it by name, as ``json`` can write it; what derives from this adds its own."""
+        return {"failures": [failure.sentence() for failure in self.failures], "reason": self.reason}
+
+    def note_reason(self) -> None:
+        """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""
+        sentences = dict.fromkeys(failure.sentence() for failure in self.failures)
+        self.reason = "; then ".join(sentences)
+
+    def explained(self) -> str:
+        """Return the reason as it is told at the end; a robot's blackboard may add what it knows beyond the skills."""
+        return self.reason
+
+    def because(self, resource: str) -> str:
+        """Return what is remarked on a resource, to be put behind a sentence; empty when there is nothing."""
+        remark = self.remarks.get(resource, "")
+        return f": {remark}" if remark else ""

@@ -1,0 +1,176 @@
+"""Leaves of a mission's tree: skills (green in the paper's figures) and actions internal to the tree (grey).
+
+A leaf does no work itself and never waits: it starts, looks, and stops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from typing import Generic, TypeVar
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from alula.missions.blackboard import Blackboard, Failure
+from alula.missions.skillset import Client
+from alula.model.execution_state import ExecutionState
+from alula.runtime.handle import SkillHandle
+
+Board = TypeVar("Board", bound=Blackboard)
+Inputs = Mapping[str, object] | Callable[[Board], Mapping[str, object]]
+
+
+def nothing_more(_blackboard: Blackboard) -> None:
+    """Do nothing after a success."""
+
+
+class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
+    """One skill: started when the leaf is first ticked, watched, interrupted when the tree leaves it.
+
+    RUNNING until the execution has ended; SUCCESS when it TERMINATED with a result in ``success``; else FAILURE, with a
+    `Failure` on the blackboard and its sentence as ``feedback_message``. A skill with an empty ``success`` is meant to run
+    until it is interrupted, and fails when it ends by itself. ``inputs`` may be a function of the blackboard, called at the
+    start. While another execution of the skillset that this tree has interrupted has not ended, the start waits, RUNNING.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        client: Client,
+        skill: str,
+        inputs: Inputs[Board],
+        *,
+        blackboard: Board,
+        success: Collection[str] = (),
+        on_success: Callable[[Board], None] = nothing_more,
+    ) -> None:
+        super().__init__(name)
+        self.client = client
+        self.skill = skill
+        self.handle: SkillHandle | None = None
+        self._interrupted = False
+        self._inputs = inputs
+        self._blackboard = blackboard
+        self._success = frozenset(success)
+        self._on_success = on_success
+
+    @property
+    def skill_name(self) -> str:
+        """As navigation.goto."""
+        return f"{self.client.skillset}.{self.skill}"
+
+    def initialise(self) -> None:
+        """Forget the last execution; the start itself is in `update`, because it may have to wait."""
+        self.handle = None
+        self._interrupted = False
+        self.feedback_message = ""
+
+    def update(self) -> Status:
+        """Start the skill when nothing is in its way, then follow its execution."""
+        if self.handle is None and not self._start():
+            return Status.RUNNING
+        handle = self.handle
+        if handle is None or not handle.done:
+            return Status.RUNNING
+        if handle.state is ExecutionState.TERMINATED and handle.result in self._success:
+            self.feedback_message = handle.result
+            self._on_success(self._blackboard)
+            return Status.SUCCESS
+        failure = Failure(self.name, self.skill_name, handle.state, handle.result, handle.message)
+        self._blackboard.failures.append(failure)
+        self.feedback_message = failure.sentence()
+        return Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        """Interrupt the execution when the tree leaves the leaf before its end; composites may call this again and again."""
+        if new_status is Status.INVALID and self.handle is not None and not self.handle.done and not self._interrupted:
+            self._interrupted = True
+            self.feedback_message = "interrupted"
+            self._blackboard.pending.interrupt(self.client.skillset, self.skill, self.handle)
+
+    def _start(self) -> bool:
+        waits_for = self._blackboard.pending.names(self.client.skillset)
+        if waits_for:
+            self.feedback_message = f"waits for the end of {', '.join(waits_for)}"
+            return False
+        inputs = self._inputs(self._blackboard) if callable(self._inputs) else self._inputs
+        self.feedback_message = ""
+        self.handle = self.client.start(self.skill, **inputs)
+        return True
+
+
+class Do(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
+    """Does something to the blackboard at once, and succeeds."""
+
+    def __init__(self, name: str, action: Callable[[Board], None], *, blackboard: Board) -> None:
+        super().__init__(name)
+        self._blackboard = blackboard
+        self._action = action
+
+    def update(self) -> Status:
+        """Do it."""
+        self._action(self._blackboard)
+        return Status.SUCCESS
+
+
+class Check(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+    """SUCCESS when the condition holds; otherwise FAILURE, or RUNNING until it does with ``wait``."""
+
+    def __init__(self, name: str, condition: Callable[[], bool], *, wait: bool = False) -> None:
+        super().__init__(name)
+        self._condition = condition
+        self._otherwise = Status.RUNNING if wait else Status.FAILURE
+
+    def update(self) -> Status:
+        """Look."""
+        return Status.SUCCESS if self._condition() else self._otherwise
+
+
+class Stays(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+    """SUCCESS when the condition has held for a time of mission clock without a break, FAILURE as soon as it does not."""
+
+    def __init__(self, name: str, condition: Callable[[], bool], duration_s: float, *, blackboard: Blackboard) -> None:
+        super().__init__(name)
+        self._condition = condition
+        self._duration_s = duration_s
+        self._blackboard = blackboard
+        self._since_s = 0.0
+
+    def initialise(self) -> None:
+        """Begin to count."""
+        self._since_s = self._blackboard.now_s
+
+    def update(self) -> Status:
+        """Look and count."""
+        if not self._condition():
+            return Status.FAILURE
+        return Status.SUCCESS if self._blackboard.now_s - self._since_s >= self._duration_s else Status.RUNNING
+
+
+class Awaits(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+    """SUCCESS when the condition has held for ``held_s`` without a break, FAILURE when it has not within a time of mission clock."""
+
+    def __init__(self, name: str, condition: Callable[[], bool], limit_s: float, *, held_s: float = 0.0, blackboard: Blackboard) -> None:
+        super().__init__(name)
+        self._condition = condition
+        self._limit_s = limit_s
+        self._held_s = held_s
+        self._blackboard = blackboard
+        self._since_s = 0.0
+        self._holds_since_s: float | None = None
+
+    def initialise(self) -> None:
+        """Begin to count."""
+        self._since_s = self._blackboard.now_s
+        self._holds_since_s = None
+
+    def update(self) -> Status:
+        """Look and count."""
+        now_s = self._blackboard.now_s
+        if not self._condition():
+            self._holds_since_s = None
+        elif self._holds_since_s is None:
+            self._holds_since_s = now_s
+        if self._holds_since_s is not None and now_s - self._holds_since_s >= self._held_s:
+            return Status.SUCCESS
+        return Status.RUNNING if now_s - self._since_s < self._limit_s else Status.FAILURE

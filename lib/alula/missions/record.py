@@ -1,0 +1,144 @@
+"""What a mission leaves in the run's folder, whatever middleware it ran over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from alula.common.files import write_json, write_text
+from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
+from alula.missions.director import Director, End, Outcome
+from alula.missions.drawing import draw
+from alula.missions.plan import MissionPlan
+from alula.missions.skillset import Clock
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, event_record
+from alula.runtime.handle import SkillHandle
+from alula.runtime.plain import to_plain
+
+
+class MissionRecord:
+    """Writes ``skills.mcap`` on the way, ``mission.json`` at once and at the end, ``tree.json`` and ``tree.svg`` at the end.
+
+    A folder that can't be written to any more ends the record and not the mission; ``problems`` says so.
+    """
+
+    def __init__(self, out: Path, plan: MissionPlan, clock_ns: Clock, parameters: Mapping[str, float]) -> None:
+        self.problems: list[str] = []
+        self._out = out
+        self._plan = plan
+        self._clock_ns = clock_ns
+        self._parameters = dict(parameters)
+        self._departure_s: float | None = None
+        self._unended: set[str] = set()
+        self._decisions = 0
+        self._view: Mapping[str, object] = {}
+        self._blackboard: dict[str, object] = {}
+        self._writer = RecordWriter(out / FILE)
+        # So that a mission that is killed leaves one that says `running`.
+        self._write_mission(End(Outcome.RUNNING), None, None)
+
+    @property
+    def unended(self) -> bool:
+        """Tell whether executions are open as far as the events have told: a result may be here before its event."""
+        return bool(self._unended)
+
+    @property
+    def departure_s(self) -> float | None:
+        """When the plan's state of departure was left first, seconds of mission clock."""
+        return self._departure_s
+
+    # --- what the mission comes to know ------------------------------------------------------------------------------
+
+    def event(self, event: EngineEvent) -> None:
+        """Write an event of a skillset."""
+        self._writer.write(EVENTS, event.stamp_ns, event_record(event))
+        if isinstance(event, ExecutionEvent):
+            (self._unended.discard if event.state.terminal else self._unended.add)(event.id)
+        elif self._departure_s is None and self._plan.departure == (event.resource, event.from_state):
+            self._departure_s = event.stamp_s
+
+    def report(self, skillset: str, handle: SkillHandle) -> None:
+        """Write what the tree is told of an execution."""
+        told = {"skillset": skillset, "skill": handle.skill, "id": handle.id, "state": handle.state.value, "progress": handle.progress}
+        told |= {"result": handle.result, "message": handle.message, "outputs": to_plain(handle.outputs)}
+        self._write(REPORTS, told)
+
+    def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
+        """Write a value of a data; ``stamp_ns`` None: it is not known when it came, so it is now."""
+        stamp_ns = self._clock_ns() if stamp_ns is None else stamp_ns
+        content = {"skillset": skillset, "data": data, "value": to_plain(value), "stamp_s": stamp_ns / 1e9}
+        self._writer.write(DATA, stamp_ns, content)
+
+    def abort(self, reason: str) -> None:
+        """Write that the mission is told from outside to stop; to be called before it does."""
+        self.told("abort", reason)
+
+    def told(self, command: str, reason: str) -> None:
+        """Write what the mission is told from outside (``abort``, ``pause``, ``resume``) before it obeys, and what came of it (``paused``).
+
+        The reason may be empty.
+        """
+        self._write(OPERATOR, {"command": command, "by": "mission", "reason": reason})
+
+    # --- what the mission does ---------------------------------------------------------------------------------------
+
+    def tick(self, director: Director) -> None:
+        """Write that the tree is ticked now; to be called before it is."""
+        conditions = director.conditions()
+        known = {"conditions": [[one.needed, one.unmet] for one in conditions]} if conditions else {}
+        self._write(TICKS, {"unmet": [one.unmet for one in conditions if one.unmet], **known})
+
+    def decision(self, kind: str, skillset: str, skill: str, execution_id: str, inputs: Mapping[str, object]) -> None:
+        """Write a request of the tree."""
+        self._decisions += 1
+        what: dict[str, object] = {"number": self._decisions, "kind": kind, "skillset": skillset, "skill": skill, "id": execution_id}
+        self._write(DECISIONS, {**what, "inputs": to_plain(inputs)})
+
+    def outcome_of_tick(self, director: Director) -> None:
+        """Write what a tick has changed in the tree and on the blackboard."""
+        view = director.view().as_dict()
+        if view != self._view:
+            self._view = view
+            self._write(TREE, view)
+        values = {name: to_plain(value) for name, value in director.blackboard.values().items()}
+        changed = {name: value for name, value in values.items() if name not in self._blackboard or self._blackboard[name] != value}
+        if changed:
+            self._blackboard = values
+            self._write(BLACKBOARD, changed)
+
+    def finish(self, end: End, director: Director, end_s: float) -> None:
+        """Write what is left to write."""
+        view = director.view()
+        title = f"Mission {self._plan.scenario}: {end.outcome.value.replace('_', ' ')}"
+        try:
+            write_json(self._out / "tree.json", view.as_dict())
+            write_text(self._out / "tree.svg", draw(view, title))
+        except OSError as error:
+            self.problems.append(f"the tree could not be written: {error.strerror or error}")
+        self._write_mission(end, director.start_s, end_s)
+        self._writer.close()
+
+    # --- inside ------------------------------------------------------------------------------------------------------
+
+    def _write(self, topic: str, content: Mapping[str, object]) -> None:
+        self._writer.write(topic, self._clock_ns(), content)
+
+    def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
+        if self._writer.error and self._writer.error not in self.problems:
+            self.problems.append(self._writer.error)
+        content = {
+            "scenario": self._plan.scenario,
+            "outcome": end.outcome.value,
+            "reason": end.reason,
+            "start_s": start_s,
+            "lift_off_s": self._departure_s,
+            "end_s": end_s,
+            "parameters": self._parameters,
+            "problems": self.problems,
+            **self._plan.facts(),
+        }
+        self._write(MISSION, content)
+        try:
+            write_json(self._out / "mission.json", content)
+        except OSError as error:
+            self.problems.append(f"mission.json could not be written: {error.strerror or error}")

@@ -1,0 +1,134 @@
+"""What a mission needs of a skillset: the part of the client that the leaves use, and the client that wakes the tree and keeps record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from alula.model.conditions import data_of
+from alula.model.model import Skillset
+from alula.runtime.client import Client as SkillsetClient
+from alula.runtime.handle import SkillHandle
+
+NANOSECONDS = 1e9
+Clock = Callable[[], int]
+"""Mission clock in nanoseconds."""
+
+
+class Client(Protocol):
+    """A skillset."""
+
+    @property
+    def skillset(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def ready(self) -> bool:
+        """Tell whether it can be called."""
+        ...
+
+    @property
+    def resources(self) -> Mapping[str, str]:
+        """State of every resource; empty until the skillset was heard of."""
+        ...
+
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        """Start an execution; returns at once."""
+        ...
+
+
+class Recorder(Protocol):
+    """What is written down of what passes between a tree and its skillsets."""
+
+    def report(self, skillset: str, handle: SkillHandle) -> None:
+        """Take what the tree is told of an execution."""
+        ...
+
+    def sample(self, skillset: str, data: str, value: object, stamp_ns: int | None) -> None:
+        """Take a value of a data."""
+        ...
+
+    def decision(self, kind: str, skillset: str, skill: str, execution_id: str, inputs: Mapping[str, object]) -> None:
+        """Take a request of the tree."""
+        ...
+
+
+class MissionClient:
+    """A skillset's client that has the tree ticked at once when an execution ends or a resource changes.
+
+    With a recorder it tells all that the tree asks for and is told.
+    """
+
+    def __init__(self, client: SkillsetClient, wake: Callable[[], None], recorder: Recorder | None = None) -> None:
+        self.client = client
+        self.skillset = client.skillset
+        self._wake = wake
+        self._recorder = recorder
+        self._follows_data = recorder is None
+        client.on_change(lambda _: wake())
+
+    @property
+    def ready(self) -> bool:
+        """Tell whether it can be called."""
+        if self.client.ready and not self._follows_data:
+            self._follows_data = True
+            self._follow_data()
+        return self.client.ready
+
+    @property
+    def resources(self) -> Mapping[str, str]:
+        """State of every resource; empty until the skillset was heard of."""
+        return self.client.resources
+
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        """Start an execution."""
+        handle = self.client.start(skill, **inputs)
+        if self._recorder is not None:
+            self._record(self._recorder, handle, inputs)
+        handle.add_done_callback(lambda _: self._wake())
+        return handle
+
+    def _record(self, recorder: Recorder, handle: SkillHandle, inputs: Mapping[str, object]) -> None:
+        recorder.decision("start", self.skillset, handle.skill, handle.id, inputs)
+        if handle.done:  # it could not be asked for
+            recorder.report(self.skillset, handle)
+        handle.on_request(lambda kind: recorder.decision(kind, self.skillset, handle.skill, handle.id, {}))
+        handle.on_report(lambda _: recorder.report(self.skillset, handle))
+
+    def _follow_data(self) -> None:
+        asked_for = asked_data(self.client.model)
+        for data in self.client.model.data:
+            every_s = 0.0 if data.name in asked_for else 1.0
+            self.client.data_feed(data.name).on_sample(Thinned(self._sample_of(data.name), every_s))
+
+    def _sample_of(self, name: str) -> Callable[[Any], None]:
+        def record(sample: Any) -> None:
+            if self._recorder is not None:
+                self._recorder.sample(self.skillset, name, sample.value, sample.stamp_ns)
+
+        return record
+
+
+class Thinned:
+    """Passes on samples that are at least ``every_s`` apart."""
+
+    def __init__(self, take: Callable[[Any], None], every_s: float) -> None:
+        self._take = take
+        self._every_s = every_s
+        self._last_s: float | None = None
+
+    def __call__(self, sample: Any) -> None:
+        """Take a sample."""
+        now_s = None if sample.stamp_ns is None else sample.stamp_ns / NANOSECONDS
+        if now_s is not None and self._last_s is not None and now_s - self._last_s < self._every_s:
+            return
+        self._last_s = now_s
+        self._take(sample)
+
+
+def asked_data(model: Skillset) -> set[str]:
+    """Return the names of the data that conditions of the model ask for."""
+    conditions = [p.condition for skill in model.skills for p in skill.preconditions]
+    conditions += [condition for skill in model.skills for one in skill.invariants for condition in (one.condition, one.recovered)]
+    return {atom.data for condition in conditions for atom in data_of(condition)}

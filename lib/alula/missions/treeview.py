@@ -1,0 +1,108 @@
+"""The tree as it is and as it went: for the console (JSON) and for the report (SVG)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Parallel, Selector, Sequence
+from py_trees.decorators import Decorator
+
+from alula.missions.leaves import Check, SkillLeaf, Stays
+
+INTERRUPTED = "INTERRUPTED"
+KINDS: tuple[tuple[type[Behaviour], str], ...] = (
+    (SkillLeaf, "skill"),
+    (Sequence, "sequence"),
+    (Selector, "selector"),
+    (Parallel, "parallel"),
+    (Decorator, "decorator"),
+    (Check, "condition"),
+    (Stays, "condition"),
+)
+
+
+@dataclass(frozen=True)
+class NodeView:
+    """A node at one moment; ``status`` is the last one that said something: a node that is left keeps it."""
+
+    name: str
+    kind: str
+    status: str
+    message: str
+    skill: str
+    children: tuple[NodeView, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """Return what is written as JSON."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "status": self.status,
+            "message": self.message,
+            "skill": self.skill,
+            "children": [child.as_dict() for child in self.children],
+        }
+
+    def walk(self) -> Iterator[NodeView]:
+        """Yield this node and all below, top to bottom."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+def kind_of(node: Behaviour) -> str:
+    """Return what a node is, in the words of the figures."""
+    return next((kind for cls, kind in KINDS if isinstance(node, cls)), "action")
+
+
+def path_of(node: Behaviour) -> tuple[str, ...]:
+    """Return the names of the nodes from the root down to one."""
+    above = () if node.parent is None else path_of(node.parent)
+    return (*above, str(node.name))
+
+
+class _Memory:
+    """What one node last was; ``left``: while it was running, by a tick that did not come to it."""
+
+    __slots__ = ("kind", "left", "message", "node", "status")
+
+    def __init__(self, node: Behaviour) -> None:
+        self.node = node
+        self.kind = kind_of(node)
+        self.status = Status.INVALID
+        self.left = False
+        self.message = ""
+
+
+class TreeWatch:
+    """Remembers what each node last was: py_trees forgets it when it leaves a branch. To be asked, or told, after each tick."""
+
+    def __init__(self, root: Behaviour) -> None:
+        self._root = root
+        self._memories = {node: _Memory(node) for node in root.iterate()}
+
+    def remember(self) -> None:
+        """Take note of the tree now."""
+        # Of each node at each tick: a tenth of a mocked flight's time, so nothing is made here.
+        invalid, running = Status.INVALID, Status.RUNNING
+        for memory in self._memories.values():
+            node = memory.node
+            status = node.status
+            if status is not invalid:
+                memory.status, memory.left, memory.message = status, False, node.feedback_message
+            elif memory.status is running and not memory.left:
+                memory.left, memory.message = True, node.feedback_message
+
+    def look(self) -> NodeView:
+        """Return the tree now."""
+        self.remember()
+        return self._view(self._root)
+
+    def _view(self, node: Behaviour) -> NodeView:
+        memory = self._memories[node]
+        status = INTERRUPTED if memory.left else memory.status.value
+        skill = node.skill_name if isinstance(node, SkillLeaf) else ""
+        return NodeView(node.name, memory.kind, status, memory.message, skill, tuple(self._view(child) for child in node.children))

@@ -1,0 +1,154 @@
+"""`./alula bench prove [--json FILE] [--sizes 10,20,50,100,200] [--timeout 30]`: how far the proofs scale.
+
+Grows two kinds of skillsets by skills and resources alike, and proves them one situation at a time and as sets, each
+in a process of its own: seconds of the clock and of the processor, peak memory, and where it stops. A line is printed as soon
+as it is measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from alula.model.expressions import And, ResourceIs, SkillRuns
+from alula.model.model import (
+    Assignment,
+    Effect,
+    Interrupt,
+    Invariant,
+    Precondition,
+    Property,
+    PropertyKind,
+    Resource,
+    Result,
+    Skill,
+    Skillset,
+    Transition,
+)
+from alula.prove.prover import prove
+
+ALL_ONE_BY_ONE = 10**9
+
+
+def tools(count: int) -> Skillset:
+    """Return a robot with ``count`` tools: each a resource of its own and a skill that uses it, all under one authority."""
+    authority = Resource(
+        "authority", ("Pilot", "Drone"), "Pilot", (Transition("Pilot", "Drone", extern=True), Transition("Drone", "Pilot", extern=True))
+    )
+    skills = tuple(_using(f"use{i}", [f"tool{i}"], ResourceIs("authority", "Drone")) for i in range(count))
+    never = Property("obeys", PropertyKind.NEVER, And((SkillRuns("use0"), ResourceIs("authority", "Pilot"))))
+    ends = Property("ends", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs("tool0", "Free"), fair=True)
+    return Skillset(
+        "tools", resources=(authority, *(_free_or_used(f"tool{i}") for i in range(count))), skills=skills, properties=(never, ends)
+    )
+
+
+def neighbours(count: int) -> Skillset:
+    """Return a ring of ``count`` resources and as many skills that each need two neighbours of it."""
+    skills = tuple(_using(f"join{i}", [f"part{i}", f"part{(i + 1) % count}"]) for i in range(count))
+    both = Property("apart", PropertyKind.NEVER, And((SkillRuns("join0"), SkillRuns("join1"))))
+    return Skillset("neighbours", resources=tuple(_free_or_used(f"part{i}") for i in range(count)), skills=skills, properties=(both,))
+
+
+FAMILIES = {"tools": tools, "neighbours": neighbours}
+METHODS = {"one by one": ALL_ONE_BY_ONE, "sets": 0}
+
+
+def _free_or_used(name: str) -> Resource:
+    return Resource(name, ("Free", "Used"), "Free", (Transition("Free", "Used"), Transition("Used", "Free")))
+
+
+def _using(name: str, resources: Sequence[str], needs: ResourceIs | None = None) -> Skill:
+    take = Effect("take", tuple(Assignment(one, "Used") for one in resources))
+    give = Effect("give", tuple(Assignment(one, "Free") for one in resources))
+    needed = () if needs is None else (Precondition("needs", needs),)
+    kept = () if needs is None else (Invariant("keeps", needs, give),)
+    free = tuple(Precondition(f"free_{one}", ResourceIs(one, "Free")) for one in resources)
+    held = tuple(Invariant(f"holds_{one}", ResourceIs(one, "Used")) for one in resources)
+    return Skill(
+        name,
+        preconditions=(*needed, *free),
+        start=take,
+        invariants=(*kept, *held),
+        interrupt=Interrupt(effect=give),
+        results=(Result("OK", effect=give),),
+    )
+
+
+def measure(family: str, count: int, method: str, timeout_s: float) -> dict[str, object]:
+    """Prove one skillset in this process."""
+    begin, worked = time.monotonic(), time.process_time()
+    findings = prove(FAMILIES[family](count), timeout_s=timeout_s, most=METHODS[method])
+    seconds, cpu_s = time.monotonic() - begin, time.process_time() - worked
+    return {
+        "family": family,
+        "size": count,
+        "method": method,
+        "seconds": round(seconds, 3),
+        "cpu_s": round(cpu_s, 3),
+        "peak_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "proved": not any(finding.code == "ALU540" for finding in findings),
+        "findings": sorted({finding.code for finding in findings}),
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure all sizes until a method stops; print a table, and write JSON where it is wanted."""
+    options = _parser().parse_args(arguments)
+    if options.one:
+        family, size, method = options.one
+        sys.stdout.write(json.dumps(measure(family, int(size), method, options.timeout)) + "\n")
+        return 0
+    _say(_HEAD)
+    rows: list[dict[str, object]] = []
+    for row in _all(options.sizes, options.timeout):
+        rows.append(row)
+        _say(_ROW.format(**{**row, "proved": "yes" if row["proved"] else "no"}))
+    if options.json is not None:
+        options.json.write_text(json.dumps({"timeout_s": options.timeout, "proofs": rows}, indent=2) + "\n")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="alula bench prove", description="Measure how far the proofs of skillsets scale.")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured to this file, too")
+    parser.add_argument("--sizes", type=_sizes, default=_sizes("10,20,50,100,200"), help="numbers of skills, and as many resources")
+    parser.add_argument("--timeout", type=float, default=30.0, metavar="SECONDS", help="for each proof (30)")
+    parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure this one only, in this process")
+    return parser
+
+
+def _sizes(text: str) -> list[int]:
+    return [int(size) for size in text.split(",")]
+
+
+def _all(sizes: Sequence[int], timeout_s: float) -> Iterator[dict[str, object]]:
+    """Yield a row for each size, each measured in a process of its own; a method that stops is not tried with more."""
+    program = [sys.executable, "-m", "alula.prove.bench", "--timeout", str(timeout_s), "--one"]
+    for family in FAMILIES:
+        for method in METHODS:
+            for size in sizes:
+                done = subprocess.run([*program, family, str(size), method], check=True, capture_output=True, text=True)
+                row: dict[str, object] = json.loads(done.stdout)
+                yield row
+                if not row["proved"]:
+                    break
+
+
+_HEAD = f"{'family':<12}{'method':<12}{'size':>6}{'seconds':>10}{'CPU s':>10}{'peak MB':>10}  proved"
+_ROW = "{family:<12}{method:<12}{size:>6}{seconds:>10}{cpu_s:>10}{peak_mb:>10}  {proved}"
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,30 @@
+"""The search one situation at a time."""
+
+from __future__ import annotations
+
+from alula.language.errors import Diagnostic
+from alula.model.model import Skillset
+from alula.prove.abstract import Abstraction
+from alula.prove.explore import explore
+from alula.prove.limits import Deadline
+from alula.prove.local import Suspect
+from alula.prove.properties import check_property
+from alula.prove.reachable import check_graph, crowded, decide
+from alula.prove.steps import World
+
+
+def search(
+    skillset: Skillset, abstraction: Abstraction, suspects: list[Suspect], deadline: Deadline, *, most: int, copies: int
+) -> list[Diagnostic] | None:
+    """Return all global findings, or None when there are more than ``most`` situations."""
+    graph = explore(World(abstraction, copies=copies), deadline, most=most)
+    if not graph.complete:
+        return None
+    findings = decide(skillset, graph, suspects)
+    findings += check_graph(skillset, graph)
+    findings += crowded(skillset, graph.world.crowded, copies)
+    for wanted in skillset.properties:
+        deadline.check()
+        found = check_property(graph, wanted)
+        findings += [found] if found else []
+    return findings

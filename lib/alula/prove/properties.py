@@ -1,0 +1,205 @@
+"""The user's properties over the reachable situations.
+
+A run begins in the initial situation and goes on as long as any step is possible: it is infinite, or ends where nothing
+more can happen. skillsets/PROOFS.md, How to read a finding, has what is assumed of runs; ``fair`` is `assuming termination`.
+
+NEVER and ALWAYS speak of single situations. EVENTUALLY and LEADS_TO are refuted by a lasso: a way to a loop (or to an
+end) that avoids what should come. A fair loop is one in which each skill either does not run somewhere, or is ended by a
+step of the loop: then the execution that has run longest can be the one that ends.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+
+from alula.language.errors import Diagnostic, Severity
+from alula.language.stories import Story
+from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
+from alula.model.model import Property, PropertyKind
+from alula.prove import story
+from alula.prove.explore import Edge, Graph
+from alula.prove.steps import State, World
+
+
+def check_property(graph: Graph, wanted: Property) -> Diagnostic | None:
+    """Return why a property does not hold, or None when it does."""
+    graph.deadline.check()
+    holds = [true_in(graph.world, wanted.condition, state) for state in graph.states]
+    match wanted.kind:
+        case PropertyKind.NEVER:
+            return _found(graph, wanted, next((n for n, value in enumerate(holds) if value), None))
+        case PropertyKind.ALWAYS:
+            return _found(graph, wanted, next((n for n, value in enumerate(holds) if not value), None))
+        case PropertyKind.EVENTUALLY:
+            return lasso(graph, wanted, [0], holds)
+        case PropertyKind.LEADS_TO:
+            then = [true_in(graph.world, wanted.consequence or Constant(value=False), state) for state in graph.states]
+            return lasso(graph, wanted, [n for n, value in enumerate(holds) if value], then)
+
+
+def true_in(world: World, condition: Expression, state: State) -> bool:
+    """Tell whether a condition over resources and executions is true in a situation."""
+    match condition:
+        case ResourceIs(resource=resource, state=value, negated=negated):
+            index = next(i for i, r in enumerate(world.skillset.resources) if r.name == resource)
+            return (state.resources[index] == value) != negated
+        case SkillRuns(skill=skill):
+            return skill in state.running
+        case Constant(value=value):
+            return value
+        case Not(operand=operand):
+            return not true_in(world, operand, state)
+        case And(operands=operands):
+            return all(true_in(world, operand, state) for operand in operands)
+        case Or(operands=operands):
+            return any(true_in(world, operand, state) for operand in operands)
+        case Implies(premise=premise, conclusion=conclusion):
+            return not true_in(world, premise, state) or true_in(world, conclusion, state)
+        case _:
+            raise ValueError(f"a property can't ask data: {condition}")
+
+
+def failed(wanted: Property, what: str, run: Story) -> Diagnostic:
+    """Return ALU531."""
+    message = f"property `{wanted.name}` ({wanted.kind.value}{', assuming termination' if wanted.fair else ''}) does not hold: {what}"
+    return Diagnostic("ALU531", message, wanted.span, Severity.ERROR, story=run)
+
+
+def _found(graph: Graph, wanted: Property, number: int | None) -> Diagnostic | None:
+    if number is None:
+        return None
+    return failed(wanted, story.situation(graph.world, graph.states[number]), story.to(graph, number))
+
+
+# --- runs that never get there ----------------------------------------------------------------------------------------
+
+
+def lasso(graph: Graph, wanted: Property, begins: list[int], goal: list[bool]) -> Diagnostic | None:
+    """Search from each beginning, within the situations that are not the goal, for a loop or an end."""
+    begins = [number for number in begins if not goal[number]]
+    ways = _ways(graph, begins, goal)
+    for component in _components(graph, list(ways), goal):
+        if _goes_on(graph, component, goal) and (not wanted.fair or _fair(graph, component)):
+            loop = _loop(graph, component, fair=wanted.fair)
+            prefix = _way_to(graph, ways, loop[0].source if loop else component[0])
+            return failed(wanted, "a run never gets there", story.lasso(graph, prefix, loop))
+    return None
+
+
+def _ways(graph: Graph, begins: list[int], goal: list[bool]) -> dict[int, Edge | None]:
+    """Return the situations that are reached from the beginnings without the goal, each with the step to it."""
+    ways: dict[int, Edge | None] = dict.fromkeys(begins)
+    todo = deque(begins)
+    while todo:
+        graph.deadline.check()
+        for edge in graph.edges[todo.popleft()]:
+            if edge.target not in ways and not goal[edge.target]:
+                ways[edge.target] = edge
+                todo.append(edge.target)
+    return ways
+
+
+def _way_to(graph: Graph, ways: dict[int, Edge | None], number: int) -> list[Edge]:
+    way: list[Edge] = []
+    while (edge := ways[number]) is not None:
+        way.append(edge)
+        number = edge.source
+    return [*graph.path(number), *way[::-1]]
+
+
+def _goes_on(graph: Graph, component: list[int], goal: list[bool]) -> bool:
+    """Tell whether a run can stay in a component: round a loop, or because nothing more can happen at all."""
+    inside = set(component)
+    if any(edge.target in inside for number in component for edge in graph.edges[number]):
+        return True
+    return len(component) == 1 and not graph.edges[component[0]] and not goal[component[0]]
+
+
+def _fair(graph: Graph, component: list[int]) -> bool:
+    inside = set(component)
+    always = set.intersection(*(set(graph.states[number].running) for number in component))
+    ended = {skill for n in component for edge in graph.edges[n] if edge.target in inside for skill in edge.ended}
+    return always <= ended
+
+
+def _loop(graph: Graph, component: list[int], *, fair: bool) -> list[Edge]:
+    """Return a loop in a component; a fair one comes by what ends each skill that runs all the time, and by a rest of each other."""
+    inside = set(component)
+    if not any(edge.target in inside for number in component for edge in graph.edges[number]):
+        return []
+    begin = component[0]
+    way: list[Edge] = []
+    here = begin
+    if fair:
+        while (missing := _unfair(graph, begin, way)) is not None:
+            skill = missing
+            way += _search(graph, inside, here, lambda e, skill=skill: skill in e.ended or skill not in graph.states[e.target].running)  # type: ignore[misc]
+            here = way[-1].target
+    if here != begin or not way:
+        way += _search(graph, inside, here, lambda edge: edge.target == begin)
+    return way
+
+
+def _unfair(graph: Graph, begin: int, way: list[Edge]) -> str | None:
+    """Return a skill that runs all along a way and is not ended by it."""
+    passed = [begin, *(edge.target for edge in way)]
+    always = set.intersection(*(set(graph.states[number].running) for number in passed))
+    return next(iter(sorted(always - {skill for edge in way for skill in edge.ended})), None)
+
+
+def _search(graph: Graph, inside: set[int], begin: int, wanted: Callable[[Edge], bool]) -> list[Edge]:
+    """Return a shortest way within a component whose last step is wanted."""
+    ways: dict[int, list[Edge]] = {begin: []}
+    todo = deque([begin])
+    while todo:
+        number = todo.popleft()
+        for edge in graph.edges[number]:
+            if edge.target not in inside:
+                continue
+            if wanted(edge):
+                return [*ways[number], edge]
+            if edge.target not in ways:
+                ways[edge.target] = [*ways[number], edge]
+                todo.append(edge.target)
+    raise LookupError(begin)
+
+
+def _components(graph: Graph, numbers: list[int], goal: list[bool]) -> Iterator[list[int]]:
+    """Yield the strongly connected components among these situations (Tarjan, without recursion)."""
+    index: dict[int, int] = {}
+    low: dict[int, int] = {}
+    stack: list[int] = []
+    waiting: set[int] = set()
+    for root in numbers:
+        if root in index:
+            continue
+        work = [(root, iter(graph.edges[root]))]
+        index[root] = low[root] = len(index)
+        stack.append(root)
+        waiting.add(root)
+        graph.deadline.check()
+        while work:
+            number, edges = work[-1]
+            following = next((edge.target for edge in edges if not goal[edge.target]), None)
+            if following is None:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[number])
+                if low[number] == index[number]:
+                    yield _popped(stack, waiting, number)
+            elif following not in index:
+                index[following] = low[following] = len(index)
+                stack.append(following)
+                waiting.add(following)
+                work.append((following, iter(graph.edges[following])))
+            elif following in waiting:
+                low[number] = min(low[number], index[following])
+
+
+def _popped(stack: list[int], waiting: set[int], number: int) -> list[int]:
+    component: list[int] = []
+    while not component or component[-1] != number:
+        component.append(stack.pop())
+        waiting.discard(component[-1])
+    return component[::-1]

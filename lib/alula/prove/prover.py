@@ -1,0 +1,99 @@
+"""Puts the proofs together: local checks, then the reachable situations one by one, or as sets where there are many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from alula.language.errors import Diagnostic, Severity
+from alula.language.outside import Arrow, opened, untaken
+from alula.model.model import Skillset
+from alula.prove import explicit, symbolic
+from alula.prove.abstract import without_data
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.local import Suspect, local_checks
+
+MOST_SITUATIONS = 2000
+"""More situations than this are not looked at one by one, but as sets; see ``bench``."""
+
+COPIES = 2
+"""So many executions of one skill are looked at at once."""
+
+
+def prove(
+    skillset: Skillset,
+    *,
+    closed_world: bool = False,
+    timeout_s: float = 30.0,
+    most: int = MOST_SITUATIONS,
+    copies: int = COPIES,
+) -> list[Diagnostic]:
+    """Return what is wrong with a skillset that the checker finds no error in, in the order of the source.
+
+    An arrow that nothing in the model takes may be taken from outside (see ``outside``), unless ``closed_world``. What could not
+    be decided within ``timeout_s`` seconds is a finding as well (ALU540). The skillset must be free of errors of
+    ``alula.language.check``: every name in it leads somewhere. ``most`` is how many situations are looked at one by one before they
+    are taken as sets, ``copies`` how many executions of one skill at once.
+    """
+    deadline = Deadline.after(timeout_s)
+    findings: list[Diagnostic] = []
+    suspects: list[Suspect] = []
+    try:
+        findings, suspects = local_checks(skillset, deadline)
+        search = _Search(skillset, suspects, deadline, most, copies)
+        findings += search.findings() if closed_world else search.open_findings()
+    except OutOfTimeError:
+        findings += [_unsure(suspect, deadline) for suspect in suspects]
+        findings.append(_undecided(skillset, deadline))
+    findings = list(dict.fromkeys(findings))
+    findings.sort(key=lambda finding: (finding.span.line, finding.span.column, finding.code))
+    return findings
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The search through what can be reached."""
+
+    skillset: Skillset
+    suspects: list[Suspect]
+    deadline: Deadline
+    most: int
+    copies: int
+
+    def findings(self, outside: frozenset[Arrow] = frozenset()) -> list[Diagnostic]:
+        """Return all global findings, where these arrows are taken from outside as well."""
+        skillset = opened(self.skillset, outside) if outside else self.skillset
+        abstraction = without_data(skillset, self.deadline, outside)
+        found = explicit.search(skillset, abstraction, self.suspects, self.deadline, most=self.most, copies=self.copies)
+        if found is None:
+            found = symbolic.search(skillset, abstraction, self.suspects, self.deadline, copies=self.copies)
+        return found
+
+    def open_findings(self) -> list[Diagnostic]:
+        """Return the findings of the model alone, and the errors that arrows which nothing takes lead to."""
+        findings = self.findings()
+        arrows = untaken(self.skillset)
+        if not arrows:
+            return findings
+        known = {(f.code, f.span) for f in findings if f.severity is Severity.ERROR}
+        errors = [_from_outside(f) for f in self.findings(arrows) if f.severity is Severity.ERROR and (f.code, f.span) not in known]
+        shown = {(f.code, f.span) for f in errors}
+        return [f for f in findings if (f.code, f.span) not in shown] + errors
+
+
+def _from_outside(finding: Diagnostic) -> Diagnostic:
+    """Say of a finding that it needs arrows which nothing in the model takes."""
+    missing = "nothing in the model takes the arrow that comes from outside"
+    hint = f"{missing}: make it `extern`, add a skill or event that takes it, or use `--closed-world`"
+    return replace(finding, hint=f"{finding.hint}; {hint}" if finding.hint else hint)
+
+
+def _undecided(skillset: Skillset, deadline: Deadline) -> Diagnostic:
+    """Return ALU540: an error where the user wants something proved."""
+    severity = Severity.ERROR if skillset.properties else Severity.WARNING
+    message = f"not proved within {deadline.given_s:.3g} s"
+    return Diagnostic("ALU540", message, skillset.span, severity, "allow more time, or model the skillset with fewer resources")
+
+
+def _unsure(suspect: Suspect, deadline: Deadline) -> Diagnostic:
+    message = f"{suspect.finding.message}; whether it comes to that was not found out within {deadline.given_s:.3g} s"
+    return replace(suspect.finding, message=message)

@@ -1,0 +1,185 @@
+"""The search with sets of situations, for skillsets with more than can be looked at one by one."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from alula.language.errors import Diagnostic, Severity
+from alula.language.stories import Story
+from alula.model.expressions import Constant
+from alula.model.model import Property, PropertyKind, Skill, Skillset
+from alula.prove import reachable, story
+from alula.prove.abstract import Abstraction
+from alula.prove.diagrams import Encoded
+from alula.prove.encoding import encode
+from alula.prove.limits import Deadline
+from alula.prove.local import Suspect
+from alula.prove.properties import failed, lasso, true_in
+from alula.prove.sets import Sets
+from alula.prove.steps import Key, World
+from alula.prove.walk import MOST_IN_A_LOOP, Walker
+
+
+def search(
+    skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int
+) -> list[Diagnostic]:
+    """Return all global findings; raise OutOfTimeError."""
+    return _Search(skillset, abstraction, deadline, copies).findings(list(suspects))
+
+
+class _Search:
+    def __init__(self, skillset: Skillset, abstraction: Abstraction, deadline: Deadline, copies: int) -> None:
+        self.skillset = skillset
+        self.copies = copies
+        self.world = World(abstraction, copies=copies)
+        self.model: Encoded = encode(abstraction, copies, deadline)
+        self.sets = Sets(self.model, deadline)
+        self.walker = Walker(self.world, self.sets)
+
+    def findings(self, suspects: list[Suspect]) -> list[Diagnostic]:
+        """Return the findings of all checks."""
+        findings = reachable.judged(self.skillset, suspects, self._stories({suspect.key for suspect in suspects}))
+        findings += reachable.unreachable_states(self.skillset, [set(self._seen(r.name)) for r in self.skillset.resources])
+        findings += [reachable.dead_skill(skill) for skill in self.skillset.skills if self._dead(skill)]
+        findings += self._held_twice()
+        findings += self._lost()
+        findings += reachable.crowded(self.skillset, self._crowded(), self.copies)
+        for wanted in self.skillset.properties:
+            found = self._property(wanted)
+            findings += [found] if found else []
+        return findings
+
+    # --- faults ---------------------------------------------------------------------------------------------------
+
+    def _stories(self, suspected: set[Key]) -> dict[Key, Story]:
+        """Return the story of each fault that is reached: of effects, and of what else is suspected."""
+        stories: dict[Key, Story] = {}
+        for fault, goal in self._shown():
+            if fault[0] != "effect" and fault not in suspected:
+                continue
+            moves = self.walker.fault(fault, goal)
+            if moves is not None:
+                stories[fault] = story.walked(self.world, self.world.initial(), moves, fault)
+        return stories
+
+    def _shown(self) -> Iterator[tuple[Key, Any]]:
+        """Yield each fault that is reached with the situations before its step."""
+        for fault, where in self.model.faults.items():
+            if where & self.sets.reached != self.sets.bdd.false:
+                yield fault, where & self.sets.reached
+        for fault, where in self.model.inner.items():
+            if where & self.sets.inside != self.sets.bdd.false:
+                yield fault, self.sets.before(self.sets.bdd.false, within=where)
+
+    # --- what can be reached --------------------------------------------------------------------------------------
+
+    def _reaches(self, goal: Any) -> bool:
+        return bool(self.sets.reached & goal != self.sets.bdd.false)
+
+    def _seen(self, resource: str) -> Iterator[str]:
+        return (state for state in self.skillset.resource(resource).states if self._reaches(self.model.is_state(resource, state)))
+
+    def _dead(self, skill: Skill) -> bool:
+        asked_in_vain = self.model.faults["effect", "start", skill.name]
+        return not self._reaches(self.model.startable[skill.name]) and not self._reaches(asked_in_vain)
+
+    def _crowded(self) -> set[str]:
+        changing = {s.name for s in self.skillset.skills if s.name not in self.world.idle}
+        return {name for name in changing if self._reaches(self.model.crowded[name])}
+
+    def _held_twice(self) -> list[Diagnostic]:
+        findings: list[Diagnostic] = []
+        taken: dict[tuple[str, str], list[str]] = {}
+        for skill in self.skillset.skills:
+            for resource, state in reachable.takes(skill).items():
+                taken.setdefault((resource, state), []).append(skill.name)
+        for (resource, state), names in taken.items():
+            here = self.sets.reached & self.model.is_state(resource, state)
+            for first, second in itertools.combinations_with_replacement(names, 2):
+                both = here & (self.model.runs(first, 2) if first == second else self.model.runs(first) & self.model.runs(second))
+                moves = self.walker.to(both) if both != self.sets.bdd.false else None
+                if moves is not None:
+                    run = story.walked(self.world, self.world.initial(), moves)
+                    findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), run))
+        return findings
+
+    def _lost(self) -> list[Diagnostic]:
+        """Return skills that can be lost; where all can go back to the beginning, what starts at all can start again."""
+        if self.sets.can_come_to(self.sets.initial) == self.sets.reached:
+            return []
+        groups: dict[Story, list[str]] = {}
+        for skill in self.skillset.skills:
+            starts = self.model.startable[skill.name] & self.sets.reached
+            hopeless = self.sets.reached & ~self.sets.can_come_to(starts)
+            if self.sets.bdd.false in {starts, hopeless}:
+                continue
+            moves = self.walker.to(hopeless)
+            if moves is not None:
+                groups.setdefault(story.walked(self.world, self.world.initial(), moves), []).append(skill.name)
+        return [reachable.lost(self.skillset, names, run) for run, names in groups.items()]
+
+    # --- properties -----------------------------------------------------------------------------------------------
+
+    def _property(self, wanted: Property) -> Diagnostic | None:
+        condition = self.model.term(wanted.condition)
+        match wanted.kind:
+            case PropertyKind.NEVER:
+                return self._single(wanted, condition)
+            case PropertyKind.ALWAYS:
+                return self._single(wanted, ~condition)
+            case PropertyKind.EVENTUALLY:
+                return self._run(wanted, self.sets.initial, condition)
+            case PropertyKind.LEADS_TO:
+                return self._run(wanted, condition, self.model.term(wanted.consequence or Constant(value=False)))
+
+    def _single(self, wanted: Property, bad: Any) -> Diagnostic | None:
+        if not self._reaches(bad):
+            return None
+        moves = self.walker.to(bad)
+        if moves is None:
+            return _unsure(wanted)
+        run = story.walked(self.world, self.world.initial(), moves)
+        return failed(wanted, story.situation(self.world, self.walker.end(moves)), run)
+
+    def _run(self, wanted: Property, begins: Any, goal: Any) -> Diagnostic | None:
+        """Look for a run that avoids the goal for ever; a set that allows one is walked before it is believed."""
+        avoiding = self._for_ever(goal, fair=wanted.fair)
+        if not self._reaches(begins & avoiding):
+            return None
+        condition = wanted.condition if wanted.kind is PropertyKind.EVENTUALLY else wanted.consequence or Constant(value=False)
+        suspected = begins & avoiding & self.sets.reached
+        while suspected != self.sets.bdd.false:
+            moves = self.walker.to(suspected)
+            if moves is None:
+                return _unsure(wanted)
+            graph, looked = self.walker.graph(moves, avoiding)
+            closed = [n not in looked or true_in(self.world, condition, state) for n, state in enumerate(graph.states)]
+            refuted = lasso(graph, wanted, [len(moves)], closed)
+            if refuted is not None or len(looked) >= MOST_IN_A_LOOP:
+                return refuted or _unsure(wanted)
+            # All that can follow was looked at: what led here are steps that come back to where they began.
+            suspected &= ~self.sets.only(graph.states[number] for number in looked)
+        return None
+
+    def _for_ever(self, goal: Any, *, fair: bool) -> Any:
+        """Return all from which a run may avoid the goal for ever (Emerson and Lei's greatest fixpoint), or more."""
+        sets = self.sets
+        stuck = sets.reached & ~sets.before(sets.reached)
+        avoiding, before = sets.reached & ~goal, sets.bdd.false
+        while avoiding != before:
+            before = avoiding
+            avoiding &= sets.before(avoiding) | stuck
+            for skill in self.skillset.skills if fair else ():
+                rests = ~self.model.runs(skill.name)
+                if avoiding & ~rests == sets.bdd.false:
+                    continue
+                good = avoiding & (rests | sets.before(avoiding, ending=skill.name))
+                avoiding = sets.can_come_to(good, avoiding=~avoiding)
+        return avoiding
+
+
+def _unsure(wanted: Property) -> Diagnostic:
+    message = f"property `{wanted.name}` was neither proved nor refuted: a run against it may exist, but none was found to show"
+    return Diagnostic("ALU540", message, wanted.span, Severity.ERROR)

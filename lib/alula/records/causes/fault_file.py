@@ -1,0 +1,79 @@
+"""Reads ``faults.yaml``, which stands beside a robot's models: what its faults and the ends of its processes can bring about."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.robots import FAULTS, robot_of
+from alula.model.execution_state import ExecutionState as S
+from alula.model.model import Skill, Skillset
+from alula.records.causes.reach import Reach, Reaches
+from alula.records.errors import AnalysisError
+from alula.records.models import models_of
+
+SECTIONS = ("faults", "processes")
+PARTS = ("states", "later", "ends")
+ANY = "*"
+BAD_ENDS = (S.FAILED.value, S.INTERRUPTED.value, S.NOT_VALIDATED.value)
+"""States in which an execution ends without the name of a result or a condition."""
+
+Members = Mapping[str, Collection[str]]
+"""By ``skillset.resource`` its states; by ``skillset.skill`` how it can end."""
+
+
+def reaches_of(skillsets: Iterable[str]) -> Reaches:
+    """Return what is known of the robot that has these skillsets; of a robot without ``faults.yaml`` nothing is.
+
+    Raises:
+        AnalysisError: the file can't be read or is wrong; the message names file and line.
+    """
+    robot = robot_of(skillsets)
+    file = None if robot is None else robot.file(FAULTS)
+    return Reaches() if robot is None or file is None else load_reaches(file, models_of(robot.skillsets))
+
+
+def load_reaches(path: Path, skillsets: Sequence[Skillset]) -> Reaches:
+    """Read a file, and check it against the models of the robot.
+
+    Raises:
+        AnalysisError: the file can't be read or is wrong; the message names file and line.
+    """
+    document = read_yaml(path, AnalysisError)
+    sections = {} if document is None else document.record("a file of faults", SECTIONS)
+    states = {f"{one.name}.{resource.name}": resource.states for one in skillsets for resource in one.resources}
+    ends = {f"{one.name}.{skill.name}": _ends(skill) for one in skillsets for skill in one.skills}
+    known: dict[str, Reach] = {}
+    for section, part in sections.items():
+        for name, entry in part.entries(f"`{section}`").items():
+            if name in known:
+                raise entry.wrong(f"`{name}` is a fault already; a process needs another name")
+            said = entry.record(f"`{name}`", PARTS)
+            known[name] = Reach(
+                states=_read(said.get("states"), "resource", "state", states),
+                later=_read(said.get("later"), "resource", "state", states),
+                ends=_read(said.get("ends"), "skill", "end", ends),
+            )
+    return Reaches(known)
+
+
+def _ends(skill: Skill) -> tuple[str, ...]:
+    return (*(result.name for result in skill.results), *(invariant.name for invariant in skill.invariants), *BAD_ENDS)
+
+
+def _read(part: Located | None, kind: str, word: str, members: Members) -> frozenset[str]:
+    """Return the patterns of a part: ``skillset.name`` with a word or a list of words; ``*`` stands for anything."""
+    found = set()
+    for pattern, entry in ({} if part is None else part.entries(f"{kind}s")).items():
+        matching = [name for name in members if fnmatchcase(name, pattern)]
+        if not matching:
+            raise entry.wrong(f"there is no {kind} `{pattern}`; there are {choices(pattern, members)}")
+        known = dict.fromkeys(text for name in matching for text in members[name])
+        for element in entry.elements():
+            text = element.text(f"a {word}")
+            if text != ANY and text not in known:
+                raise element.wrong(f"{pattern} has no {word} `{text}`; it has {choices(text, known)}")
+            found.add(f"{pattern} {text}")
+    return frozenset(found)

@@ -1,0 +1,112 @@
+"""Faults of a run, and what followed from each: which resource told of it, which skills failed because of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from alula.common.faults import FaultRequest, spans_of
+from alula.records.causes.failures import SkillFailure, skill_failures
+from alula.records.causes.reach import Reach, Reaches
+from alula.runtime.core.events import EngineEvent, TransitionEvent
+from alula.runtime.mock import Behaviour
+
+EARLY_S = 0.05
+"""The managers' clock ticks at 50 Hz: an event's stamp may be some ticks older than what caused it."""
+LATE_S = 5.0
+"""A fault that has ended can still show for so long: the patience of the watches, 3 s, and what they say has to arrive."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that failed, or a process that ended, from ``at_s`` to ``until_s``, seconds of mission clock."""
+
+    name: str
+    at_s: float
+    until_s: float = math.inf
+    reach: Reach = field(default_factory=Reach)
+
+    def holds(self, t_s: float) -> bool:
+        """Tell whether what happened at this time can follow from it."""
+        return self.at_s - EARLY_S <= t_s <= self.until_s + LATE_S
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A fault and what followed from it, in the order of the events; ``changes`` are those of resources that told of it."""
+
+    fault: Fault
+    changes: tuple[TransitionEvent, ...] = ()
+    failures: tuple[SkillFailure, ...] = ()
+
+    @property
+    def first(self) -> EngineEvent | None:
+        """What told of it first; None: nothing."""
+        events: list[EngineEvent] = [*self.changes, *(one.end for one in self.failures)]
+        return min(events, key=lambda event: event.stamp_s, default=None)
+
+    @property
+    def detected_s(self) -> float | None:
+        """When the skill layer first told of it, seconds of mission clock; None: never."""
+        return None if self.first is None else self.first.stamp_s
+
+
+def faults_asked(
+    requests: Sequence[FaultRequest],
+    events: Sequence[EngineEvent],
+    lift_off_s: float | None,
+    reaches: Reaches,
+    *,
+    first_s: Mapping[str, float] | None = None,
+    behaviour: Behaviour | None = None,
+) -> list[tuple[FaultRequest, Fault]]:
+    """Return the faults that were asked for and came, with their requests, in the order of time.
+
+    Args:
+        requests: as on the command line.
+        events: of the run.
+        lift_off_s: seconds of mission clock; None: it never lifted off.
+        reaches: of the robot.
+        first_s: what mocks say (see ``alula.common.faults.spans_of``).
+        behaviour: of the mocks, which says what the faults reach.
+    """
+    stamps = [event.stamp_s for event in events]
+    begun_s, ended_s = min(stamps, default=0.0), max(stamps, default=-math.inf)
+    found = []
+    for span in spans_of(requests, begun_s=begun_s, lift_off_s=lift_off_s, ended_s=ended_s, first_s=first_s):
+        name = f"{span.request.what}:{span.request.how}" if span.request.how else span.request.what
+        found.append((span.request, Fault(name, span.at_s, span.until_s, reaches.of(name, behaviour))))
+    return found
+
+
+def trace(faults: Sequence[Fault], events: Sequence[EngineEvent]) -> list[Traced]:
+    """Return what followed from each fault.
+
+    A change of a resource follows from the last fault before it that can show so and had not ended long before; else from the last one
+    that can lead to it later, which tells of nothing. A skill's failure follows from the fault behind the newest change that it names;
+    one that names no change, from the last fault that holds and reaches such an end. Nothing follows from two faults, and what none
+    explains from none.
+    """
+    causes = {at: cause for at, event in enumerate(events) if (cause := _cause(faults, event)) is not None}
+    changes: list[list[TransitionEvent]] = [[] for _ in faults]
+    for at, cause in causes.items():
+        event = events[at]
+        if isinstance(event, TransitionEvent) and faults[cause].reach.shows(event):
+            changes[cause].append(event)
+    failures: list[list[SkillFailure]] = [[] for _ in faults]
+    for failure in skill_failures(events):
+        behind = next((causes[at] for at in failure.behind if at in causes), None) if failure.behind else causes.get(failure.at)
+        if behind is not None:
+            failures[behind].append(failure)
+    return [Traced(fault, tuple(changes[at]), tuple(failures[at])) for at, fault in enumerate(faults)]
+
+
+def _cause(faults: Sequence[Fault], event: EngineEvent) -> int | None:
+    """Return the place of the last fault that can have brought about an event by itself."""
+    holding = [at for at, fault in enumerate(faults) if fault.holds(event.stamp_s)]
+    if isinstance(event, TransitionEvent):
+        reaching = [at for at in holding if faults[at].reach.shows(event)] or [at for at in holding if faults[at].reach.leads_to(event)]
+    else:
+        reaching = [at for at in holding if faults[at].reach.stops(event)]
+    return max(reaching, key=lambda at: faults[at].at_s, default=None)

@@ -1,0 +1,77 @@
+"""What a fault, or the end of a process, can bring about in the skill layer first: changes of resources and ends of skills."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+
+from alula.runtime.core.events import ExecutionEvent, TransitionEvent
+from alula.runtime.mock import Behaviour
+from alula.runtime.mock.behaviour import Place
+
+EXTERN = "extern"
+"""The cause of a change that the functional layer reported."""
+WELL = "OK"
+"""The state of a resource ``NAME_status`` whose sensor or function works."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Patterns in which ``*`` stands for anything.
+
+    Attributes:
+        states: ``skillset.resource STATE`` that tell of it.
+        later: states that it can bring about by what is done about it, such as the landing of a failsafe.
+        ends: ``skillset.skill END`` of executions that no change of a resource explains: the name of the result or the invariant, else
+            the state.
+    """
+
+    states: frozenset[str] = field(default_factory=frozenset)
+    later: frozenset[str] = field(default_factory=frozenset)
+    ends: frozenset[str] = field(default_factory=frozenset)
+
+    def shows(self, change: TransitionEvent) -> bool:
+        """Tell whether it can be what the functional layer reported with a change of a resource."""
+        return _reported(change) and _any(self.states, f"{change.skillset}.{change.resource} {change.to_state}")
+
+    def leads_to(self, change: TransitionEvent) -> bool:
+        """Tell whether the change can be of what was done about it."""
+        return _reported(change) and _any(self.later, f"{change.skillset}.{change.resource} {change.to_state}")
+
+    def stops(self, end: ExecutionEvent) -> bool:
+        """Tell whether an execution can end like this because of it."""
+        return _any(self.ends, f"{end.skillset}.{end.skill} {end.result or end.state.value}")
+
+
+def _reported(change: TransitionEvent) -> bool:
+    return change.cause == EXTERN and change.to_state != WELL
+
+
+def _any(patterns: Iterable[str], text: str) -> bool:
+    return any(fnmatchcase(text, pattern) for pattern in patterns)
+
+
+@dataclass(frozen=True)
+class Reaches:
+    """What the faults of a robot, and the ends of its processes, can bring about; ``known``: by name, without the way of failing."""
+
+    known: Mapping[str, Reach] = field(default_factory=dict)
+
+    def of(self, name: str, behaviour: Behaviour | None = None) -> Reach:
+        """Return the reach of a fault or a process by its name, as in ``radio`` or ``radio:out``.
+
+        What is not known reaches what has its name: the resource ``NAME_status`` and the skillset NAME. A fault that a behaviour of mocks
+        declares brings about the states that are said there.
+        """
+        what = name.partition(":")[0]
+        found = self.known.get(what) or Reach(frozenset([f"*.{what}_status *"]), ends=frozenset([f"{what}.*"]))
+        fault = None if behaviour is None else behaviour.faults.get(name) or behaviour.faults.get(what)
+        if fault is None:
+            return found
+        later = [_named(change.states) for change in fault.changes]
+        return Reach(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
+
+
+def _named(words: Mapping[Place, str]) -> frozenset[str]:
+    return frozenset(f"{'.'.join(place)} {word}" for place, word in words.items())

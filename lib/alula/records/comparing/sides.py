@@ -1,0 +1,155 @@
+"""What is compared of each run, and the first decision that is not alike."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+from alula.model.execution_state import ExecutionState as S
+from alula.records.errors import AnalysisError
+from alula.records.run import Run, load_run
+from alula.runtime.core.events import EngineEvent, ExecutionEvent
+
+TOGETHER_S = 0.05
+"""Decisions about several skillsets that are no farther apart have no order: each skillset tells of them by itself."""
+FIGURES: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "duration": (("duration_s",), "s"),
+    "detected after": (("recovery", "detected_s"), "s"),
+    "fallback after": (("recovery", "fallback_running_s"), "s"),
+    "moving after": (("recovery", "moving_again_s"), "s"),
+    "clearance": (("min_clearance_m",), "m"),
+    "collisions": (("collisions",), ""),
+    "flown": (("distance_m",), "m"),
+    "map points": (("map", "points"), ""),
+    "map coverage": (("map", "coverage"), ""),
+    "map rmse": (("map", "rmse_m"), "m"),
+    "least frames": (("video", "min_fps"), "1/s"),
+    "least SSIM": (("video", "min_ssim"), ""),
+    "video delay": (("video", "p95_delay_s"), "s"),
+    "freezes": (("video", "freezes"), ""),
+}
+"""What ``summary.json`` has of each figure, and its unit. Recovery times count from the failure."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The mission starts or interrupts a skill, ``at_s`` seconds after lift-off."""
+
+    what: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class Side:
+    """One run: its decisions in order, the times in which skills ran, and its figures, None where they are not known."""
+
+    name: str
+    outcome: str
+    decisions: Sequence[Decision]
+    spans: Sequence[tuple[str, float, float]]
+    figures: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The runs, and for each but the first where it decides otherwise than the first: the number of the decision, None: nowhere."""
+
+    sides: Sequence[Side]
+    differs_at: Sequence[int | None]
+
+    @property
+    def alike(self) -> bool:
+        """Tell whether all have decided the same."""
+        return all(at is None for at in self.differs_at)
+
+
+def load_side(path: Path, name: str) -> Side:
+    """Read a run; raises AnalysisError."""
+    run = load_run(path)
+    summary = _summary(path)
+    figures = {figure: _figure(summary, where) for figure, (where, _) in FIGURES.items()}
+    if figures["duration"] is None:
+        figures["duration"] = run.events[-1].stamp_s - run.events[0].stamp_s
+    return Side(name, run.outcome, decisions_of(run), list(_spans(run)), figures)
+
+
+def compare(sides: Sequence[Side]) -> Compared:
+    """Hold the decisions of each run against those of the first."""
+    first = [decision.what for decision in sides[0].decisions]
+    return Compared(sides, [_first_difference(first, [decision.what for decision in side.decisions]) for side in sides[1:]])
+
+
+def _first_difference(ours: Sequence[str], theirs: Sequence[str]) -> int | None:
+    pairs = enumerate(zip_longest(ours, theirs))
+    return next((at for at, (one, other) in pairs if one != other), None)
+
+
+def decisions_of(run: Run) -> list[Decision]:
+    """Return what the mission has asked of the skills: starts and interruptions, without their inputs."""
+    asked: list[ExecutionEvent] = []
+    seen: set[str] = set()
+    for event in run.events:
+        if isinstance(event, ExecutionEvent) and (kind := _kind(event)) and f"{kind} {event.id}" not in seen:
+            seen.add(f"{kind} {event.id}")
+            asked.append(event)
+    return [Decision(f"{_kind(event)} {event.skillset}.{event.skill}", run.time_s(event)) for event in _ordered(asked)]
+
+
+def _kind(event: ExecutionEvent) -> str:
+    if event.state is S.REQUESTED:
+        return "start"
+    return "interrupt" if event.state in {S.INTERRUPTING, S.INTERRUPTED} else ""
+
+
+def _ordered(events: Sequence[ExecutionEvent]) -> list[ExecutionEvent]:
+    groups: list[list[ExecutionEvent]] = []
+    for event in events:
+        if groups and event.stamp_s - groups[-1][0].stamp_s <= TOGETHER_S:
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+    return [event for group in groups for event in sorted(group, key=lambda one: one.skillset)]
+
+
+def _spans(run: Run) -> Iterator[tuple[str, float, float]]:
+    """Yield each execution that ran: skill, and from when to when, seconds since lift-off."""
+    since: dict[str, float] = {}
+    for event in run.events:
+        if isinstance(event, ExecutionEvent):
+            if event.state is S.RUNNING:
+                since.setdefault(event.id, run.time_s(event))
+            elif event.state.terminal and event.id in since:
+                yield f"{event.skillset}.{event.skill}", since.pop(event.id), run.time_s(event)
+    last: EngineEvent = run.events[-1]
+    skills = {event.id: f"{event.skillset}.{event.skill}" for event in run.events if isinstance(event, ExecutionEvent)}
+    yield from ((skills[name], begun_s, run.time_s(last)) for name, begun_s in since.items())
+
+
+def _summary(path: Path) -> Mapping[str, Any]:
+    file = (path if path.is_dir() else path.parent) / "summary.json"
+    if not file.is_file():
+        return {}
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise AnalysisError(f"{file}: can't be read: {error}") from None
+    return content if isinstance(content, dict) else {}
+
+
+def _figure(summary: Mapping[str, Any], where: tuple[str, ...]) -> float | None:
+    value = _number(summary, where)
+    if value is not None and where[0] == "recovery":
+        failure_s = _number(summary, ("recovery", "failure_s"))
+        return None if failure_s is None else value - failure_s
+    return value
+
+
+def _number(summary: Mapping[str, Any], where: tuple[str, ...]) -> float | None:
+    value: Any = summary
+    for name in where:
+        value = value.get(name) if isinstance(value, dict) else None
+    return None if isinstance(value, bool) or not isinstance(value, int | float) else float(value)

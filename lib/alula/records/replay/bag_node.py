@@ -1,0 +1,104 @@
+"""What the drone's hooks need of a node, in virtual time, with the answers of a recorded flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from alula.runtime.local import Timer, VirtualClock
+from alula.runtime.plain import to_plain
+
+Subscribers = dict[str, list[Callable[[Any], None]]]
+
+
+class RecordedFuture:
+    """An answer that comes, or does not."""
+
+    def __init__(self) -> None:
+        self._result: Any = None
+        self._callbacks: list[Callable[[RecordedFuture], None]] = []
+
+    def add_done_callback(self, callback: Callable[[RecordedFuture], None]) -> None:
+        """Have a callback called when the answer comes."""
+        self._callbacks.append(callback)
+
+    def result(self) -> Any:
+        """Return the answer."""
+        return self._result
+
+    def resolve(self, result: Any) -> None:
+        """Let the answer come."""
+        self._result = result
+        for callback in self._callbacks:
+            callback(self)
+
+
+Answer = Callable[[str, Mapping[str, Any]], RecordedFuture]
+"""What is called with a service's name and a request."""
+
+
+class RecordedService:
+    """A client of a service whose answers are recorded."""
+
+    def __init__(self, name: str, answer: Answer) -> None:
+        self.srv_name = name
+        self._answer = answer
+
+    def service_is_ready(self) -> bool:
+        """Tell that it is there."""
+        return True
+
+    def call_async(self, request: Any) -> RecordedFuture:
+        """Call it."""
+        return self._answer(self.srv_name, to_plain(request))
+
+    def remove_pending_request(self, future: RecordedFuture) -> None:
+        """Nothing waits here."""
+
+
+class BagNode:
+    """What the drone's hooks use of an rclpy node, in virtual time, over a bag.
+
+    Args:
+        clock: the mission clock.
+        answer: what answers calls of services.
+        subscribers: the callbacks by topic, to which this node's are added.
+        is_silent: whether the functional layer says nothing more, so that timers end.
+    """
+
+    def __init__(self, clock: VirtualClock, answer: Answer, subscribers: Subscribers, is_silent: Callable[[], bool]) -> None:
+        self._clock = clock
+        self._answer = answer
+        self._subscribers = subscribers
+        self._is_silent = is_silent
+
+    def get_clock(self) -> BagNode:
+        """Return what tells the time."""
+        return self
+
+    def now(self) -> SimpleNamespace:
+        """Return the mission clock."""
+        return SimpleNamespace(nanoseconds=self._clock.now_ns)
+
+    def create_timer(self, period_s: float, callback: Callable[[], None], **_: object) -> Timer:
+        """Have a callback called again and again."""
+
+        def again() -> None:
+            if not self._is_silent():
+                self._clock.after(period_s, again)
+                callback()
+
+        return self._clock.after(period_s, again)
+
+    def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
+        """Connect to a service."""
+        return RecordedService(name, self._answer)
+
+    def create_subscription(self, _kind: object, topic: str, callback: Callable[[Any], None], *_: object, **__: object) -> None:
+        """Follow a topic."""
+        self._subscribers.setdefault(topic, []).append(callback)
+
+    def declare_parameter(self, _name: str, value: object) -> SimpleNamespace:
+        """Return the parameter's default."""
+        return SimpleNamespace(value=value)

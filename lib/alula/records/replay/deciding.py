@@ -1,0 +1,109 @@
+"""Decides a recorded mission again, as it was or with one thing changed: the steps of a replay that need no measurements and no report.
+
+1. ``read_mission``: the record, the mission's tree and models, or others, and the mocks that answer what was not recorded.
+2. ``decide``: what was recorded happens again, and the tree decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from alula.common.record import Entry
+from alula.missions.plan import MissionPlan
+from alula.missions.record import MissionRecord
+from alula.model.model import Skillset
+from alula.records.replay.asked import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
+from alula.records.replay.recorded import Recorded, ReplayError
+from alula.records.replay.replay import Replay, Result
+from alula.records.replay.vehicle import RecordedSkills, Vehicle
+from alula.runtime.mock import Behaviour
+
+BAG = "functional.bag"
+
+
+@dataclass(frozen=True)
+class RecordedMission:
+    """What is decided again: the record, its plan or another one, the models, and what mocks do where nothing was recorded."""
+
+    recorded: Recorded
+    plan: MissionPlan
+    skillsets: Sequence[Skillset]
+    behaviour: Behaviour
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which conditions it is decided again.
+
+    Attributes:
+        bag: of the functional layer, which answers; None: the skills end as they did.
+        fail: what did not fail then, as on the command line.
+        settings: other parameters of the mission, ``NAME=VALUE``.
+        go_on: go on over mocks after the first difference.
+        rate: mission clock a second at most; 0: no limit.
+        out: folder of the replay's own record; None: it leaves none.
+    """
+
+    bag: Path | None = None
+    fail: Sequence[str] = ()
+    settings: Sequence[str] = ()
+    go_on: bool = False
+    rate: float = 0.0
+    out: Path | None = None
+
+
+def read_mission(recorded: Recorded, *, tree: str = "", models: Sequence[Path] = (), behaviour: Sequence[Path] = ()) -> RecordedMission:
+    """Return a recorded mission with another tree, other models, or more behaviour of the mocks; raises ReplayError."""
+    plan = plan_for(recorded, tree)
+    skillsets = skillsets_for(plan, models)
+    return RecordedMission(recorded, plan, skillsets, behaviour_for(recorded, skillsets, behaviour))
+
+
+def bag_of(recorded: Recorded, given: Path) -> Path:
+    """Return the bag that was given, or the one beside the record; raises ReplayError."""
+    path = given if given.suffix == ".bag" else recorded.path.parent / BAG
+    if not path.is_file():
+        raise ReplayError(f"{path}: there is no such bag; a flight over mocks has none, replay it with --from skills")
+    return path
+
+
+def decide(mission: RecordedMission, conditions: Conditions) -> Result:
+    """Decide again; raises ReplayError."""
+    recorded, plan, out = mission.recorded, mission.plan, conditions.out
+    parameters = parameters_for(recorded, plan, conditions.settings)
+    faults = faults_for(mission.behaviour, conditions.fail)
+    vehicle, entries = _vehicle(mission, conditions.bag)
+    for fault in faults:
+        vehicle.fail(fault)
+    make_record = None
+    if out is not None:
+        _make_folder(out)
+        make_record = lambda clock_ns: MissionRecord(out, plan, clock_ns, parameters)  # noqa: E731
+    replay = Replay(
+        recorded, vehicle, entries, plan, parameters=parameters, go_on=conditions.go_on, record=make_record, rate=conditions.rate
+    )
+    return replay.run()
+
+
+def _vehicle(mission: RecordedMission, bag: Path | None) -> tuple[Vehicle, Iterable[Entry]]:
+    """Return what answers the tree, and what is told it."""
+    recorded = mission.recorded
+    if bag is None:
+        return RecordedSkills(mission.skillsets, recorded, mission.behaviour, start_s=recorded.begun_s), recorded.entries
+    # Late: it needs the interfaces, which a replay of skills does without.
+    from alula.records.replay.functional import RecordedFunctions
+    from alula.records.replay.functional_bag import begin_of, entries_of
+
+    functions = RecordedFunctions(mission.skillsets, bag, mission.behaviour, start_s=begin_of(recorded, bag))
+    return functions, entries_of(recorded, bag, functions.topics)
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise ReplayError(f"--out {out}: is not empty; choose another, a replay never overwrites")
+    except OSError as error:
+        raise ReplayError(f"--out {out}: {error.strerror}") from error

@@ -1,0 +1,79 @@
+"""A run as it was recorded: its events and how its mission ended."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from alula.common.record import FILE, MISSION, RecordError, read_record
+from alula.records.errors import AnalysisError
+from alula.records.logs import read_log
+from alula.runtime.core.events import EngineEvent, TransitionEvent
+
+DEPARTURE = ("flight_status", "ON_GROUND")
+"""Times of a run count from when this resource leaves this state first: lift-off."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run's events in their order; ``mission`` is what ``mission.json`` says, empty where that is not known."""
+
+    path: Path
+    events: Sequence[EngineEvent]
+    mission: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def outcome(self) -> str:
+        """How the mission ended, empty where that is not known."""
+        return str(self.mission.get("outcome", ""))
+
+    @property
+    def origin_s(self) -> float:
+        """Lift-off, seconds of mission clock; the first event where nothing has lifted off."""
+        return origin_of(self.events)
+
+    def time_s(self, event: EngineEvent) -> float:
+        """Return when an event was, seconds since lift-off."""
+        return event.stamp_s - self.origin_s
+
+
+def lift_off_of(events: Sequence[EngineEvent]) -> float | None:
+    """Return when the vehicle left the ground first, seconds of mission clock; None: never."""
+    for event in events:
+        if isinstance(event, TransitionEvent) and (event.resource, event.from_state) == DEPARTURE:
+            return event.stamp_s
+    return None
+
+
+def origin_of(events: Sequence[EngineEvent]) -> float:
+    """Return the time that a run's times count from, seconds of mission clock."""
+    lift_off_s = lift_off_of(events)
+    if lift_off_s is not None:
+        return lift_off_s
+    return events[0].stamp_s if events else 0.0
+
+
+def load_run(path: Path) -> Run:
+    """Read a run's folder, or any log that ``read_log`` reads.
+
+    Raises:
+        AnalysisError: there is none, or it can't be read.
+    """
+    log = read_log(path)
+    return Run(path, tuple(entry.event for entry in log.entries), _mission(path))
+
+
+def _mission(path: Path) -> Mapping[str, Any]:
+    folder = path if path.is_dir() else path.parent
+    try:
+        if (folder / "mission.json").is_file():
+            content = json.loads((folder / "mission.json").read_text(encoding="utf-8"))
+            return content if isinstance(content, dict) else {}
+        record = path if path.is_file() else path / FILE
+        told = [entry.value for entry in read_record(record) if entry.topic == MISSION] if record.suffix == ".mcap" else []
+    except (OSError, ValueError, RecursionError, RecordError) as error:
+        raise AnalysisError(f"{folder}: its mission can't be read: {error}") from None
+    return told[-1] if told else {}

@@ -1,0 +1,299 @@
+"""Between the values of the port and the static messages of the skillset interface, in either ROS world.
+
+The classes of the messages take the same arguments in both worlds. An adapter gives its own, so that nothing here imports ROS.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from alula.model.execution_state import ExecutionState
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from alula.runtime.core.records import ExecutionRecord, ResourceStatus, SkillRecord
+from alula.runtime.core.replies import PauseReply, TransitionReply
+from alula.runtime.core.why import Unmet, Why
+from alula.runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, PublishedEvent, ResourceStates, SkillStates, Topic, WhyReply
+from alula.runtime.plain import to_plain
+from alula.runtime.views import DataReading, Sample
+
+NANOSECONDS = 1_000_000_000
+
+
+def set_stamp(stamp: Any, stamp_ns: int) -> None:
+    """Set a time of either world."""
+    seconds, rest = divmod(stamp_ns, NANOSECONDS)
+    if hasattr(stamp, "nanosec"):
+        stamp.sec, stamp.nanosec = seconds, rest
+    else:
+        stamp.secs, stamp.nsecs = seconds, rest
+
+
+def stamp_ns_of(stamp: Any) -> int:
+    """Return a time of either world."""
+    seconds, rest = (stamp.sec, stamp.nanosec) if hasattr(stamp, "nanosec") else (stamp.secs, stamp.nsecs)
+    return int(seconds) * NANOSECONDS + int(rest)
+
+
+@dataclass(frozen=True)
+class TopicCodec:
+    """``encode(skillset, value)`` makes a message, ``decode(message)`` the value again."""
+
+    kind: Any
+    """The message's class; None where only the graph knows it."""
+    encode: Callable[[str, Any], Any]
+    decode: Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class ServiceCodec:
+    """``encode(value, response)`` fills a response, ``decode(response)`` makes the value; a request has the fields of its type."""
+
+    kind: Any
+    fields: tuple[str, ...]
+    encode: Callable[[Any, Any], None]
+    decode: Callable[[Any], Any]
+
+
+def _encode_transition(reply: TransitionReply, response: Any) -> None:
+    response.accepted, response.reason, response.state = reply.accepted, reply.reason, reply.state
+
+
+def _encode_trigger(reply: TransitionReply | PauseReply, response: Any) -> None:
+    response.accepted, response.reason = reply.accepted, reply.reason
+
+
+def _encode_describe(model_json: str, response: Any) -> None:
+    response.model_json = model_json
+
+
+def _encode_data(reading: DataReading, response: Any) -> None:
+    response.known, response.received, response.stale = reading.known, reading.received, reading.stale
+    response.stamp_ns, response.value_json = reading.stamp_ns, reading.value_json
+
+
+def _record_of(skill: str, message: Any) -> ExecutionRecord:
+    return ExecutionRecord(
+        message.id,
+        skill,
+        ExecutionState(message.state),
+        message.result,
+        message.message,
+        json.loads(message.inputs_json or "null"),
+        json.loads(message.outputs_json or "{}"),
+        message.requested_ns,
+        message.started_ns,
+        message.ended_ns,
+    )
+
+
+def _decode_why(response: Any) -> WhyReply:
+    if not response.known:
+        return WhyReply(response.reason)
+    found = tuple(
+        Unmet(
+            one.name,
+            one.condition,
+            one.reason,
+            {resource.name: resource.state for resource in one.resources},
+            {data.name: json.loads(data.value_json) if data.value_json else None for data in one.data},
+        )
+        for one in response.unmet
+    )
+    history = tuple(TransitionEvent(0, e.stamp_ns, e.resource, e.from_state, e.to_state, e.cause) for e in response.history)
+    return WhyReply("", Why("", response.ready, response.reason, response.refusal, found, history))
+
+
+def published_event(message: Any) -> PublishedEvent:
+    """Return an event; inputs and outputs are plain values."""
+    return PublishedEvent(message.header.frame_id, event_of(message))
+
+
+def event_of(message: Any) -> EngineEvent:
+    """Return an event without the name of its managers."""
+    stamp_ns = stamp_ns_of(message.header.stamp)
+    if message.kind == type(message).TRANSITION:
+        return TransitionEvent(
+            message.sequence, stamp_ns, message.resource, message.from_state, message.to_state, message.cause, message.skillset
+        )
+    return ExecutionEvent(
+        message.sequence,
+        stamp_ns,
+        message.skill,
+        message.id,
+        ExecutionState(message.state),
+        message.result,
+        message.message,
+        json.loads(message.inputs_json or "null"),
+        json.loads(message.outputs_json or "{}"),
+        message.skillset,
+    )
+
+
+def states_of(message: Any) -> ResourceStates:
+    """Return resource states."""
+    life, _, after = message.header.frame_id.partition(" ")
+    values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
+    return ResourceStates(life, int(after or 0), stamp_ns_of(message.header.stamp), values)
+
+
+class Codecs:
+    """The codecs of one skillset's topics and services, for the messages of one ROS world.
+
+    Most of what the messages of states hold is what the one before has held: with many skills, to rebuild it would take most of the
+    time. Of each name the last is kept, here and not in the module: robots and threads of one process share nothing.
+
+    Args:
+        messages: the module ``skillset_interfaces.msg`` of the world, ``services`` its ``skillset_interfaces.srv``.
+        message_class: returns the class of ``package/Name``.
+    """
+
+    def __init__(self, messages: Any, services: Any, message_class: Callable[[str], Any]) -> None:
+        self._messages = messages
+        self._message_class = message_class
+        self._resources: dict[str, tuple[ResourceStatus, Any]] = {}
+        self._encoded: dict[str, tuple[SkillRecord, Any]] = {}
+        self._decoded: dict[str, tuple[tuple[Any, ...], SkillRecord]] = {}
+        self._topics: Mapping[str, TopicCodec] = {
+            EVENTS.name: TopicCodec(messages.Event, self._event_message, published_event),
+            RESOURCE_STATES.name: TopicCodec(messages.ResourceStates, self._states_message, states_of),
+            SKILL_STATES.name: TopicCodec(messages.SkillStates, self._skills_message, self._skills_of),
+        }
+        self.services: Mapping[str, ServiceCodec] = self._service_codecs(services)
+        """By name of the service."""
+
+    def topic(self, topic: Topic) -> TopicCodec:
+        """Return the codec of a topic: its own, or that of a data, whose values are ``Sample``s."""
+        if topic.name in self._topics:
+            return self._topics[topic.name]
+        kind: Any = self._message_class(topic.type_name) if topic.type_name else None
+        if topic.wrapped:
+            return TopicCodec(kind, lambda _, sample: kind(data=sample.value), lambda message: Sample(message.data, None))
+        return TopicCodec(kind, lambda _, sample: sample.value, lambda message: Sample(message, None))
+
+    # --- topics ------------------------------------------------------------------------------------------------------
+
+    def _event_message(self, skillset: str, told: PublishedEvent) -> Any:
+        """Return an event as a message; its outputs are there when it is the last of its execution."""
+        event, kind = told.event, self._messages.Event
+        message = kind(skillset=skillset, sequence=event.sequence)
+        set_stamp(message.header.stamp, event.stamp_ns)
+        message.header.frame_id = told.life
+        if isinstance(event, ExecutionEvent):
+            message.kind = kind.EXECUTION
+            message.skill, message.id, message.state = event.skill, event.id, event.state.value
+            message.result, message.message = event.result, event.message
+            message.inputs_json = json.dumps(to_plain(event.inputs))
+            if event.state.terminal:
+                message.outputs_json = json.dumps(to_plain(event.outputs))
+        else:
+            message.kind = kind.TRANSITION
+            message.resource, message.cause = event.resource, event.cause
+            message.from_state, message.to_state = event.from_state, event.to_state
+        return message
+
+    def _states_message(self, skillset: str, states: ResourceStates) -> Any:
+        """Return resource states as a message; ``frame_id`` says whose they are, and after which event."""
+        resources = [self._resource(name, one) for name, one in states.resources.items()]
+        message = self._messages.ResourceStates(skillset=skillset, resources=resources)
+        set_stamp(message.header.stamp, states.stamp_ns)
+        message.header.frame_id = f"{states.life} {states.after}"
+        return message
+
+    def _skills_message(self, skillset: str, states: SkillStates) -> Any:
+        message = self._messages.SkillStates(skillset=skillset, skills=[self._skill(name, one) for name, one in states.skills.items()])
+        set_stamp(message.header.stamp, states.stamp_ns)
+        message.header.frame_id = states.life
+        return message
+
+    def _skills_of(self, message: Any) -> SkillStates:
+        """Return skill states; inputs and outputs are plain values."""
+        skills = {one.name: self._skill_of(one) for one in message.skills}
+        return SkillStates(message.header.frame_id, stamp_ns_of(message.header.stamp), skills)
+
+    def _resource(self, name: str, value: ResourceStatus) -> Any:
+        kept, message = self._resources.get(name, (None, None))
+        if kept != value:
+            message = self._resource_state(name, value.state, value)
+            self._resources[name] = (value, message)
+        return message
+
+    def _resource_state(self, name: str, state: str, status: ResourceStatus) -> Any:
+        return self._messages.ResourceState(name=name, state=state, previous_state=status.previous, stamp_ns=status.stamp_ns)
+
+    def _skill(self, name: str, skill: SkillRecord) -> Any:
+        kept, message = self._encoded.get(name, (None, None))
+        if kept is not skill:
+            last = [] if skill.last is None else [self._execution(skill.last)]
+            message = self._messages.SkillState(name=name, open=[self._execution(record) for record in skill.open], last=last)
+            self._encoded[name] = (skill, message)
+        return message
+
+    def _skill_of(self, message: Any) -> SkillRecord:
+        executions = (*message.open, *message.last)
+        # An execution of the same state and stamps holds the same.
+        now = (len(message.last), *((e.id, e.state, e.requested_ns, e.started_ns, e.ended_ns) for e in executions))
+        kept = self._decoded.get(message.name)
+        if kept is None or kept[0] != now:
+            last = [_record_of(message.name, execution) for execution in message.last]
+            record = SkillRecord(tuple(_record_of(message.name, one) for one in message.open), last[0] if last else None)
+            kept = self._decoded[message.name] = (now, record)
+        return kept[1]
+
+    def _execution(self, record: ExecutionRecord) -> Any:
+        return self._messages.SkillExecution(
+            id=record.id,
+            state=record.state.value,
+            result=record.result,
+            message=record.message,
+            inputs_json=json.dumps(to_plain(record.inputs)),
+            outputs_json=json.dumps(to_plain(record.outputs) if record.state.terminal else {}),
+            requested_ns=record.requested_ns,
+            started_ns=record.started_ns,
+            ended_ns=record.ended_ns,
+        )
+
+    # --- services ----------------------------------------------------------------------------------------------------
+
+    def _service_codecs(self, services: Any) -> Mapping[str, ServiceCodec]:
+        return {
+            "describe": ServiceCodec(services.Describe, (), _encode_describe, lambda response: response.model_json),
+            "get_data": ServiceCodec(
+                services.GetData, ("name",), _encode_data, lambda r: DataReading(r.known, r.received, r.stale, r.stamp_ns, r.value_json)
+            ),
+            "pause": ServiceCodec(services.SetPaused, ("id", "paused"), _encode_trigger, lambda r: PauseReply(r.accepted, r.reason)),
+            "transition": ServiceCodec(
+                services.Transition, ("resource", "to"), _encode_transition, lambda r: TransitionReply(r.accepted, r.reason, r.state)
+            ),
+            "trigger": ServiceCodec(
+                services.TriggerEvent, ("event",), _encode_trigger, lambda r: TransitionReply(r.accepted, r.reason, "")
+            ),
+            "why": ServiceCodec(services.Why, ("skill", "inputs_json"), self._encode_why, _decode_why),
+        }
+
+    def _encode_why(self, reply: WhyReply, response: Any) -> None:
+        response.known = reply.why is not None
+        if reply.why is None:
+            response.reason = reply.error
+            return
+        why = reply.why
+        response.ready, response.reason, response.refusal = why.ready, why.reason, why.refusal
+        response.unmet = [self._unmet(one, reply) for one in why.unmet]
+        response.history = [
+            self._messages.ResourceTransition(
+                stamp_ns=e.stamp_ns, resource=e.resource, from_state=e.from_state, to_state=e.to_state, cause=e.cause
+            )
+            for e in why.history
+        ]
+
+    def _unmet(self, one: Unmet, reply: WhyReply) -> Any:
+        values = {name: "" if value is None else json.dumps(to_plain(value)) for name, value in one.data.items()}
+        return self._messages.Unmet(
+            name=one.name,
+            condition=one.condition,
+            reason=one.reason,
+            resources=[self._resource_state(name, state, reply.resources[name]) for name, state in one.states.items()],
+            data=[self._messages.DataValue(name=name, value_json=text) for name, text in values.items()],
+        )

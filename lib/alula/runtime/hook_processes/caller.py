@@ -1,0 +1,190 @@
+"""The engine's end: calls hooks that are in other processes."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import threading
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Client, Connection, Listener
+from pathlib import Path
+
+from alula.model.model import Skillset
+from alula.runtime.core.engine import SkillsetEngine
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.core.events import EngineEvent, ExecutionEvent
+from alula.runtime.core.execution import Execution
+from alula.runtime.core.hook_calls import HookAnswer, Then
+from alula.runtime.hook_processes.place import Snapshot, snapshot
+
+ENDED = "its process has ended"
+ASKED = {"terminate", "fail", "interrupted", "set_outputs"}
+"""What a skill's process may ask of the engine."""
+
+
+class RemoteHooks:
+    """Calls the hooks of a skillset over the pipe at an address; ``attach`` the engine before anything is asked of it.
+
+    Raises:
+        SkillRuntimeError: another process serves this address.
+    """
+
+    def __init__(self, skillset: Skillset, address: str, on_error: Callable[[str], None]) -> None:
+        self._on_error = on_error
+        self._engine: SkillsetEngine | None = None
+        self._lock = threading.Lock()
+        self._changed = threading.Condition(self._lock)
+        self._processes: dict[str, _SkillProcess] = {}
+        self._skills = [skill.name for skill in skillset.skills]
+        self._over = False
+        _take_over(address)
+        self._listener = Listener(address, backlog=len(self._skills) + 1)
+        threading.Thread(target=self._accept, name="hook_processes", daemon=True).start()
+
+    def attach(self, engine: SkillsetEngine) -> None:
+        """Take the engine whose hooks these are."""
+        self._engine = engine
+
+    def wait(self, timeout_s: float) -> list[str]:
+        """Wait (wall clock) until all skills' processes are there; return the skills of those that are not."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._over or len(self._processes) == len(self._skills), timeout_s)
+            return [skill for skill in self._skills if skill not in self._processes]
+
+    def close(self) -> None:
+        """Let all processes go."""
+        with self._changed:
+            self._over = True
+            processes = list(self._processes.values())
+            self._changed.notify_all()
+        with contextlib.suppress(OSError):
+            self._listener.close()
+        for process in processes:
+            process.close()
+
+    # --- for the engine ----------------------------------------------------------------------------------------------
+
+    def call(self, execution: Execution, hook: str, then: Then) -> None:
+        """Call a hook; ``then`` gets the answer later, on the thread of its process, or at once when that has gone."""
+        process = self._processes.get(execution.skill)
+        if process is None:
+            then(HookAnswer(error=f"the manager of {execution.skill} has gone: {ENDED}"))
+        else:
+            process.call(hook, snapshot(execution), then)
+
+    def written(self, skill: str, hook: str) -> bool:
+        """Tell whether the hook is written; of a process that has gone, it is taken for written, so that the call says so."""
+        process = self._processes.get(skill)
+        return process is None or hook in process.written
+
+    def on_step(self, events: Sequence[EngineEvent]) -> None:
+        """Tell each process of its executions."""
+        for event in events:
+            process = self._processes.get(event.skill) if isinstance(event, ExecutionEvent) else None
+            if process is not None and isinstance(event, ExecutionEvent):
+                process.tell(Snapshot(event.id, None, event.state, event.result, event.message, dict(event.outputs), 0.0))
+
+    # --- inside ------------------------------------------------------------------------------------------------------
+
+    def _accept(self) -> None:
+        while not self._over:
+            try:
+                pipe = self._listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._serve, args=(pipe,), name="hook_process", daemon=True).start()
+
+    def _serve(self, pipe: Connection) -> None:
+        """Serve one skill's process to its end."""
+        try:
+            _, skill, written = pipe.recv()
+        except (EOFError, OSError):
+            return
+        process = _SkillProcess(pipe, frozenset(written), self._ask)
+        with self._changed:
+            before = self._processes.get(skill)
+            self._processes[skill] = process
+            self._changed.notify_all()
+        if before is not None:
+            before.close()
+        process.read()
+        with self._changed:
+            if self._processes.get(skill) is process:
+                del self._processes[skill]
+        self._lost(skill, process)
+
+    def _lost(self, skill: str, process: _SkillProcess) -> None:
+        gone = f"the manager of {skill} has gone: {ENDED}"
+        if self._engine is not None and not self._over:
+            for execution in self._engine.executions:
+                if execution.skill == skill:
+                    self._engine.fail(execution.id, gone)
+        process.give_up(HookAnswer(error=gone))
+
+    def _ask(self, method: str, arguments: tuple[object, ...]) -> object:
+        if self._engine is None or method not in ASKED:
+            return False
+        return getattr(self._engine, method)(*arguments)
+
+
+class _SkillProcess:
+    """The pipe to one skill's process."""
+
+    def __init__(self, pipe: Connection, written: frozenset[str], ask: Callable[[str, tuple[object, ...]], object]) -> None:
+        self.written = written
+        self._pipe = pipe
+        self._ask = ask
+        self._sending = threading.Lock()
+        self._numbers = itertools.count(1)
+        self._waiting: dict[int, Then] = {}
+
+    def call(self, hook: str, execution: Snapshot, then: Then) -> None:
+        """Send a call."""
+        number = next(self._numbers)
+        self._waiting[number] = then
+        self._send(("call", number, hook, execution))
+
+    def tell(self, execution: Snapshot) -> None:
+        """Send what has become of an execution."""
+        self._send(("event", execution))
+
+    def read(self) -> None:
+        """Take what comes until the process ends."""
+        while True:
+            try:
+                kind, number, *rest = self._pipe.recv()
+            except (EOFError, OSError):
+                return
+            if kind == "answer":
+                then = self._waiting.pop(number, None)
+                if then is not None:
+                    then(rest[0])
+            else:
+                self._send(("reply", number, self._ask(rest[0], rest[1])))
+
+    def give_up(self, answer: HookAnswer) -> None:
+        """Answer all calls for a process that has ended."""
+        while self._waiting:
+            _, then = self._waiting.popitem()
+            then(answer)
+
+    def close(self) -> None:
+        """Let the process go."""
+        with contextlib.suppress(OSError):
+            self._pipe.close()
+
+    def _send(self, message: object) -> None:
+        with self._sending, contextlib.suppress(OSError):
+            self._pipe.send(message)
+
+
+def _take_over(address: str) -> None:
+    """Remove the socket of a process that has ended; raise SkillRuntimeError when it lives."""
+    try:
+        Client(address).close()
+    except FileNotFoundError:
+        return
+    except OSError:
+        Path(address).unlink(missing_ok=True)
+        return
+    raise SkillRuntimeError(f"another process manages this skillset already ({address}); end it first")

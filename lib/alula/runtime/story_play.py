@@ -1,0 +1,222 @@
+"""Plays a counterexample of the proofs in running managers: the same requests, reports and data, one after another.
+
+Functions are hooks that do nothing but what the story says: they end with its results, and make progress meanwhile. After each
+step, the states of the resources and the ends of the executions are held against the story. The managers and their client are
+those of any world: in virtual time, over rclpy, over rospy.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+
+from alula.language.outside import opened
+from alula.language.stories import Execution, Story, StoryStep, messages
+from alula.language.stories import StepKind as Kind
+from alula.model.model import Skillset
+from alula.runtime.core.execution import Execution as Running
+from alula.runtime.core.replies import TransitionReply
+from alula.runtime.handle import SkillHandle
+from alula.runtime.hooks import SkillHooks
+from alula.runtime.story_world import MakeWorld, StoryWorld, virtual_world
+from alula.runtime.waiting import Pending
+
+READY_S = 60.0
+"""How long (wall clock) managers and their client may take to find one another."""
+TICK_S = 0.5
+"""Mission time passes in steps of so much where nothing in the model is more frequent."""
+
+
+@dataclass(frozen=True)
+class PlayedStep:
+    """A step of the story, and how the managers differ from it: a line for each difference, none where they agree."""
+
+    step: StoryStep
+    differences: tuple[str, ...] = ()
+
+
+class _Function(SkillHooks):
+    """A function that goes on until the story ends it."""
+
+    def __init__(self) -> None:
+        self.now_ns: Callable[[], int] = lambda: 0
+        self.running: dict[str, Running] = {}
+        self.asked_ns: dict[str, int] = {}
+        """When each execution was dispatched, or asked for its progress last; mission clock."""
+        self._reports = 0
+
+    def on_dispatch(self, execution: Running) -> None:
+        """Note what runs."""
+        self.asked_ns[execution.id] = self.now_ns()
+        self.running[execution.id] = execution
+
+    def progress(self, execution: Running) -> float:
+        """Return another number each time, so that no deadline of progress passes."""
+        self.asked_ns[execution.id] = self.now_ns()
+        self._reports += 1
+        return (self._reports % 100) / 100
+
+
+def play(skillset: Skillset, story: Story, make_world: MakeWorld = virtual_world) -> list[PlayedStep]:
+    """Play a story from its first step on; stop after the first step that comes out otherwise."""
+    arrows = _from_outside(story)
+    # Managers refuse what is not extern; arrows that the story has taken from outside are, in this play.
+    played_model = _without_parameters(opened(skillset, arrows) if arrows else skillset)
+    functions = {skill.name: _Function() for skill in skillset.skills}
+    played: list[PlayedStep] = []
+    with make_world(played_model, functions) as world:
+        player = _Player(played_model, functions, world)
+        for step in story.steps:
+            played.append(PlayedStep(step, tuple(player.take(step))))
+            if played[-1].differences:
+                break
+    return played
+
+
+@dataclass
+class _Known:
+    """An execution of the story: its handle and how it ended there."""
+
+    handle: SkillHandle
+    function: _Function
+    ends: list[tuple[str, str]] = field(default_factory=list)
+
+
+class _Player:
+    def __init__(self, skillset: Skillset, functions: Mapping[str, _Function], world: StoryWorld) -> None:
+        self._functions = functions
+        self._world = world
+        self._managers = world.managers
+        self._client = world.client
+        self._client.wait_ready(READY_S)
+        for function in functions.values():
+            function.now_ns = lambda: world.now_ns
+        self._executions: dict[Execution, _Known] = {}
+        self._data: dict[str, object] = {}
+        self._periods_s = {skill.name: skill.progress.period_s for skill in skillset.skills if skill.progress is not None}
+        periods_s = [*self._periods_s.values(), *(data.period_s for data in skillset.data if data.period_s is not None)]
+        self._tick_s = min(periods_s, default=2 * TICK_S) / 2
+
+    def take(self, step: StoryStep) -> Iterable[str]:
+        """Do what a step says, let the managers come to rest, and yield each difference from the story."""
+        refusal = self._do(step)
+        if refusal:
+            yield refusal
+        for execution, ended in ((one.execution, one) for one in step.ended):
+            known = self._executions.get(execution)
+            if known is not None:
+                known.ends.append((ended.state, ended.name))
+        self._world.settle(lambda: not any(self._differences(step)))
+        yield from self._differences(step)
+
+    def _differences(self, step: StoryStep) -> Iterable[str]:
+        """Yield how the managers are otherwise than the story says after a step."""
+        states = {name: status.state for name, status in self._managers.engine.resources.items()}
+        for name, state in step.states:
+            if states[name] != state:
+                yield f"{name} is {states[name]} in the managers, {state} in the story"
+        told, found = Counter(one.skill for one in step.running), Counter(one.skill for one in self._managers.engine.executions)
+        for skill in sorted({*told, *found}):
+            if told[skill] != found[skill]:
+                yield f"{found[skill]} executions of {skill} run in the managers, {told[skill]} in the story"
+        yield from self._ends()
+
+    def _ends(self) -> Iterable[str]:
+        """Yield each execution that has not ended as in the story, or not yet."""
+        for execution, known in self._executions.items():
+            handle = known.handle
+            found = [(str(handle.outcome), handle.result)] if handle.done else []
+            if found != known.ends:
+                managers, story = (" ".join(ends[0]).strip() if ends else "running" for ends in (found, known.ends))
+                yield f"{execution.skill} (execution {execution.number}) is {managers} in the managers, {story} in the story"
+
+    def _do(self, step: StoryStep) -> str:
+        """Do what a step says; return why the managers refuse it, or nothing."""
+        match step.kind:
+            case Kind.EXTERN | Kind.OUTSIDE:
+                return self._refusal(self._client.transition(*step.subject))
+            case Kind.EVENT:
+                reason = self._refusal(self._client.trigger(step.subject[0]))
+                return "" if step.refused else reason
+            case Kind.START:
+                return self._start(step)
+            case Kind.RESULT | Kind.INTERRUPT:
+                return self._end(step)
+            case Kind.DATA:
+                self._receive(step)
+            case Kind.TIME:
+                self._wait(step.time_s)
+            case Kind.BREAK:
+                return "no values of data are known that break the invariant"
+        return ""
+
+    def _refusal(self, answer: Pending[TransitionReply]) -> str:
+        self._world.settle(lambda: answer.done)
+        if not answer.done:
+            return "the managers do not answer"
+        return answer.failure or answer.value.reason
+
+    def _start(self, step: StoryStep) -> str:
+        assert step.execution is not None  # noqa: S101 - a start has one
+        handle = self._client.start(step.execution.skill)
+        if step.refused:
+            self._world.settle(lambda: handle.done)
+            return "" if handle.done else f"{step.execution.skill} starts"
+        function = self._functions[step.execution.skill]
+        self._executions[step.execution] = _Known(handle, function)
+        self._world.settle(lambda: handle.done or handle.id in function.running)
+        return ""
+
+    def _end(self, step: StoryStep) -> str:
+        known = self._executions.get(step.execution) if step.execution is not None else None
+        running = None if known is None or known.handle.done else known.function.running.get(known.handle.id)
+        if known is None or running is None:
+            return "it does not run in the managers"
+        if step.kind is Kind.INTERRUPT:
+            known.handle.interrupt()
+        else:
+            running.terminate(step.subject[1])
+        return ""
+
+    def _receive(self, step: StoryStep) -> None:
+        for name in dict.fromkeys(path[0] for path, value in step.data if value is None):
+            self._data.pop(name, None)
+            self._managers.update_data(name, None)
+        given = {path: value for path, value in step.data if value is not None}
+        for name, message in messages(given).items():
+            before = self._data.get(name)
+            if isinstance(before, SimpleNamespace) and isinstance(message, SimpleNamespace):
+                message = SimpleNamespace(**{**vars(before), **vars(message)})  # noqa: PLW2901 - fields that the step leaves as they are
+            self._data[name] = message
+            self._managers.update_data(name, message)
+
+    def _wait(self, time_s: float) -> None:
+        """Let mission time pass in ticks; the managers do all that is due at one before the next."""
+        left_ns = round(time_s * 1e9)
+        while left_ns > 0:
+            tick_ns = min(round(self._tick_s * 1e9), left_ns)
+            left_ns -= tick_ns
+            self._world.pass_time(tick_ns / 1e9)
+            self._world.settle(self._has_caught_up)
+
+    def _has_caught_up(self) -> bool:
+        """Tell whether nothing is due in the managers, and each execution was asked for its progress within the period."""
+        due_ns, now_ns = self._managers.engine.due_ns, self._world.now_ns
+        return (due_ns is None or due_ns > now_ns) and all(
+            now_ns - self._functions[one.skill].asked_ns.get(one.id, now_ns) < self._periods_s[one.skill] * 1e9
+            for one in self._managers.engine.executions
+            if one.skill in self._periods_s
+        )
+
+
+def _without_parameters(skillset: Skillset) -> Skillset:
+    """Return the model as a story knows it: inputs and outputs are the hooks' own affair."""
+    return replace(skillset, skills=tuple(replace(skill, inputs=(), outputs=()) for skill in skillset.skills))
+
+
+def _from_outside(story: Story) -> frozenset[tuple[str, str, str]]:
+    """Return the arrows that nothing in the model takes and the story has taken."""
+    changes = [(step.changes[0], step.subject) for step in story.steps if step.kind is Kind.OUTSIDE]
+    return frozenset((change.resource, change.source, change.target) for change, _ in changes)

@@ -1,0 +1,85 @@
+"""Where a story is played: managers of one skillset, a client of theirs, and a clock that the player moves. Here, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from typing import Protocol
+
+from alula.model.model import Skillset
+from alula.runtime.client import Client
+from alula.runtime.core.engine import SkillsetEngine
+from alula.runtime.hooks import SkillHooks
+from alula.runtime.local import LocalWorld
+
+
+class StoryManagers(Protocol):
+    """What a story needs of the managers beside their client."""
+
+    @property
+    def engine(self) -> SkillsetEngine:
+        """Where their states are read."""
+        ...
+
+    def update_data(self, name: str, value: object | None) -> None:
+        """Take a value of a data, or None: there is no fresh one."""
+        ...
+
+
+class StoryWorld(Protocol):
+    """Managers of one skillset, a client of theirs, and a mission clock that stands still unless it is told to go on."""
+
+    @property
+    def managers(self) -> StoryManagers:
+        """The managers."""
+        ...
+
+    @property
+    def client(self) -> Client:
+        """Their client, perhaps not ready yet."""
+        ...
+
+    @property
+    def now_ns(self) -> int:
+        """Mission clock."""
+        ...
+
+    def pass_time(self, seconds: float) -> None:
+        """Have so much mission time pass; return when managers and client know the new time."""
+        ...
+
+    def settle(self, condition: Callable[[], bool]) -> None:
+        """Let what was asked for happen: until the condition holds, or so long that it will not hold any more."""
+        ...
+
+
+Hooks = Mapping[str, SkillHooks]
+MakeWorld = Callable[[Skillset, Hooks], AbstractContextManager[StoryWorld]]
+
+
+class VirtualWorld:
+    """Managers and client in virtual time."""
+
+    def __init__(self, skillset: Skillset, hooks: Hooks) -> None:
+        self._world = LocalWorld()
+        self.managers = self._world.serve(skillset, hooks)
+        self.client = self._world.client(skillset.name)
+
+    @property
+    def now_ns(self) -> int:
+        """Mission clock."""
+        return self._world.clock.now_ns
+
+    def pass_time(self, seconds: float) -> None:
+        """Have mission time pass."""
+        self._world.run_for(seconds)
+
+    def settle(self, condition: Callable[[], bool]) -> None:  # noqa: ARG002 - nothing more happens at this moment, whatever holds
+        """Do all that is due now."""
+        self._world.run_for(0.0)
+
+
+@contextmanager
+def virtual_world(skillset: Skillset, hooks: Hooks) -> Iterator[StoryWorld]:
+    """Serve a skillset in virtual time."""
+    yield VirtualWorld(skillset, hooks)

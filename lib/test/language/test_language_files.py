@@ -1,0 +1,118 @@
+"""Findings about files: such as are no models, and what is wrong in a robot's folder."""
+
+from __future__ import annotations
+
+import pytest
+
+from alula.language.errors import LanguageError
+from alula.language.load import check_file, load_robot, load_skillset
+from alula.language.models import read_text
+
+LINK = "resource link { initial DOWN extern DOWN -> UP extern UP -> DOWN }\n"
+
+
+def codes(error) -> list[str]:
+    return [finding.code for finding in error.value.diagnostics]
+
+
+def test_files_that_are_no_text(tmp_path):
+    missing = tmp_path / "missing.skill"
+    with pytest.raises(LanguageError, match=r"missing\.skill: error ALU001: can't be read: No such file") as caught:
+        load_skillset(missing)
+    with pytest.raises(LanguageError, match="ALU006"):
+        load_skillset(tmp_path)
+    with pytest.raises(LanguageError, match="ALU001"):
+        load_skillset("a\0b")
+    latin = tmp_path / "latin.skill"
+    latin.write_bytes("skillset s { // \xe9\n}".encode("latin-1"))
+    with pytest.raises(LanguageError, match="ALU002: not UTF-8 text: byte 16 is 0xe9"):
+        load_skillset(latin)
+    large = tmp_path / "large.skill"
+    large.write_bytes(b" " * 1_200_001)
+    with pytest.raises(LanguageError, match="ALU003"):
+        load_skillset(large)
+    assert codes(caught) == ["ALU001"]
+
+
+def test_marks_and_line_ends_of_other_systems(tmp_path):
+    path = tmp_path / "dos.skill"
+    path.write_bytes("\ufeffskillset s {\r\n  skill f { input { a: bool // yes\r\n } result { R } }\r\n}\r\n".encode())
+    assert "\r" not in read_text(path)
+    assert load_skillset(path).skill("f").inputs[0].comment == "yes"
+
+
+def test_warnings_do_not_keep_a_model_from_being_loaded(tmp_path):
+    path = tmp_path / "x.skill"
+    path.write_text("skillset s { type P }")
+    assert load_skillset(path).name == "s"
+    assert [d.code for d in check_file(path)[1]] == ["ALU303"]
+
+
+def test_findings_of_the_check_carry_their_line(tmp_path):
+    path = tmp_path / "x.skill"
+    path.write_text(f"skillset s {{\n  {LINK}  skill f {{ progress = 0 result {{ R }} }}\n}}")
+    with pytest.raises(LanguageError, match=r"x\.skill:3:13: error ALU211") as caught:
+        load_skillset(path)
+    assert "    3 |   skill f { progress = 0 result { R } }" in str(caught.value)
+
+
+def robot(folder, skill="skillset s { }", types=None, bindings=None):
+    (folder / "s.skill").write_text(skill)
+    for name, text in (("types.yaml", types), ("bindings.yaml", bindings)):
+        if text is not None:
+            (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
+    return folder
+
+
+def test_a_folder_without_skillsets(tmp_path):
+    with pytest.raises(LanguageError, match=r"ALU006: no \*\.skill or \*\.rl file in it"):
+        load_robot(tmp_path)
+    with pytest.raises(LanguageError, match="ALU006: is no folder"):
+        load_robot(tmp_path / "none")
+
+
+def test_a_robot_with_all_that_can_be_wrong_tells_all(tmp_path):
+    robot(tmp_path, "skillset s { type Lost data d: Lost }", "Lst: nosuch", "data: {s.e: /x}\ncolour: red")
+    (tmp_path / "t.skill").write_text("skillset s { }")
+    with pytest.raises(LanguageError) as caught:
+        load_robot(tmp_path)
+    assert sorted(codes(caught)) == ["ALU005", "ALU005", "ALU401", "ALU402", "ALU403", "ALU404"]
+    assert "did you mean `s.d`?" in str(caught.value)
+
+
+def test_data_that_no_topic_can_carry(tmp_path):
+    robot(tmp_path, "skillset s { type Path data d: Path }", "Path: geometry_msgs/Point[]", "data: {s.d: /d}")
+    with pytest.raises(LanguageError, match="ALU405: data `d` is a list"):
+        load_robot(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("types", "bindings", "message"),
+    [
+        ("[1, 2]", "", "should be a mapping at its top"),
+        ("a: [", "", "can't be read"),
+        (b"\xff\xfe\x00", "", "can't be read"),
+        ("Point: 3", "", "type `Point` is 3"),
+        ("Point: geometry_msgs", "", "type `Point` is 'geometry_msgs'"),
+        ("", "data: [1]", "`data` should map"),
+        ("", "data: {s.d: 1}", "data.s.d should be a mapping, not 1"),
+        ("", "data: {s.d: {topic: relative}}", "`topic` is 'relative'; it should be an absolute ROS name"),
+        ("", "data: {s.d: {}}", "data.s.d has no `topic`"),
+        ("", "topics: {}", "`topics` should be a list"),
+        ("", "topics: [{name: /a, direction: up, type: std_msgs/Header}]", "`direction` is 'up'; it should be ros1_to_ros2"),
+        ("", "topics: [{name: /a, direction: [], type: std_msgs/Header}]", "`direction` is []"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/msg/Header}]", "it should be package/Name"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, deph: 3}]", "unknown key `deph`"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, depth: 0}]", "`depth` is 0"),
+        ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, reliability: no}]", "should be reliable or best_effort"),
+        ("", "services: [{name: /a, server: ros1, type: std_srvs/SetBool, timeout_s: -1}]", "`timeout_s` is -1"),
+        ("", "services: [{name: /a, type: std_srvs/SetBool}]", "services[0] has no `server`"),
+        ("", "service: []", "unknown section `service`; there are `data`, `topics`, `services`"),
+    ],
+)
+def test_side_files(tmp_path, types, bindings, message):
+    robot(tmp_path, types=types, bindings=bindings)
+    with pytest.raises(LanguageError) as caught:
+        load_robot(tmp_path)
+    assert "ALU005" in codes(caught)
+    assert message in str(caught.value)

@@ -1,0 +1,66 @@
+"""LANGUAGE.md tells the truth: its examples are models, the two notations in it the same ones, and each finding comes as told."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from alula.language import paper, rl
+from alula.language.check import check
+from alula.language.codes import CODES, PROOF_CODES
+from alula.language.models import ModelFile, check_texts
+from alula.language.syntax.quantities import SECONDS
+from alula.model.json_form import to_json
+from alula.model.model import NO_EFFECT
+from alula.model.units import UNIT_IN_SI
+
+PAGE = next(p / "skillsets" / "LANGUAGE.md" for p in Path(__file__).resolve().parents if (p / "skillsets").is_dir()).read_text()
+PAPER = [paper.parse(f"skillset page {{ {text} }}") for text in re.findall(r"```skill\n(.*?)```", PAGE, re.DOTALL)]
+TEXTS_RL = re.findall(r"```rl\n(.*?)```", PAGE, re.DOTALL)
+ROWS = re.findall(r"^\| (ALU\d+) \| (.*?) \| (.*?) \| (.*?) \|$", PAGE, re.MULTILINE)
+
+
+def test_every_example_is_sound():
+    assert len(PAPER) == 3
+    assert len(TEXTS_RL) == 3
+    for example in PAPER:
+        assert check(example) == []
+
+
+def test_both_notations_of_an_example_are_one_model():
+    for written, text in zip(PAPER, TEXTS_RL[:2], strict=False):
+        other = rl.parse(f"skillset page {{ {text} }}")
+        assert to_json(other) == to_json(written)
+    assert PAPER[1].skill("goto").start != NO_EFFECT
+
+
+def test_names_across_files(tmp_path):
+    first, second = TEXTS_RL[2].split("// navigation.rl\n")
+    (tmp_path / "types.rl").write_text(first)
+    file = ModelFile(str(tmp_path / "navigation.rl"), second)
+    assert [finding.code for finding in check_texts([file])[0].findings] == []
+    assert file.skillsets[0].types == ("Point",)
+    (tmp_path / "types.rl").unlink()
+    lonely = check_texts([ModelFile(str(tmp_path / "navigation.rl"), second)])[0]
+    assert sorted(finding.code for finding in lonely.findings) == ["ALU205", "ALU224"]
+
+
+def test_all_units_are_told():
+    (told,) = re.findall(r"A number may have a unit: `(.*?)`", " ".join(PAGE.split()))
+    assert set(told.split()) == set(UNIT_IN_SI) - {""}
+    (told,) = re.findall(r"Durations are in `(.*?)`", " ".join(PAGE.split()))
+    assert set(told.split()) == set(SECONDS)
+
+
+def test_all_codes_are_told():
+    assert {code: meaning for code, meaning, _, _ in ROWS} == {code: CODES[code] for code in CODES if code not in PROOF_CODES}
+    assert all(cure for *_, cure in ROWS)
+
+
+@pytest.mark.parametrize(("code", "example"), [(code, example) for code, _, example, _ in ROWS if not example.startswith("*")])
+def test_an_example_has_the_finding_that_it_shows(code, example):
+    (file,) = check_texts([ModelFile("example.rl", example.strip("`"))])
+    assert code in [finding.code for finding in file.findings]
+    assert len(file.findings) <= 3

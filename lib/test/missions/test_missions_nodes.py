@@ -1,0 +1,174 @@
+"""What missions are made of, node by node, on a clock that the test moves; whole trees are flown in ``uav_missions``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import pytest
+
+pytest.importorskip("py_trees")
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from alula.missions.blackboard import Blackboard, Failure
+from alula.missions.decorators import RetryAfter, Until
+from alula.missions.leaves import Check, Do, SkillLeaf, Stays
+from alula.missions.pending import PendingInterrupts
+from alula.model.execution_state import ExecutionState
+from alula.runtime.handle import SkillHandle
+
+E = ExecutionState
+S, F, R = Status.SUCCESS, Status.FAILURE, Status.RUNNING
+
+
+@dataclass
+class Client:
+    """Its handles end when the test says so."""
+
+    skillset: str = "arm"
+    ready: bool = True
+    resources: dict[str, str] = field(default_factory=dict)
+    started: list[tuple[str, dict, SkillHandle]] = field(default_factory=list)
+    interrupts: list[str] = field(default_factory=list)
+
+    def start(self, skill: str, **inputs: object) -> SkillHandle:
+        handle = SkillHandle(skill, str(len(self.started)), lambda: self.interrupts.append(skill))
+        self.started.append((skill, inputs, handle))
+        return handle
+
+
+class Script(Behaviour):
+    """Gives one status after the other; counts how often it is begun."""
+
+    def __init__(self, *statuses: Status) -> None:
+        super().__init__("script")
+        self.left = list(statuses)
+        self.begun = 0
+
+    def initialise(self) -> None:
+        self.begun += 1
+
+    def update(self) -> Status:
+        return self.left.pop(0)
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.s = 0.0
+        self.board = Blackboard(clock_ns=self.ns, pending=PendingInterrupts(self.ns, bound_s=5.0))
+
+    def ns(self) -> int:
+        return round(self.s * 1e9)
+
+
+def ticked(node: Behaviour) -> Status:
+    node.tick_once()
+    return node.status
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def leaf(clock, client, skill="grip", inputs=None, **options):
+    return SkillLeaf(skill, client, skill, {} if inputs is None else inputs, blackboard=clock.board, **options)
+
+
+def test_a_skill_is_started_once_with_inputs_of_that_moment_and_succeeds_by_its_result(clock):
+    client, done = Client(), []
+    grip = leaf(clock, client, inputs=lambda board: {"at_s": board.now_s}, success=["HELD"], on_success=done.append)
+    clock.s = 3.0
+    assert [ticked(grip), ticked(grip)] == [R, R]
+    ((skill, inputs, execution),) = client.started
+    assert (skill, inputs) == ("grip", {"at_s": 3.0})
+    execution.end(E.TERMINATED, "HELD", "")
+    assert ticked(grip) is S
+    assert (done, clock.board.failures, grip.feedback_message) == ([clock.board], [], "HELD")
+    assert ticked(grip) is R  # a leaf that is ticked again asks again
+    assert len(client.started) == 2
+
+
+@pytest.mark.parametrize(
+    ("end", "sentence"),
+    [
+        ((E.TERMINATED, "DROPPED", "slippery"), "arm.grip: DROPPED (slippery)"),
+        ((E.NOT_READY, "arm_free", "arm_free: arm is BUSY"), "arm.grip: NOT_READY arm_free (arm is BUSY)"),
+        ((E.FAILED, "", "the managers have gone"), "arm.grip: FAILED (the managers have gone)"),
+        ((E.INTERRUPTED, "", ""), "arm.grip: INTERRUPTED"),
+    ],
+)
+def test_any_other_end_is_a_failure_that_says_why(clock, end, sentence):
+    client = Client()
+    grip = leaf(clock, client, success=["HELD"])
+    ticked(grip)
+    client.started[0][2].end(*end)
+    assert ticked(grip) is F
+    assert grip.feedback_message == sentence
+    assert [failure.sentence() for failure in clock.board.failures] == [sentence]
+
+
+def test_a_leaf_that_is_left_interrupts_once_and_the_next_start_in_its_skillset_waits_but_not_for_ever(clock):
+    client, other = Client(), Client("legs")
+    grip, lift, walk = leaf(clock, client), leaf(clock, client, "lift"), leaf(clock, other, "walk")
+    ticked(grip)
+    for _ in range(3):
+        grip.stop(Status.INVALID)
+    assert client.interrupts == ["grip"]
+    assert [ticked(lift), ticked(walk)] == [R, R]
+    assert ([skill for skill, _, _ in client.started], [skill for skill, _, _ in other.started]) == (["grip"], ["walk"])
+    assert lift.feedback_message == "waits for the end of arm.grip"
+    clock.s = 4.9
+    ticked(lift)
+    assert len(client.started) == 1
+    clock.s = 5.1  # it has been waited for long enough: the managers have the last word
+    ticked(lift)
+    assert [skill for skill, _, _ in client.started] == ["grip", "lift"]
+
+
+def test_the_reason_names_each_failure_once_and_nothing_that_fails_afterwards(clock):
+    first, second = Failure("a", "arm.grip", E.FAILED, "", "cold"), Failure("b", "arm.lift", E.TERMINATED, "STUCK", "")
+    clock.board.failures += [first, first, second]
+    clock.board.note_reason()
+    clock.board.failures.append(Failure("c", "arm.rest", E.FAILED, "", ""))
+    assert clock.board.reason == "arm.grip: FAILED (cold); then arm.lift: STUCK"
+
+
+def test_do_check_and_stays_look_at_the_mission_clock(clock):
+    seen, holds = [], [False]
+    assert ticked(Do("do", seen.append, blackboard=clock.board)) is S
+    assert seen == [clock.board]
+    assert [ticked(Check("now", lambda: holds[0])), ticked(Check("wait", lambda: holds[0], wait=True))] == [F, R]
+    stays = Stays("stays", lambda: holds[0], 2.0, blackboard=clock.board)
+    assert ticked(stays) is F
+    holds[0] = True
+    assert ticked(stays) is R
+    clock.s = 1.9
+    assert ticked(stays) is R
+    clock.s = 2.0
+    assert ticked(stays) is S
+
+
+def test_until_repeats_its_child_and_fails_with_it():
+    laps = [False, False, True]
+    child = Script(R, S, S, S)
+    until = Until("until", child, lambda: laps.pop(0))
+    assert [ticked(until) for _ in range(4)] == [R, R, R, S]
+    assert child.begun == 3
+    failing = Until("until", Script(F), lambda: True)
+    assert ticked(failing) is F
+
+
+def test_another_chance_comes_after_its_wait_of_mission_clock_and_only_as_often_as_promised(clock):
+    child = Script(F, F, F)
+    retry = RetryAfter("retry", child, chances=2, wait_s=1.0, worth_it=lambda: True, blackboard=clock.board)
+    assert ticked(retry) is R
+    assert retry.feedback_message == "tries again after 1 s"
+    clock.s = 0.9
+    assert (ticked(retry), child.begun) == (R, 1)
+    clock.s = 1.0
+    assert (ticked(retry), child.begun) == (F, 2)
+    assert (ticked(retry), child.begun) == (R, 3)  # begun again: all chances are back
+    hopeless = RetryAfter("retry", Script(F), chances=2, wait_s=1.0, worth_it=lambda: False, blackboard=clock.board)
+    assert ticked(hopeless) is F

@@ -1,0 +1,169 @@
+"""``./alula conform`` on every kind of log, whole, cut off, damaged or foreign."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+from mcap.writer import Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as BagWriter
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from alula.campaign.mock_flights import load_flights
+from alula.commands.conform import main
+from alula.common.faults import parse_fault
+from alula.common.record import EVENTS, FILE, MISSION, RecordWriter
+from alula.records.logs import MESSAGE, read_log
+from alula.runtime.core.events import event_record
+
+ROOT = Path(os.environ["ALULA_ROOT"])
+
+
+@pytest.fixture(scope="module")
+def flown():
+    flights = load_flights("mapping")
+    return flights.fly([parse_fault("zed@30")]).events
+
+
+def record(path, events):
+    writer = RecordWriter(path)
+    for event in events:
+        writer.write(EVENTS, event.stamp_ns, event_record(event))
+    writer.close()
+
+
+def lines(path, events):
+    path.write_text("".join(json.dumps(event_record(event)) + "\n" for event in events), encoding="utf-8")
+
+
+def bag(path, events, storage):
+    """Write what a recorder of ROS 2 would: CDR on a topic of each skillset."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    definition = (ROOT / "bridge/interfaces/skillset_interfaces/msg/Event.msg").read_text(encoding="utf-8")
+    store.register(get_types_from_msg(definition, MESSAGE))
+    message, header, time = (store.types[name] for name in (MESSAGE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time"))
+    with BagWriter(path, version=9, storage_plugin=storage) as writer:
+        topics = {}
+        for event in events:
+            topic = topics.setdefault(event.skillset, None) or writer.add_connection(f"/{event.skillset}/events", MESSAGE, typestore=store)
+            topics[event.skillset] = topic
+            told = event_record(event)
+            fields = {name: told.get(name, "") for name in ("skillset", "skill", "id", "state", "result", "message", "resource")}
+            fields |= {name: told.get(name, "") for name in ("from_state", "to_state", "cause")}
+            stamp = time(sec=event.stamp_ns // 10**9, nanosec=event.stamp_ns % 10**9)
+            whole = message(
+                header=header(stamp=stamp, frame_id="one"),
+                sequence=event.sequence,
+                kind=int(told["kind"] == "TRANSITION"),
+                inputs_json=json.dumps(told.get("inputs", {})),
+                outputs_json="",
+                EXECUTION=0,
+                TRANSITION=1,
+                **fields,
+            )
+            writer.write(topic, event.stamp_ns, store.serialize_cdr(whole, MESSAGE))
+
+
+def test_every_kind_of_log_says_the_same(tmp_path, flown, capsys):
+    record(tmp_path / FILE, flown)
+    lines(tmp_path / "events.jsonl", flown)
+    bag(tmp_path / "mcap", flown, StoragePlugin.MCAP)
+    bag(tmp_path / "sqlite", flown, StoragePlugin.SQLITE3)
+    told = [entry.event for entry in read_log(tmp_path).entries]
+    assert [event_record(event) for event in told] == [event_record(event) for event in flown]
+    inside = next((tmp_path / "mcap").glob("*.mcap"))
+    for log in (tmp_path, tmp_path / FILE, tmp_path / "events.jsonl", tmp_path / "mcap", tmp_path / "sqlite", inside):
+        assert main([str(log), "--json"]) == 0
+        verdict = json.loads(capsys.readouterr().out)
+        assert (verdict["conforms"], verdict["events"], verdict["cut"]) == (True, len(flown), "")
+
+
+@pytest.mark.parametrize("name", ["mapping", "mapping-zed", "mapping-both", "inspection", "inspection-radio"])
+def test_flights_of_the_whole_stack_conform(name, capsys):
+    assert main([str(ROOT / "tests" / "recordings" / name)]) == 0
+    assert ": conforms: " in capsys.readouterr().out
+
+
+def test_a_run_that_never_started_has_no_events_and_that_is_what_is_told(tmp_path, capsys):
+    writer = RecordWriter(tmp_path / FILE)
+    writer.write(MISSION, 0, {"scenario": "inspection"})
+    writer.close()
+    assert main([str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"alula conform: {tmp_path / FILE}: has no events of skillsets\n"
+
+
+def test_what_does_not_conform_is_told_and_ends_with_1(tmp_path, flown, capsys):
+    at = next(number for number, event in enumerate(flown) if getattr(event, "resource", "") == "axes_authority")
+    lines(tmp_path / "events.jsonl", [*flown[:at], *flown[at + 1 :]])
+    assert main([str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    assert said.startswith(f"{tmp_path / 'events.jsonl'}: does not conform\n  navigation event ")
+    assert f"event {flown[at].sequence} is missing" in said
+    assert "would have been allowed: axes_authority AVAILABLE -> USED (takeoff " in said
+
+
+def test_another_model_may_be_given(tmp_path, flown, capsys):
+    lines(tmp_path / "events.jsonl", flown)
+    text = (ROOT / "skillsets/uav/perception.skill").read_text(encoding="utf-8")
+    other = tmp_path / "other.skill"
+    other.write_text(text.replace("zed_status == OK", "zed_status != UNKNOWN"), encoding="utf-8")
+    assert other.read_text(encoding="utf-8") != text
+    assert main([str(tmp_path), "--model", str(other)]) == 1
+    assert "zed_depthmap" in capsys.readouterr().out
+
+
+def test_a_log_that_was_cut_off_is_read_up_to_there(tmp_path, flown, capsys):
+    record(tmp_path / FILE, flown)
+    whole = (tmp_path / FILE).read_bytes()
+    (tmp_path / FILE).write_bytes(whole[: len(whole) // 2])
+    assert main([str(tmp_path)]) == 0
+    assert "read up to its break: it was cut off" in capsys.readouterr().out
+    lines(tmp_path / "cut.jsonl", flown)
+    (tmp_path / "cut.jsonl").write_bytes((tmp_path / "cut.jsonl").read_bytes()[:-20])
+    assert main([str(tmp_path / "cut.jsonl")]) == 0
+    assert "its last line was cut off" in capsys.readouterr().out
+
+
+def foreign_mcap(path):
+    writer = Writer(str(path))
+    writer.start()
+    channel = writer.register_channel("/other", "json", writer.register_schema("x", "jsonschema", b"{}"))
+    writer.add_message(channel, 0, b"{}", 0)
+    writer.finish()
+
+
+UNREADABLE = {
+    "no such": ("nothing.mcap", lambda _: None, "there is no such file or folder"),
+    "a folder": ("empty", lambda path: path.mkdir(), "is no run and no bag"),
+    "a suffix": ("log.txt", lambda path: path.write_text("x"), "is no log"),
+    "no magic": ("x.mcap", lambda path: path.write_text("x" * 100), "is no MCAP file"),
+    "foreign": ("x.mcap", foreign_mcap, "can't be read as a bag"),
+    "empty": ("x.jsonl", lambda path: path.write_text(""), "has no events of skillsets"),
+    "no json": ("x.jsonl", lambda path: path.write_text("{\n{}\n"), "x.jsonl:1: is no JSON"),
+    "no event": ("x.jsonl", lambda path: path.write_text('{"kind": "NOD"}\n'), "x.jsonl:1: is no event: there is no kind of event 'NOD'"),
+    "a list": ("x.jsonl", lambda path: path.write_text("[1]\n"), "x.jsonl:1: is no event, but list"),
+    "a bag": ("x.bag", lambda path: path.write_bytes(os.urandom(64)), "can't be read as a bag"),
+    "a database": ("x.db3", lambda path: path.write_bytes(os.urandom(64)), "can't be read as a bag"),
+    "no model": (
+        "x.jsonl",
+        lambda path: path.write_text(
+            '{"kind": "TRANSITION", "stamp_s": 0, "skillset": "os; x", "resource": "r", "from_state": "", "to_state": ""}\n'
+        ),
+        "there is no model of skillset 'os; x' in this checkout; give its file with --model",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", UNREADABLE)
+def test_what_can_not_be_read_is_refused_in_one_line(what, tmp_path, capsys):
+    name, make, complaint = UNREADABLE[what]
+    make(tmp_path / name)
+    assert main([str(tmp_path / name)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("alula conform: ")
+    assert printed.err.count("\n") == 1
+    assert complaint in printed.err

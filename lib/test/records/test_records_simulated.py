@@ -1,0 +1,97 @@
+"""A campaign over the simulator, with a recorded flight in its place: what is asked of ``fly``, and what its folders become."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from records_mocks import fly_recorded
+
+from alula.campaign.flying import fly
+from alula.campaign.plan import SIMULATOR, Flight, load_campaign
+from alula.common.record import FILE, MISSION, RecordWriter
+from alula.common.scenarios import load_scenario
+
+ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
+CAMPAIGNS = ALULA_ROOT / "tests/campaigns"
+SUMMARY = """{"outcome": "degraded", "reason": "zed", "landed": true, "collisions": 0, "min_clearance_m": 1.2, "problems": [],
+ "skills": [{"id": "a", "end_s": 3.0}, {"id": "b", "end_s": null}], "died": [{"name": "zed_depth", "when_s": 7.0, "how": "exit code 1"}]}"""
+FLY = """#!/bin/sh
+echo "$@" >>"$(dirname "$0")/asked"
+while [ "$1" != --out ]; do [ "$1" = 13 ] && { echo "no free domain" >&2; exit 2; }; shift; done
+mkdir -p "$2" && cp "$RECORDING/skills.mcap" "$2" && cp "$(dirname "$0")/summary.json" "$2"
+"""
+
+
+@pytest.fixture
+def recorded_flights(tmp_path, monkeypatch):
+    """An ``alula`` that leaves a recorded flight whatever it is to fly; seed 13 can't start."""
+    (tmp_path / "alula").write_text(FLY, encoding="utf-8")
+    (tmp_path / "alula").chmod(0o755)
+    (tmp_path / "summary.json").write_text(SUMMARY, encoding="utf-8")
+    (tmp_path / "recorded").mkdir()
+    fly_recorded(tmp_path / "recorded", "zed@6")
+    for folder in ("scenarios", "skillsets", "ros1_ws"):
+        (tmp_path / folder).symlink_to(ALULA_ROOT / folder)
+    monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
+    monkeypatch.setenv("RECORDING", str(tmp_path / "recorded"))
+    return tmp_path
+
+
+def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_flights, tmp_path):
+    flights = [Flight(4, "mapping", 7, ("zed@6", "lidar@9"), tmp_path / "hill.yaml"), Flight(5, "mapping", 13, ())]
+    (tmp_path / "out" / "flight-00004").mkdir(parents=True)
+    row, failed = fly(flights, SIMULATOR, (), str(tmp_path / "out"))
+    asked = (tmp_path / "asked").read_text(encoding="utf-8").splitlines()
+    folder = tmp_path / "out" / "flight-00004-2"  # what a crash has left half done stays as it is
+    assert asked[0] == f"fly mapping --seed 7 --rate 0 --world {tmp_path / 'hill.yaml'} --fail zed@6 --fail lidar@9 --out {folder}"
+    assert (folder / "skills.mcap").is_file()
+    found = (row["outcome"], row["landed"], row["collisions"], row["min_clearance_m"], row["open"], row["exit_code"], row["conforms"])
+    assert found == ("degraded", True, 0, 1.2, ["b"], 0, True)
+    answers = {failure["name"]: failure["answered_by"] for failure in row["failures"]}
+    assert answers["zed"] == answers["perception.zed_status OK -> BROKEN"] == "LiDAR navigation"
+    assert answers["lidar"] == answers["zed_depth"] == "not detected"
+    assert (failed["outcome"], failed["reason"], failed["exit_code"], failed["failures"]) == ("not_started", "no free domain", 2, [])
+
+
+def test_managers_that_died_are_answered_by_what_the_mission_was_told(recorded_flights, tmp_path):
+    shutil.rmtree(recorded_flights / "recorded")
+    (recorded_flights / "recorded").mkdir()
+    mission = fly_recorded(recorded_flights / "recorded", kill=("perception", 20.0))
+    lift_off_s = mission.departure_s
+    died = [{"name": name, "when_s": 20.0 - lift_off_s, "how": "signal SIGKILL"} for name in ("perception", "lidar_mapping")]
+    summary = {"outcome": "given_up", "reason": "the managers have gone", "landed": True, "skills": [], "died": died}
+    (recorded_flights / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    (row,) = fly([Flight(4, "mapping", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
+    answers = {one["name"]: (one["answered_by"], one["skill"]) for one in row["failures"] if one["kind"] == "process"}
+    assert answers == {"perception": ("given up", "navigation.hover"), "lidar_mapping": ("not detected", "not detected")}
+    assert row["conforms"] is True
+
+
+def test_a_flight_in_which_no_skill_was_started_keeps_its_own_reason(recorded_flights, tmp_path):
+    summary = {"outcome": "not_started", "reason": "the mission clock stands still", "landed": None, "problems": ["no lift-off is known"]}
+    (recorded_flights / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    writer = RecordWriter(recorded_flights / "recorded" / FILE)
+    writer.write(MISSION, 0, {"scenario": "inspection"})
+    writer.close()
+    (row,) = fly([Flight(4, "inspection", 7, ())], SIMULATOR, (), str(tmp_path / "out"))
+    assert {name: row[name] for name in summary} == summary
+    assert (row["events"], row["failures"]) == (0, [])
+
+
+@pytest.mark.parametrize("file", ["uav-simulator.yaml", "uav-simulator-short.yaml"])
+def test_the_campaigns_of_thirty_flights_try_everything_that_can_fail_in_the_simulator(file):
+    campaign = load_campaign(CAMPAIGNS / file)
+    assert {flight.world is None for flight in campaign.flights} == {file == "uav-simulator.yaml"}
+    assert (campaign.over, campaign.at_once, len(campaign.flights)) == (SIMULATOR, 1, 30)
+    for name, sensors in (("inspection", ["zed", "lidar"]), ("mapping", ["zed", "lidar"])):
+        faults = [fault for flight in campaign.flights if flight.scenario == name for fault in flight.requests]
+        others = {(what, how) for what, ways in load_scenario(name).faults for how in ways}
+        assert {(fault.what, fault.how) for fault in faults} >= others
+        assert {fault.what for fault in faults} >= set(sensors)
+        assert () in {flight.faults for flight in campaign.flights if flight.scenario == name}
+    out_s = {round(fault.end_s - fault.begin_s, 6) for flight in campaign.flights for fault in flight.requests if fault.how == "out"}
+    assert out_s == {1.0, 5.0, 20.0}

@@ -1,0 +1,182 @@
+"""Handles and answers without middleware: every waiting caller is woken once, in its own way, and every reader sees every change."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+
+import pytest
+
+from alula.model.execution_state import ExecutionState
+from alula.runtime.handle import Report, SkillFailedError, SkillHandle, StillRunningError
+from alula.runtime.waiting import NoAnswerError, Pending
+
+S = ExecutionState
+SOON_S = 10.0
+
+
+def handle() -> SkillHandle:
+    return SkillHandle("takeoff", "1")
+
+
+def follow(one: SkillHandle) -> None:
+    one.run(0.25, {"height": 1.0})
+    one.run(0.25, {"height": 1.0})  # nothing new
+    one.run(0.5, {"height": 2.0})
+    one.end(S.TERMINATED, "DONE", "there", {"height": 3.0})
+    one.end(S.FAILED, "", "too late")
+    one.run(0.75, {"height": 9.0})
+
+
+REPORTS = [
+    Report(S.REQUESTED, 0.0, {}),
+    Report(S.RUNNING, 0.25, {"height": 1.0}),
+    Report(S.RUNNING, 0.5, {"height": 2.0}),
+    Report(S.TERMINATED, 0.5, {"height": 3.0}),
+]
+
+
+def test_an_execution_has_one_end():
+    one, ends = handle(), []
+    one.add_done_callback(ends.append)
+    assert one.ended is None
+    follow(one)
+    one.add_done_callback(ends.append)
+    assert ends == [one, one]
+    ended = one.get(0.0)
+    assert (ended.outcome, ended.result, ended.message, ended.outputs) == ("TERMINATED", "DONE", "there", {"height": 3.0})
+    assert ended.expect("DONE") is ended.expect() is ended
+    with pytest.raises(SkillFailedError, match=r"takeoff was to end with HIGH or HIGHER, but TERMINATED \(DONE: there\)"):
+        ended.expect("HIGH", "HIGHER")
+
+
+def test_a_message_that_begins_with_the_name_of_its_reason_does_not_get_it_twice():
+    one = handle()
+    one.end(S.NOT_READY, "idle", "idle: mapping_process is RUNNING")
+    assert str(one.ended) == "NOT_READY (idle: mapping_process is RUNNING)"
+
+
+def test_an_end_that_is_no_result_is_never_expected():
+    one = handle()
+    one.fail("gone")
+    with pytest.raises(SkillFailedError, match=r"end with a result, but FAILED \(gone\)"):
+        one.get(0.0).expect()
+
+
+def test_time_that_is_up_says_where_the_execution_is():
+    one = handle()
+    one.run()
+    assert not one.wait(0.01)
+    with pytest.raises(StillRunningError, match=r"takeoff is RUNNING and has not ended within 0\.01 s"):
+        one.get(0.01)
+
+
+def test_readers_in_threads_see_every_change_and_stop_at_the_end():
+    one = handle()
+    seen: list[list[Report]] = [[], []]
+    readers = [one.reports(), iter(one)]
+    threads = [threading.Thread(target=lambda i=i: seen[i].extend(readers[i])) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    follow(one)
+    for thread in threads:
+        thread.join(SOON_S)
+    assert seen == [REPORTS, REPORTS]
+    assert list(one) == REPORTS[-1:]  # a late reader
+
+
+def test_a_listener_that_raises_keeps_no_caller_waiting():
+    one = handle()
+    one.on_report(lambda report: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        one.fail("gone")
+    assert one.wait(0.0)
+
+
+def test_asyncio_awaits_and_iterates():
+    async def main() -> None:
+        one = handle()
+        thread = threading.Thread(target=lambda: (gate.wait(SOON_S), follow(one)))
+        gate = threading.Event()
+        thread.start()
+
+        async def read() -> list[Report]:
+            return [report async for report in one]
+
+        reading = asyncio.create_task(read())
+        await asyncio.sleep(0)  # one turn of the loop: the reader waits now
+        gate.set()
+        ended = await asyncio.wait_for(one, SOON_S)
+        assert ended.result == "DONE"
+        assert await asyncio.wait_for(reading, SOON_S) == REPORTS
+        assert (await one) == ended  # at once
+        thread.join(SOON_S)
+
+    asyncio.run(main())
+
+
+def test_an_await_that_is_cancelled_leaves_nothing_behind():
+    one = handle()
+
+    async def main() -> None:
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(one, 0.01)
+        assert one._after == []
+        waiting = asyncio.ensure_future(asyncio.wait_for(one, SOON_S))
+        await asyncio.sleep(0)  # one turn of the loop: it waits now
+        waiting.cancel()
+
+    asyncio.run(main())
+    one.fail("after the loop was closed")
+    assert one.done
+
+
+def test_a_coroutine_without_a_loop_is_resumed_by_its_driver():
+    one = handle()
+
+    async def waits() -> str:
+        return (await one).outcome
+
+    coroutine = waits()
+    for _ in range(3):
+        assert coroutine.send(None) is None
+    one.fail("gone")
+    with pytest.raises(StopIteration) as stopped:
+        coroutine.send(None)
+    assert stopped.value.value == "FAILED"
+
+
+def test_an_answer_comes_once_or_says_why_not():
+    answer: Pending[str] = Pending()
+    with pytest.raises(NoAnswerError, match="still under way"):
+        answer.get(0.01)
+    seen: list[str] = []
+    answer.add_done_callback(lambda pending: seen.append(pending.value))
+    answer.resolve("yes")
+    answer.resolve("no")
+    answer.fail("gone")
+    assert (answer.get(0.0), seen, answer.failure) == ("yes", ["yes"], "")
+    lost: Pending[str] = Pending()
+    lost.fail("gone")
+
+    async def main() -> None:
+        with pytest.raises(NoAnswerError, match="gone"):
+            await lost
+
+    asyncio.run(main())
+
+
+def test_pauses_are_asked_for_where_there_are_managers_to_ask():
+    asked: list[bool] = []
+
+    def pause(paused: bool) -> Pending[str]:  # noqa: FBT001 - the client's signature
+        asked.append(paused)
+        answer: Pending[str] = Pending()
+        answer.resolve("")
+        return answer
+
+    one = SkillHandle("takeoff", "1", pause=pause)
+    assert (one.pause().value, one.resume().value, asked) == ("", "", [True, False])
+    one.fail("gone")
+    assert one.pause().value == "takeoff has ended"
+    assert handle().pause().value == "takeoff can't be paused"

@@ -1,6 +1,0 @@
-"""The managers of a skillset (paper, section 4.2 and Figure 2), over any middleware."""
-
-from skill_runtime.managers.data import DataBindings, generated_bindings
-from skill_runtime.managers.managers import HOOKS_RETURN_S, MakeInputs, Managers
-
-__all__ = ["HOOKS_RETURN_S", "DataBindings", "MakeInputs", "Managers", "generated_bindings"]

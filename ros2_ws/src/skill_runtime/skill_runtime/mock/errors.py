@@ -1,9 +1,0 @@
-"""What can be wrong with a behaviour."""
-
-from __future__ import annotations
-
-from skill_runtime.core.errors import SkillRuntimeError
-
-
-class BehaviourError(SkillRuntimeError):
-    """A behaviour file is not as it should be; the message says where, what and what would be right."""

@@ -1,0 +1,211 @@
+"""The middleware port over rclpy."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import skillset_interfaces.msg
+import skillset_interfaces.srv
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Header
+
+from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from alula.runtime.timers import Job
+from skillset_ros2.actions import RclpyLink, RclpyServer
+from skillset_ros2.base import RclpyBase
+from skillset_ros2.calls import Calls, Discovery
+from skillset_ros2.convert import message_class
+from skillset_ros2.names import ALIVE, SERVICE, SOURCE, action_type, latched
+
+
+class RclpyMiddleware(RclpyBase):
+    """The middleware port over rclpy.
+
+    Args:
+        node: whose executor serves it.
+        skillset: its name.
+        root: what its names begin with, relative to the node's namespace or absolute.
+        interfaces: the generated package ``<skillset>_interfaces``, or its module ``action``; imported by name by default.
+    """
+
+    def __init__(self, node: Node, skillset: str, *, root: str = "", interfaces: Any = None) -> None:
+        super().__init__(node, skillset, root=root)
+        self._interfaces = interfaces
+        self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class)
+        self._give_sign: Job = lambda: None
+
+    # --- topics ------------------------------------------------------------------------------------------------------
+
+    def advertise(self, topic: Topic) -> RclpyPublisher:
+        """Open a topic for publishing."""
+        codec = self._codecs.topic(topic)
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        made = self.node.create_publisher(codec.kind, self.name(topic.name), latched(topic.depth), event_callbacks=quiet)
+        return RclpyPublisher(made, functools.partial(codec.encode, self._skillset))
+
+    def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
+        """Follow a topic; the type of a data is asked of the graph where it is not known."""
+        if self._closed:
+            return lambda: False
+        codec = self._codecs.topic(topic)
+        take: OnValue = lambda message: callback(codec.decode(message))  # noqa: E731
+        if topic.outside:
+            self.listen(topic.name, codec.kind, take, SOURCE, events=None)
+            return lambda: True
+        if codec.kind is None:
+            self._listen_once_known(self.name(topic.name), take, latched(topic.depth))
+            return lambda: True
+        self.listen(self.name(topic.name), codec.kind, take, latched(topic.depth))
+        publishers = self.node.resolve_topic_name(self.name(topic.name))
+        return Discovery(lambda: bool(self.node.count_publishers(publishers)))
+
+    def _listen_once_known(self, name: str, callback: OnValue, qos: QoSProfile) -> None:
+        """Subscribe as soon as the graph tells the topic's type."""
+        topic = self.node.resolve_topic_name(name)
+        found: list[str] = []
+
+        def known() -> bool:
+            found[:] = sorted({info.topic_type for info in self.node.get_publishers_info_by_topic(topic)})
+            return bool(found)
+
+        def listen() -> None:
+            try:
+                self.listen(topic, message_class(found[0]), callback, qos)
+            except (ImportError, AttributeError):
+                self.log(f"{topic}: no Python package has the type {found[0]}; its values can't be followed here")
+
+        self.when(known, listen)
+
+    # --- services ----------------------------------------------------------------------------------------------------
+
+    def serve(self, service: str, handler: Serve) -> None:
+        """Serve a service; its answers may come later, from any thread, and the executor goes on meanwhile."""
+        codec = self._codecs.services[service]
+        made: Any = self.node.create_service(
+            codec.kind, self.name(service), lambda request, _: request, qos_profile=SERVICE, callback_group=self._group
+        )
+        respond = made.send_response
+
+        def reply(header: Any, value: Any) -> None:
+            response = codec.kind.Response()
+            codec.encode(value, response)
+            if not self._closed:
+                respond(response, header)
+
+        def take(request: Any, header: Any) -> None:
+            fields = {name: getattr(request, name) for name in codec.fields}
+            handler(fields, functools.partial(reply, header))
+            if service == "describe":
+                # The client may have given these managers up before this answer comes, and DDS tells of no change.
+                self._give_sign()
+
+        # What rclpy takes for the sending of the callback's return value is where the request is dealt with.
+        made.send_response = self.on_loop(take)
+
+    def call(
+        self,
+        service: str,
+        request: Mapping[str, object],
+        on_reply: OnReply,
+        on_error: OnError,
+        *,
+        timeout_s: float = CALL_S,
+        once: bool = False,
+    ) -> None:
+        """Call a service."""
+        codec = self._codecs.services[service]
+        decoded: OnReply = lambda response, tries: on_reply(codec.decode(response), tries)  # noqa: E731
+        self._calls_of(service, codec).call(codec.kind.Request(**request), decoded, on_error, timeout_s=timeout_s, once=once)
+
+    def prepare_calls(self) -> None:
+        """Have DDS discover all services before they are called: the first answer of one that was just discovered may get lost."""
+        for service, codec in self._codecs.services.items():
+            self._calls_of(service, codec)
+
+    def _calls_of(self, service: str, codec: ServiceCodec) -> Calls:
+        return self._calls.get(service) or self.calls(service, codec.kind)
+
+    # --- actions -----------------------------------------------------------------------------------------------------
+
+    def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> RclpyServer:
+        """Serve a skill."""
+        return RclpyServer(self, self._action(skill), skill, on_goal, on_cancel)
+
+    def action(self, skill: str, listener: GoalListener) -> RclpyLink:
+        """Connect to a skill."""
+        return RclpyLink(self, self._action(skill), skill, listener)
+
+    def _action(self, skill: str) -> type:
+        if self._interfaces is None:
+            self._interfaces = importlib.import_module(f"{self._skillset}_interfaces.action")
+        return action_type(self._interfaces, skill)
+
+    # --- life --------------------------------------------------------------------------------------------------------
+
+    def announce(self, life: str, on_rival: OnError) -> None:
+        """Tell of these managers, latched; DDS itself sends the signs of life. Those that were there first stay."""
+        begun_ns = time.time_ns()
+        sign = Header(frame_id=life)
+        set_stamp(sign.stamp, begun_ns)
+        told = f"managers of {self._skillset} are there already ({self.node.resolve_topic_name(self.name('alive'))}); end them first"
+
+        def hear(other: Any) -> None:
+            mine, others = (begun_ns, life), (stamp_ns_of(other.stamp), other.frame_id)
+            if others[1] != life and others < mine:
+                on_rival(told)
+            elif others[1] != life:
+                self.log(f"second managers of {self._skillset} were started; they have to end")
+
+        self.listen(self.name("alive"), Header, hear, latched(1))
+        publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE)
+        self._give_sign = lambda: publisher.publish(sign)
+        self._give_sign()
+
+    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
+        """Follow the signs of life of the managers, by DDS."""
+        last: list[str] = []
+
+        def hear(sign: Any) -> None:
+            last[:] = [sign.frame_id]
+            on_sign(sign.frame_id, 0)
+
+        def changed(info: Any) -> None:
+            # By the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).
+            if info.alive_count_change < 0 or info.not_alive_count_change > 0:
+                on_doubt()
+            elif info.alive_count_change > 0 and last:
+                # Perhaps the managers that were heard last: it may be others that live, whose name comes in a moment.
+                on_sign(last[0], 0)
+
+        self.node.create_subscription(
+            Header,
+            self.name("alive"),
+            self.on_loop(hear),
+            ALIVE,
+            callback_group=self._group,
+            event_callbacks=SubscriptionEventCallbacks(liveliness=self.on_loop(changed), use_default_callbacks=False),
+        )
+
+
+class RclpyPublisher:
+    """A topic's writing end."""
+
+    def __init__(self, publisher: Any, encode: Callable[[Any], Any]) -> None:
+        self._publisher = publisher
+        self._encode = encode
+
+    def publish(self, value: Any) -> None:
+        """Send a value."""
+        self._publisher.publish(self._encode(value))
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait (wall clock) until all subscribers have all messages."""
+        self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))

@@ -1,0 +1,68 @@
+"""A node that spins by itself, for scripts that have none."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import threading
+import traceback
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import Executor, ExternalShutdownException, ShutdownException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+
+from skillset_ros2.executor import StaticSingleThreadedExecutor
+
+JOIN_S = 5.0
+
+
+class Session:
+    """A context, a node and a thread that spins it, of their own; ``close`` ends them.
+
+    Args:
+        name: begins the node's name.
+        domain: the DDS domain; by default the environment's ROS_DOMAIN_ID.
+        executor: what spins the node.
+    """
+
+    def __init__(self, name: str, *, domain: int | None = None, executor: type[Executor] = StaticSingleThreadedExecutor) -> None:
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = Node(f"{name}_{os.getpid():x}_{threading.get_native_id():x}", context=self._context, enable_rosout=False)
+        self._executor = executor(context=self._context)
+        self._executor.add_node(self.node)
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._spin, name=f"{name}_spin", daemon=True)
+        self._thread.start()
+        # A script that ends without closing: the spinning thread must not be in DDS when the interpreter goes.
+        atexit.register(self.close)
+
+    def follow_clock(self) -> None:
+        """Take the mission clock of ``/clock`` where one is published."""
+        if self.node.count_publishers("/clock"):
+            self.node.set_parameters([Parameter("use_sim_time", value=True)])
+
+    def close(self) -> None:
+        """End the spinning, the node and the context; a second call does nothing."""
+        atexit.unregister(self.close)
+        if self._over.is_set():
+            return
+        self._over.set()
+        self._executor.shutdown(timeout_sec=0)
+        if threading.current_thread() is not self._thread:
+            self._thread.join(JOIN_S)
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def _spin(self) -> None:
+        while not self._over.is_set():
+            try:
+                self._executor.spin()
+            except (ExternalShutdownException, ShutdownException):
+                return
+            except Exception as error:  # noqa: BLE001 - a user's callback; the others must go on
+                if not self._over.is_set():
+                    self.node.get_logger().error("".join(traceback.format_exception(error)))

@@ -1,0 +1,205 @@
+"""The main function of a skillset's process."""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from types import FrameType, ModuleType
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, ShutdownException
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Header
+
+from alula.common.shared_memory import sweep_shared_memory
+from alula.model.model import Skillset
+from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.hook_processes import RemoteHooks, pipe_address
+from alula.runtime.managers import DataBindings
+from skillset_ros2.executor import StaticSingleThreadedExecutor
+from skillset_ros2.names import latched
+from skillset_ros2.node import HooksFactory, HooksNode, SkillsetNode
+from skillset_ros2.processes import RESOURCES, end_with, supervise, wait_for
+
+END_S = 2.0
+LISTEN_FIRST_S = 0.5
+"""How long (wall clock) managers that begin listen for others."""
+PROCESSES_S = 0.5
+REFUSED = 2
+SWEPT_AFTER_S = 5.0
+END_LIMIT_S = 30.0
+"""Wall clock; hooks may take some seconds to stop their functions."""
+ROS_ARGUMENTS = "--ros-args"
+ALL = "all"
+
+
+def ros2_arguments(arguments: Sequence[str]) -> list[str]:
+    """Return the command line without the words that roslaunch adds for ROS 1 (``__name:=...``), which rclpy refuses."""
+    return [word for word in arguments if not (word.startswith("__") and ":=" in word)]
+
+
+def run_skillset(
+    skillset: Skillset,
+    interfaces: ModuleType,
+    hooks_factory: HooksFactory,
+    *,
+    data_bindings: DataBindings | None = None,
+    arguments: Sequence[str] | None = None,
+    again: Sequence[str] = (),
+) -> None:
+    """Serve a skillset until SIGINT or SIGTERM; then stop what runs, tell its callers, and return.
+
+    ``arguments`` (default: the command line) are ``--processes single|separate``, ``--part NAME`` to serve a part only, and those of
+    ROS: ``--ros-args -p use_sim_time:=true``. Exits with 2 when they are wrong. ``again``: what else the command line of a part needs.
+    """
+    options, words = _options(skillset, sys.argv[1:] if arguments is None else arguments)
+    stop = threading.Event()
+
+    def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    if options.parent:
+        end_with(options.parent)
+    if options.processes == "separate" and options.part == ALL:
+        code = supervise(skillset.name, [skill.name for skill in skillset.skills], [*again, *words], stop)
+        if code:
+            sys.exit(code)
+        return
+    # Processes that were killed have left theirs.
+    sweep_shared_memory(older_than_s=SWEPT_AFTER_S)
+    # Our own handlers: rclpy's would shut the context down before the callers were told.
+    rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
+    refusals: list[str] = []
+
+    def refuse(reason: str) -> None:
+        refusals.append(reason)
+        stop.set()
+
+    try:
+        if options.part in {ALL, RESOURCES} and rivals_there(skillset.name):
+            refuse(f"managers of {skillset.name} are there already; end them first")
+        else:
+            address = pipe_address(os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
+            node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
+            if node is not None:
+                spin_until(node, stop, at_stop=_limit_the_end)
+                node.destroy_node()
+    except SkillRuntimeError as error:
+        refuse(str(error))
+    finally:
+        rclpy.try_shutdown()
+        faulthandler.cancel_dump_traceback_later()
+    if refusals:
+        sys.stderr.write(f"{refusals[0]}\n")
+        sys.exit(REFUSED)
+
+
+def rivals_there(skillset: str) -> bool:
+    """Tell whether managers of this skillset give signs of life, before anything is done that might disturb them."""
+    node = Node(skillset, enable_rosout=False)
+    heard: list[object] = []
+    node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
+    executor = StaticSingleThreadedExecutor()
+    executor.add_node(node)
+    end_s = time.monotonic() + LISTEN_FIRST_S
+    while not heard and (left_s := end_s - time.monotonic()) > 0:
+        executor.spin_once(timeout_sec=left_s)
+    executor.shutdown(timeout_sec=0)
+    node.destroy_node()
+    return bool(heard)
+
+
+def make_part(
+    part: str,
+    skillset: Skillset,
+    interfaces: ModuleType,
+    hooks_factory: HooksFactory,
+    data_bindings: DataBindings | None,
+    *,
+    address: str,
+    stop: threading.Event,
+    on_rival: Callable[[str], None],
+) -> SkillsetNode | HooksNode | None:
+    """Make the node of a part: ``all`` managers, the ``resources``' or the hooks of a skill; None when ``stop`` came before."""
+    if part == ALL:
+        return SkillsetNode(skillset, interfaces, hooks_factory, data_bindings=data_bindings, on_rival=on_rival)
+    if part != RESOURCES:
+        return HooksNode(skillset, part, hooks_factory, address)
+    hooks = RemoteHooks(skillset, address, get_logger(skillset.name).error)
+    # A client that finds the skillset can call all of it.
+    while hooks.wait(PROCESSES_S):
+        if stop.is_set():
+            return None
+    return SkillsetNode(skillset, interfaces, hooks, data_bindings=data_bindings, on_rival=on_rival)
+
+
+def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
+    """Return the options of this command and the words for ROS."""
+    words = ros2_arguments(arguments)
+    split = words.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in words else len(words)
+    skills = [skill.name for skill in skillset.skills]
+    parser = argparse.ArgumentParser(description=f"Serve the skillset {skillset.name}.", epilog="after these: --ros-args ...")
+    parser.add_argument("--processes", choices=["single", "separate"], default="single", help="separate: each skill manager in its own")
+    parser.add_argument("--part", choices=[ALL, RESOURCES, *skills], default=ALL, metavar="PART", help=f"serve {RESOURCES} or a skill only")
+    parser.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this process, the parent, ends")
+    return parser.parse_args(words[:split]), words[split:]
+
+
+def _limit_the_end() -> None:
+    """Have this process say where it hangs, and end all the same, when its end takes too long: a hook, the middleware."""
+    faulthandler.dump_traceback_later(END_LIMIT_S, exit=True)
+
+
+def nothing_more() -> None:
+    """Do nothing more at the stop."""
+
+
+def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop: Callable[[], None] = nothing_more) -> None:
+    """Spin a node in a thread of its own until ``stop``; then end its executions while it still spins.
+
+    A callback that raises (most are of hooks) fails what runs, as it is not known whose function is without its watch now;
+    the managers live on.
+    """
+    executor = StaticSingleThreadedExecutor()
+    executor.add_node(node)
+    over = threading.Event()
+
+    def spin() -> None:
+        while not over.is_set():
+            try:
+                executor.spin()
+            except (ExternalShutdownException, ShutdownException):
+                break
+            except Exception as error:  # noqa: BLE001 - told and failed below
+                node.get_logger().error("".join(traceback.format_exception(error)))
+                last_line = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
+                node.fail_all(f"a callback raised {last_line}")
+        stop.set()
+
+    def end() -> None:
+        """Shut down once nothing else is left: rclpy sends results by tasks, which make others."""
+        if executor.idle or time.monotonic() > patient_until_s:
+            over.set()
+            executor.shutdown(timeout_sec=0)
+        else:
+            executor.create_task(end)
+
+    thread = threading.Thread(target=spin, name="executor")
+    thread.start()
+    wait_for(stop)
+    at_stop()
+    node.close("the managers were shut down")
+    patient_until_s = time.monotonic() + END_S / 2
+    executor.create_task(end)
+    thread.join(END_S)

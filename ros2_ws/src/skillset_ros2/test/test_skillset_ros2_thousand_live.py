@@ -1,0 +1,65 @@
+"""A thousand executions in a row leave memory and open files where they were."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy")
+pytest.importorskip("navigation_interfaces.action")
+
+from skillset_ros2_rig import SOON_S  # noqa: E402
+
+from alula.model.execution_state import ExecutionState  # noqa: E402
+from alula_testing.navigation import FLYING  # noqa: E402
+
+WARM, MEASURED = 300, 1000
+"""The events' topic keeps the last 1000 of them: four of each execution, and it is full."""
+GROWTH_KB = 8000
+"""Of all of the process, rclpy and DDS included; goals that rcl keeps for late questions are part of it."""
+
+
+def rss_kb() -> int:
+    """Resident memory of this process."""
+    line = next(line for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines() if line.startswith("VmRSS"))
+    return int(line.split()[1])
+
+
+def open_files() -> int:
+    return len(os.listdir("/proc/self/fd"))  # noqa: PTH208
+
+
+def own_objects() -> Counter[str]:
+    """How many objects of each class of this package live."""
+    gc.collect()
+    classes = (type(thing) for thing in gc.get_objects())
+    return Counter(kind.__name__ for kind in classes if str(kind.__module__).startswith("alula.runtime."))
+
+
+def test_a_thousand_executions_leave_nothing_behind(navigation):
+    navigation.bring(FLYING)
+    navigation.hooks["hover"].acts["on_dispatch"] = lambda execution: execution.terminate("DONE")
+
+    def run(times: int) -> None:
+        for _ in range(times):
+            handle = navigation.client.start("hover", duration=1.0)
+            assert handle.wait(SOON_S)
+            assert handle.state is ExecutionState.TERMINATED
+        navigation.events.clear()
+        navigation.hooks["hover"].calls.clear()
+
+    run(WARM)
+    files, memory_kb, objects = open_files(), rss_kb(), own_objects()
+    assert objects["SkillManager"] >= len(navigation.hooks)  # they are found at all
+    run(MEASURED)
+    growth_kb, more = rss_kb() - memory_kb, own_objects() - objects
+    assert open_files() <= files
+    assert growth_kb < GROWTH_KB, f"{growth_kb} kB more after {MEASURED} executions"
+    assert more.total() < MEASURED / 20, more
+    assert navigation.managers.engine.executions == ()
+    assert navigation.managers.engine._context.entries == {}
+    print(f"{growth_kb} kB, {open_files() - files} files, {more.total()} objects more")  # noqa: T201
