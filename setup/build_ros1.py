@@ -14,7 +14,7 @@ import sys
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from workspace import TOOLS_AND_TESTS, Built, Package, digest, find_packages, link_python, state_of
+from workspace import Built, Package, digest, find_packages, state_of
 
 ROOT = Path(os.environ["ALULA_ROOT"])
 STATE = Path(os.environ["ALULA_STATE"])
@@ -67,9 +67,6 @@ def build() -> int:
     code = run_catkin(changed if built.packages else ()) if changed else 0
     if code == 0:
         Built(tools, states).write(BUILT)
-        devel = DEVEL / "lib" / "python3" / "dist-packages"
-        shared = find_packages([STATE / "generated"], "*_managers") | find_packages([ROOT / "ros2_ws/src"], "mission_console")
-        link_python(shared.values(), devel, *(ROOT / place for place in TOOLS_AND_TESTS))
     return code
 
 

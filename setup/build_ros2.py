@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from importlib.metadata import distributions
 from pathlib import Path
 
-from workspace import TOOLS_AND_TESTS, Built, Package, build_files, digest, find_packages, link_python, state_of
+from workspace import Built, Package, build_files, digest, find_packages, state_of
 
 ROOT = Path(os.environ["ALULA_ROOT"])
 STATE = Path(os.environ["ALULA_STATE"])
@@ -113,8 +113,6 @@ def build() -> int:
     for name in changed:
         (BUILD / name / "colcon_build.rc").unlink(missing_ok=True)
     code = run_colcon(changed, packages) if changed else 0
-    site = INSTALL / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
-    link_python(packages.values(), site, *(ROOT / place for place in TOOLS_AND_TESTS))
     Built(tools, {name: state for name, state in states.items() if name not in changed or succeeded(name)}).write(BUILT)
     return code
 

@@ -4,6 +4,8 @@ unset PYTHONHOME AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPA
 # The ROS 2 wheels set the loader's path once a process tree and mark that with this variable; we have just unset the path.
 unset _ROS_WHEELS_BOOTSTRAP_COMPLETE
 export ALULA_ROOT ALULA_STATE="${ALULA_STATE:-$ALULA_ROOT/.alula}"
+# The robot that commands are about (alula.common.robots); the drone of this checkout, where the entry script has not looked for one.
+export ALULA_ROBOT="${ALULA_ROBOT-$ALULA_ROOT}"
 export PYTHONUNBUFFERED=1 PYTHONNOUSERSITE=1
 # Numeric libraries: many small processes share few cores, a pool of threads in each only makes them wait for one another.
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"

@@ -127,13 +127,13 @@ tell_broken_robots() {
   done 2>/dev/null <"$ALULA_STATE/broken_robots"
 }
 
-make_ros1() { ( . "$ALULA_ROOT/setup/env.sh" 1 && python3 "$ALULA_ROOT/setup/build_ros1.py" ); }
+make_ros1() { ( . "$ALULA_ROOT/setup/env.sh" 1 && python3 "$ALULA_ROOT/setup/build_ros1.py" && python3 "$ALULA_ROOT/setup/link_packages.py" 1 ); }
 
 make_ros2() {
   ( . "$ALULA_ROOT/setup/env.sh" 2
     unset PYTHONPATH LD_LIBRARY_PATH
     export AMENT_PREFIX_PATH="$ALULA_STATE/venv2" CMAKE_PREFIX_PATH="$ALULA_STATE/venv2"
-    python "$ALULA_ROOT/setup/build_ros2.py" )
+    python "$ALULA_ROOT/setup/build_ros2.py" && python "$ALULA_ROOT/setup/link_packages.py" 2 )
 }
 
 if [ -f "$ALULA_STATE/sealed" ]; then   # an image that flies, without what builds
@@ -157,10 +157,10 @@ step_venv2() {
 }
 step_generated() { step generated "$(model_digest)" generate "skillsets: interfaces, managers, bridge configuration"; }
 step_ros1() {
-  step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")-$(digest "$ALULA_ROOT"/setup/{workspace,build_ros1}.py)" make_ros1 "ROS 1 workspace (catkin_make)"
+  step ros1 "$(tree_digest "$ALULA_ROOT/ros1_ws/src" "$ALULA_STATE"/generated/*_interfaces)-$(cat "$ALULA_STATE/stamps/venv1")-$(digest "$ALULA_ROOT"/setup/{workspace,build_ros1,link_packages}.py)" make_ros1 "ROS 1 workspace (catkin_make)"
 }
 step_ros2() {
-  local scripts; scripts=$(digest "$ALULA_ROOT"/setup/{workspace.py,build_ros2.py,interfaces.cmake})
+  local scripts; scripts=$(digest "$ALULA_ROOT"/setup/{workspace.py,build_ros2.py,link_packages.py,interfaces.cmake})
   step ros2 "$(tree_digest "$ALULA_ROOT/ros2_ws/src" "$ALULA_ROOT/bridge")-$(tree_digest "$ALULA_STATE/generated")-$(cat "$ALULA_STATE/stamps/venv2")-$scripts" make_ros2 "ROS 2 workspace (colcon build)"
 }
 run apt

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sysconfig
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,20 +66,6 @@ def state_of(name: str, packages: Mapping[str, Package]) -> str:
     if not (package.folder / "CMakeLists.txt").exists():
         return package.digest
     return digest(package.digest, *(state_of(needed, packages) for needed in sorted(package.needs & packages.keys())))
-
-
-def link_python(packages: Iterable[Package], *others: Path) -> None:
-    """Have this interpreter's environment find the Python packages where their sources are, and what else lies in ``others``.
-
-    This is what an editable installation of each would do, in one file: no path is set by hand where a process starts.
-    """
-    places = [*others, *(package.folder for package in packages if (package.folder / "setup.cfg").exists())]
-    path = Path(sysconfig.get_path("purelib")) / "alula_workspace.pth"
-    path.write_text("".join(f"{place.resolve()}\n" for place in places), encoding="utf-8")
-
-
-TOOLS_AND_TESTS = ("flight", "tests/support", "tools")
-"""Folders of the checkout that hold Python packages of neither workspace."""
 
 
 @dataclass(frozen=True)

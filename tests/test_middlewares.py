@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from alula.language.stories import Story
-from alula.runtime.live_story import from_line, to_line
+from alula_testing.live_story import from_line, to_line
 from alula_testing.misbehaviours import MISBEHAVIOURS
 from alula_testing.stories import MODELS, stories
 from alula_testing.traces import Behaviour, Script, Step, play
@@ -111,7 +111,7 @@ def test_clients_have_the_same_public_interface_in_all_worlds():
     assert {"start", "trigger", "read_data", "input_types", "interrupt_all", "on_event"} <= set(found["none"])
 
 
-STORY_PLAYERS = {"ros1": "skillset_ros1.story_world", "ros2": "skillset_ros2.story_world"}
+STORY_PLAYERS = {"ros1": "alula_testing.story_world_ros1", "ros2": "alula_testing.story_world_ros2"}
 STORIES_S = 600.0
 
 

@@ -12,17 +12,18 @@ import pytest
 from mcap.writer import Writer
 
 import alula_flight.replay
+from alula.campaign import mock_run
 from alula.commands import expect
 from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
+from alula.records.models import robot_skillsets
 from alula.runtime.mock import MockSkill, load_behaviour
 from alula_flight.replay import CANNOT_REPLAY, OTHERWISE, SAME, main
-from uav_missions import mapping, mock_flight
-from uav_missions.route import load_route
+from uav_missions import mapping
+from uav_missions.route import inputs_of
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
-WORLDS = {"mapping": "yard", "inspection": "building"}
 
 
 @pytest.fixture(autouse=True)
@@ -33,9 +34,7 @@ def without_report(monkeypatch):
 
 def fly(out: Path, *faults: str, scenario: str = "mapping") -> Path:
     """Fly over mocks and return the run's folder."""
-    words = ["--out", str(out), "--scenario", scenario, "--behaviour", str(ALULA_ROOT / "skillsets/uav/mock.yaml")]
-    words += ["--route", str(ALULA_ROOT / f"ros1_ws/src/uav_simulator/worlds/{WORLDS[scenario]}.yaml")]
-    mock_flight.main([*words, *(word for fault in faults for word in ("--fail", fault))])
+    mock_run.main([scenario, "--out", str(out), *(word for fault in faults for word in ("--fail", fault))])
     return out
 
 
@@ -84,11 +83,11 @@ def test_a_replay_is_a_record_that_replays(zed_dead, tmp_path):
 
 def mapping_over_mocks(out: Path) -> MockedMission:
     """Return a mission that is to be told something on the way."""
-    route = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml")
-    skillsets = mock_flight.drone(("navigation", "perception", "mapping"))
-    behaviour = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone())
+    inputs = inputs_of(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml")
+    skillsets = robot_skillsets(("navigation", "perception", "mapping"))
+    behaviour = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets())
     out.mkdir()
-    return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(route), out=out)
+    return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(inputs), out=out)
 
 
 def pause_between(mission: MockedMission, *, pause_s: float, resume_s: float) -> None:
@@ -225,7 +224,8 @@ def write_wrong_mission(path: Path) -> None:
 
 
 WRONG_MISSIONS = {
-    "its route is no list of [x, y, z]": {"route": [[0, 0, 3], "x"]},
+    "waypoint 2 is 'x', not [x, y, z] in metres": {"route": [[0, 0, 3], "x"]},
+    "the inputs of its mission are no mapping": {"inputs": [1]},
     "its parameters are no mapping": {"parameters": [1]},
     "the parameter speed_m_s is no number, but 'fast'": {"parameters": {"speed_m_s": "fast"}},
     "the parameter speed_m_s is no number, but {}": {"parameters": {"speed_m_s": {}}},

@@ -1,15 +1,36 @@
-"""Every arrow points down: nothing below ``flight/`` imports or starts what is in it."""
+"""Every arrow points down, and no room below the robot knows one: strings count, because a command line is an arrow, too."""
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 ON_TOP = sorted(path.name for path in (ALULA_ROOT / "flight").iterdir() if (path / "__init__.py").is_file())
-BELOW = ("bridge", "ros1_ws/src", "ros2_ws/src", "skillsets")
+BELOW = ("bridge", "lib", "ros1_ws/src", "ros2_ws/src", "skillsets")
+ROS = r"rclpy|rospy|roslib|roslaunch|rosbag|genpy|actionlib|rcl_interfaces|\w+_msgs|skillset_interfaces"
+ADAPTERS = "skillset_ros1|skillset_ros2|resource_reporter|skill_panel|ros_bridge|mission_console"
+DRONE_PACKAGES = "ground_station|lidar_mapping|lidar_obstacles|perception_core|radio_link|video_stream|zed_depth"
+DRONE = rf"uav_\w+|{DRONE_PACKAGES}|navigation_\w+|perception_managers|mapping_managers|video_managers"
+GENERATED = {"language/generate", "scaffold/robot"}
+"""Texts of the library that become code of a robot, which imports ROS."""
+TYPES = "lib/alula/model/ros_types.py"
+"""What types of models are called in ROS: names as data."""
+RULES = {
+    # The library: neither ROS nor a robot.
+    "lib/alula": rf"{ROS}|{ADAPTERS}|{DRONE}",
+    # The adapters and the bridge: no robot.
+    "ros1_ws/src/skillset_ros1": DRONE,
+    "ros1_ws/src/resource_reporter": DRONE,
+    "ros2_ws/src/skillset_ros2": DRONE,
+    "ros2_ws/src/skill_panel": DRONE,
+    "bridge/ros_bridge": DRONE,
+}
 
 
 def texts() -> Iterator[tuple[Path, str]]:
@@ -23,8 +44,69 @@ def texts() -> Iterator[tuple[Path, str]]:
 
 
 def test_no_room_below_names_a_package_on_top() -> None:
-    """Also not in a string: a command line with ``-m alula_flight`` is an arrow, too."""
     assert "alula_flight" in ON_TOP
     named = re.compile(rf"\b({'|'.join(ON_TOP)})\b")
     found = [f"{path}:{text.count(chr(10), 0, match.start()) + 1}: {match[0]}" for path, text in texts() for match in named.finditer(text)]
+    assert not found, "\n".join(found)
+
+
+def docstrings(tree: ast.AST) -> set[int]:
+    """Return the ids of the strings of a module that stand alone: what they say is for readers."""
+    return {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)}
+
+
+def names_in(text: str) -> Iterator[tuple[int, str]]:
+    """Yield the modules that a module imports, and its strings, with their lines."""
+    tree = ast.parse(text)
+    spoken = docstrings(tree)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.lineno, node.module or ""
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in spoken:
+            yield node.lineno, node.value
+
+
+def modules(*rooms: str) -> Iterator[Path]:
+    """Yield the Python modules of rooms, but for tests."""
+    for room in rooms:
+        for path in sorted((ALULA_ROOT / room).rglob("*.py")):
+            if "test" not in path.relative_to(ALULA_ROOT / room).parts:
+                yield path
+
+
+@pytest.mark.parametrize("room", RULES)
+def test_no_room_knows_what_stands_on_it(room: str) -> None:
+    # With a slash behind, it is the name of a type, as the language and logs have it.
+    forbidden = re.compile(rf"(?<![\w.])({RULES[room]})\b(?!/)")
+    found = [
+        f"{path}:{line}: {match[0]}"
+        for path in modules(room)
+        if not any(part in str(path) for part in {*GENERATED, TYPES})
+        for line, name in names_in(path.read_text(encoding="utf-8"))
+        for match in forbidden.finditer(name)
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_the_engine_needs_no_parser() -> None:
+    """What executes a model gets it as values: model and runtime import nothing of the language."""
+    rooms = [f"lib/alula/{room}" for room in ("common", "model", "runtime/core", "runtime/managers", "runtime/client", "runtime/local")]
+    found = [
+        f"{path}: {name}"
+        for path in modules(*rooms)
+        for _, name in names_in(path.read_text(encoding="utf-8"))
+        if name.startswith(("alula.language", "alula.prove", "alula.editor"))
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_the_bridge_uses_only_what_both_worlds_share() -> None:
+    found = [
+        f"{path}: {name}"
+        for path in modules("bridge/ros_bridge/ros_bridge")
+        for _, name in names_in(path.read_text(encoding="utf-8"))
+        if name.startswith("alula.") and not name.startswith("alula.common")
+    ]
     assert not found, "\n".join(found)

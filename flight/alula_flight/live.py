@@ -8,7 +8,7 @@ from pathlib import Path
 from alula.common.record import EVENTS, FILE, RecordFollower
 from alula.model.execution_state import ExecutionState
 from alula.records.conformance import Monitor
-from alula.records.run import DEPARTURE
+from alula.records.run import departure
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 from alula_flight.deaths import read_deaths
 
@@ -38,6 +38,7 @@ class LiveEvents:
         self._monitor = monitor
         self._begun_s: float | None = None
         self._lift_off_s: float | None = None
+        self._departure = departure()
         self._deaths_shown = 0
 
     def show_new(self) -> None:
@@ -57,7 +58,7 @@ class LiveEvents:
             return  # the report names it
         if self._begun_s is None:
             self._begun_s = event.stamp_s
-        if self._lift_off_s is None and isinstance(event, TransitionEvent) and (event.resource, event.from_state) == DEPARTURE:
+        if self._lift_off_s is None and isinstance(event, TransitionEvent) and (event.resource, event.from_state) == self._departure:
             self._lift_off_s = event.stamp_s
         text = event_line(event, self._lift_off_s, self._begun_s)
         if text is not None:

@@ -9,8 +9,6 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from alula.common.robots import behaviour_files
-from alula.common.scenarios import load_scenario
 from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
 from alula_flight.ending import CANNOT_START, GIVEN_UP
@@ -22,9 +20,9 @@ STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at o
 
 def command(spec: RunSpec, root: Path) -> list[str]:
     """Return the command line of the flight."""
-    words = [str(root / "setup" / "in_ros2"), "python", "-m", "uav_missions.mock_flight", "--scenario", spec.scenario]
-    words += ["--out", spec.out_dir, "--route", spec.world, "--seed", str(spec.seed)]
-    for file in (*map(str, behaviour_files(load_scenario(spec.scenario).skillsets)), *spec.behaviour):
+    words = [str(root / "setup" / "in_ros2"), "python", "-m", "alula.campaign.mock_run", spec.scenario]
+    words += ["--out", spec.out_dir, "--world", spec.world, "--seed", str(spec.seed)]
+    for file in spec.behaviour:
         words += ["--behaviour", file]
     for fault in spec.faults:
         words += ["--fail", fault]

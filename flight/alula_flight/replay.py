@@ -32,6 +32,7 @@ from alula.records.replay.kept import same, trace_of, verdict, write_out
 from alula.records.replay.recorded import Recorded, ReplayError, load
 from alula.records.replay.replay import Result
 from alula.records.run import load_run
+from skillset_ros2.replay import from_bag
 
 SAME, OTHERWISE, CANNOT_REPLAY = 0, 1, 2
 
@@ -116,7 +117,8 @@ def decide_again(given: Arguments, recorded: Recorded, folder: Path, out: Path |
     if given.depth == "sensors" and bag is not None:  # what fails and is set there is the perception's business
         bag = perceive(bag, folder, given.fail, [text for text in settings if is_setting(text)], given.names)
         settings, fail = [text for text in settings if not is_setting(text)], []
-    return decide(mission, Conditions(bag, fail, settings, go_on=given.on, rate=given.rate, out=out))
+    answers = None if bag is None else from_bag(bag)
+    return decide(mission, Conditions(answers, fail, settings, go_on=given.on, rate=given.rate, out=out))
 
 
 def tell(recorded: Recorded, result: Result, *, as_json: bool) -> None:
@@ -141,7 +143,7 @@ def hold(given: Arguments, checked: Sequence[Checked]) -> int:
 
 def perception_alone(given: Arguments, folder: Path) -> int:
     """Tell what the perception says of a bag that belongs to no mission: the transitions that it asks for; return the exit code."""
-    from alula.records.replay.functional_bag import read_calls  # late: it needs a reader of bags
+    from skillset_ros2.replay.bag import read_calls  # late: it needs a reader of bags
 
     if not given.run.is_file():
         raise ReplayError(f"{given.run}: there is no such bag")

@@ -143,7 +143,7 @@ class Supervisor:
         from roslaunch.parent import ROSLaunchParent
         from roslib.packages import find_resource
 
-        (launch_file,) = find_resource("uav_bringup", load_scenario(self._spec.scenario).launch)[:1]
+        (launch_file,) = find_resource(*load_scenario(self._spec.scenario).launch.split("/"))[:1]
         launch = ROSLaunchParent(
             "nodes",
             [(launch_file, self._spec.launch_arguments())],

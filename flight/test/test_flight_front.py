@@ -131,8 +131,8 @@ def test_mocks_need_no_ports_and_know_their_own_faults(tmp_path):
     assert spec.behaviour == (str(Path.cwd() / "gust.yaml"),)
     spec.save(tmp_path / "run.json")
     assert RunSpec.load(tmp_path / "run.json") == spec
-    words, own = command(spec, Path("/alula")), str(Path(os.environ["ALULA_ROOT"]) / "skillsets/uav/mock.yaml")
-    assert [words[n + 1] for n, word in enumerate(words) if word == "--behaviour"] == [own, *spec.behaviour]
+    words = command(spec, Path("/alula"))
+    assert [words[n + 1] for n, word in enumerate(words) if word == "--behaviour"] == [*spec.behaviour]
     assert words[words.index("--fail") + 1] == "pilot@20"
 
 

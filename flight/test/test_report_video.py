@@ -8,7 +8,7 @@ import pytest
 
 from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
-from alula.records.causes.fault_file import reaches_of
+from alula.records.causes.fault_file import reaches_of_robot
 from alula_flight.report.answers import find_answers
 from alula_flight.report.events import History
 from alula_flight.report.facts import RunFacts
@@ -46,7 +46,7 @@ def test_a_stream_that_no_criterion_ended_lost_no_radio():
 def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s, failed):
     killed = () if killed_s is None else (FaultChange("ground_station", "killed", killed_s),)
     scenario, recording, facts = load_scenario("inspection"), Recording(processes=killed), RunFacts("inspection", 0, Path(), (), (), None)
-    answers = find_answers(facts, scenario, History(), recording, Phases(), reaches_of(scenario.skillsets), radio_lost_s=112.5)
+    answers = find_answers(facts, scenario, History(), recording, Phases(), reaches_of_robot(), radio_lost_s=112.5)
     recovery = find_recovery(scenario, History(), recording, Phases(), answers)
     assert (recovery.failure_s, recovery.failed) == (failure_s, failed)
     (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery)["marks"]

@@ -19,7 +19,7 @@ def name(value: object) -> str:
     """Read an absolute ROS name."""
     if isinstance(value, str) and NAME.fullmatch(value):
         return value
-    raise ValueError("an absolute ROS name such as /uav_guidance/state")
+    raise ValueError("an absolute ROS name such as /camera/image")
 
 
 def type_name(value: object) -> str:

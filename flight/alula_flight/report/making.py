@@ -7,8 +7,9 @@ from pathlib import Path
 
 from alula.common.files import write_aside, write_json
 from alula.common.record import FILE as RECORD
+from alula.common.runs import INPUTS_FILE
 from alula.common.scenarios import Scenario, load_scenario
-from alula.records.causes.fault_file import reaches_of
+from alula.records.causes.fault_file import reaches_of_robot
 from alula.records.causes.reach import Reaches
 from alula_flight.report.answers import FaultAnswer, find_answers
 from alula_flight.report.events import History, read_history
@@ -107,7 +108,7 @@ def _account(facts: RunFacts, scenario: Scenario, problems: Problems) -> Account
             video = read_video(folder, history, phases, problems)
     reaches = Reaches()
     with problems.survive("what faults can bring about"):
-        reaches = reaches_of(scenario.skillsets)
+        reaches = reaches_of_robot()
     answers = find_answers(facts, scenario, history, recording, phases, reaches, radio_lost_s=radio_lost_s(video, phases))
     recovery = find_recovery(scenario, history, recording, phases, answers)
     return Account(history, recording, mock, phases, video, answers, recovery)
@@ -169,8 +170,8 @@ def _compare(folder: Path, account: Account, problems: Problems, *, mapped: bool
     if mapped:
         with problems.survive("map.ply"):
             points = load_map(folder / "map.ply")
-    with problems.survive("route.json"):
-        route = load_route(folder / "route.json")
+    with problems.survive(INPUTS_FILE):
+        route = load_route(folder / INPUTS_FILE)
     quality = MapQuality()
     with problems.survive("the map's quality"):
         quality = judge_map(points, route, world, problems)

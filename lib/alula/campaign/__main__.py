@@ -20,10 +20,10 @@ from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
 from alula.common.runs import runs_folder
-from alula.common.scenarios import load_scenario
-from alula.records.causes.fault_file import reaches_of
+from alula.common.scenarios import load_scenario, scenario_names
+from alula.records.causes.fault_file import reaches_of_robot
 from alula.records.errors import AnalysisError
-from uav_missions.mock_flight import drone
+from alula.records.models import robot_skillsets
 
 FLOWN, TROUBLE, CANNOT_START = 0, 1, 2
 SHOW_EVERY_S = 1.0
@@ -44,8 +44,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def check_faults(campaign: Campaign) -> None:
     """Refuse faults that the mocks of a scenario don't have, and a robot's file of faults that is wrong; raises AnalysisError."""
-    for name in campaign.scenarios:
-        reaches_of(load_scenario(name).skillsets)
+    reaches_of_robot()
     if campaign.over == MOCKS:
         scenarios = {name: load_flights(name, campaign.behaviour) for name in campaign.scenarios}
         for flight in campaign.flights:
@@ -74,7 +73,10 @@ class Teller:
 def finish(table: Table, out: Path, title: str) -> Coverage:
     """Order the table and write the coverage beside it."""
     table.finish()
-    coverage = cover([table.rows[number] for number in sorted(table.rows)], ways_to_fail(drone(), processes()))
+    coverage = cover(
+        [table.rows[number] for number in sorted(table.rows)],
+        ways_to_fail(robot_skillsets(), processes(map(load_scenario, scenario_names()))),
+    )
     write_json(out / "coverage.json", coverage.as_dict())
     write_text(out / "coverage.txt", as_text(coverage))
     write_text(out / "coverage.html", as_page(coverage, title))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
 from alula.campaign.failures import FAULT, KINDS, Way, name_of
 from alula.common.faults import parse_fault
+from alula.common.robots import find_robot
+from alula.common.scenarios import Scenario
 from alula.missions.director import EXIT_CODES
 
 Row = Mapping[str, Any]
@@ -102,8 +102,10 @@ def _count(one: Cover, row: Row, answer: str, after_s: float | None) -> None:
         one.worst_clearance_m = clearance_m if one.worst_clearance_m is None else min(clearance_m, one.worst_clearance_m)
 
 
-def processes(root: Path | None = None) -> list[str]:
-    """Return the names of the processes of a flight, as the launch files start them; the recorder is none of the robot's."""
-    folder = (root or Path(os.environ.get("ALULA_ROOT", "."))) / "ros1_ws" / "src" / "uav_bringup" / "launch"
-    nodes = (node.get("name", "") for file in sorted(folder.glob("*.launch")) for node in ET.parse(file).iter("node"))  # noqa: S314 - ours
+def processes(scenarios: Iterable[Scenario]) -> list[str]:
+    """Return the names of the processes of a run, as the launch files start them; the recorder is none of the robot's."""
+    packages = {scenario.launch.partition("/")[0] for scenario in scenarios if scenario.launch}
+    folders = [place / package / "launch" for place in find_robot().ros1.packages for package in sorted(packages)]
+    files = [file for folder in folders for file in sorted(folder.glob("*.launch"))]
+    nodes = (node.get("name", "") for file in files for node in ET.parse(file).iter("node"))  # noqa: S314 - the robot's own
     return sorted({name for name in nodes if name and name != "record" and "$" not in name})

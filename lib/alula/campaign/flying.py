@@ -15,8 +15,8 @@ from alula.campaign.failures import FAULT, PROCESS, Way, as_dict, failures_by, f
 from alula.campaign.mock_flights import MockFlights, load_flights
 from alula.campaign.plan import SIMULATOR, Flight
 from alula.common.record import RecordError, read_record
-from alula.common.scenarios import load_scenario
-from alula.records.causes.fault_file import reaches_of
+from alula.common.robots import find_robot
+from alula.records.causes.fault_file import reaches_of_robot
 from alula.records.causes.faults import Fault, faults_asked
 from alula.records.causes.reach import Reaches
 from alula.records.causes.told_ends import with_told_ends
@@ -55,20 +55,21 @@ def _mocked(flight: Flight, behaviour: tuple[str, ...]) -> Row:
 
 
 def _landed(events: Sequence[EngineEvent]) -> bool | None:
-    """Tell whether the vehicle came down; None where it never took off, or others have to land it.
+    """Tell whether the robot came back to its state of departure; None where it never left it, or others have to bring it back.
 
-    It is theirs when it was taken away from the mission in the air. One that is given back the mission lands, but for one that was taken
-    during its take-off: after that skill's `violation=reset` no skill is ready any more, and the front lands the vehicle.
+    It is theirs when it was taken from the mission while it was away.
     """
-    flight_status, taken = "", False
+    robot = find_robot()
+    resource, home = robot.departure or ("", "")
+    state, taken = "", False
     for event in events:
         if isinstance(event, TransitionEvent):
-            if event.resource == "flight_status":
-                flight_status = event.to_state
-            taken = taken or (event.resource == "SDK_authority" and event.to_state == "UNAVAILABLE" and flight_status == "IN_AIR")
-    if not flight_status:
+            if event.resource == resource:
+                state = event.to_state
+            taken = taken or (state not in {"", home} and (event.resource, event.to_state) == robot.taken)
+    if not state:
         return None
-    return flight_status == "ON_GROUND" or (None if taken else False)
+    return state == home or (None if taken else False)
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Mon
         monitor.take(event)
     events = left.events if left.known is None else left.known
     origin_s = origin_of(events)
-    reaches = _reaches(flight.scenario)
+    reaches = reaches_of_robot()
     asked = faults_asked(flight.requests, events, lift_off_of(events), reaches, first_s=left.first_s, behaviour=left.behaviour)
     begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
     died = [(Way(PROCESS, one["name"]), _ended(one, events, reaches)) for one in found["died"]]
@@ -120,11 +121,6 @@ def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], reaches: Reac
     begun_s = min((event.stamp_s for event in events), default=0.0)
     at_s = begun_s if died["when_s"] is None else origin_of(events) + died["when_s"]
     return Fault(died["name"], at_s, reach=reaches.of(died["name"]))
-
-
-@functools.cache
-def _reaches(scenario: str) -> Reaches:
-    return reaches_of(load_scenario(scenario).skillsets)
 
 
 # --- in the simulator ---------------------------------------------------------------------------------------------------

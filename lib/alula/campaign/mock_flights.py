@@ -1,26 +1,24 @@
-"""Flights of the drone over mocks, many in one process: what does not change between them is read once."""
+"""Runs of a scenario over mocks, many in one process: what does not change between them is read once."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula.common.faults import FaultError, FaultRequest
-from alula.common.robots import behaviour_files
+from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
 from alula.missions.director import End
 from alula.missions.mocked import MockedMission
+from alula.missions.plan import InputError, Inputs, MissionPlan, inputs_of, plan_of
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
+from alula.records.models import robot_skillsets
 from alula.records.tree import Places, tip_of
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent
 from alula.runtime.mock import Behaviour, load_behaviour
-from uav_missions.mock_flight import drone
-from uav_missions.plan import plan_of
-from uav_missions.route import Route, RouteError, load_route
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,11 @@ class MockFlights:
     scenario: Scenario
     skillsets: tuple[Skillset, ...]
     behaviour: Behaviour
-    waypoints: tuple[tuple[float, float, float], ...]
+    inputs: Inputs
+
+    def plan(self) -> MissionPlan:
+        """Make the mission; raises RobotError and InputError."""
+        return plan_of(self.scenario, self.inputs)
 
     def check(self, faults: Sequence[FaultRequest]) -> None:
         """Refuse faults that the mocks don't have.
@@ -60,25 +62,22 @@ class MockFlights:
 
     def fly(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> Flown:
         """Fly once."""
-        plan = plan_of(self.scenario, Route(list(self.waypoints)))
-        mission = MockedMission(self.skillsets, self.behaviour, plan, faults=faults, seed=seed)
+        mission = MockedMission(self.skillsets, self.behaviour, self.plan(), faults=faults, seed=seed)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
         return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)
 
 
-def load_flights(name: str, behaviour: Sequence[Path] = ()) -> MockFlights:
-    """Read what flights of a scenario need: the drone's own mocks, with behaviour files on top of them.
+def load_flights(name: str, behaviour: Sequence[Path] = (), *, world: str = "") -> MockFlights:
+    """Read what runs of a scenario over mocks need: the robot's own mocks, with behaviour files on top of them.
 
     Raises:
         AnalysisError: a file is missing or wrong, with its place.
     """
-    root = Path(os.environ.get("ALULA_ROOT", "."))
     try:
-        scenario = load_scenario(name)
-        route = load_route(root / "ros1_ws" / "src" / "uav_simulator" / "worlds" / f"{scenario.world}.yaml")
-        files = [*behaviour_files(scenario.skillsets), *behaviour]
-        known = load_behaviour(files, drone()).of(frozenset(scenario.skillsets))
-    except (ScenarioError, RouteError, SkillRuntimeError) as error:
+        scenario, robot = load_scenario(name), find_robot()
+        inputs = inputs_of(scenario, world)
+        known = load_behaviour([*robot.behaviour_files, *behaviour], robot_skillsets()).of(frozenset(scenario.skillsets))
+    except (ScenarioError, RobotError, InputError, SkillRuntimeError) as error:
         raise AnalysisError(str(error)) from None
-    return MockFlights(scenario, tuple(drone(scenario.skillsets)), known, tuple(route.waypoints))
+    return MockFlights(scenario, tuple(robot_skillsets(scenario.skillsets)), known, inputs)

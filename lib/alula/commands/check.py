@@ -30,6 +30,10 @@ exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of synt
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the files named on the command line; return the exit code."""
     options = _parser().parse_args(arguments)
+    if options.play is not None:
+        from alula.commands import play  # it takes the counterexamples from here
+
+        return play.main(arguments)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
     files = check_files(list(paths), sys.stdin.buffer)
     if options.proofs and options.to is None:

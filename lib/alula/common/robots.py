@@ -1,44 +1,220 @@
-"""The robots of this checkout: a folder of ``skillsets`` each, with the models of its skillsets and what goes with them."""
+"""The robot that commands are about: what its ``robot.yaml`` says it consists of.
+
+A robot is a folder of its own, anywhere. It is found from the current folder upwards, or named by ``--robot DIR``, which the entry
+script passes on in ``ALULA_ROBOT``. The drone of this repository is one.
+"""
 
 from __future__ import annotations
 
+import functools
+import importlib
 import os
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-MODELS = ("*.skill", "*.rl")
+from alula.common.located_yaml import Located, choices, read_yaml
+
+FILE = "robot.yaml"
+VARIABLE = "ALULA_ROBOT"
 BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
-_SKILLSET = re.compile(r"^\s*skillset\s+(\w+)", re.MULTILINE)
+"""Files beside the models: what mocks do, and what faults bring about."""
+PARTS = ("inputs", "hooks", "run", "report", "replay")
+"""What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
+WORLD_KEYS = ("packages", "python", "debian", "underlays")
+KEYS = ("name", "about", "skillsets", "scenarios", "worlds", "departure", "taken", "python", "parts", "ros1", "ros2")
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+class RobotError(Exception):
+    """There is no robot, or its file is wrong; the message says where and what to do."""
+
+
+@dataclass(frozen=True)
+class RosPart:
+    """What a robot has in one ROS world.
+
+    Attributes:
+        packages: folders of packages that are built on top of Alula's.
+        python: a file of pinned Python packages, None where no others are needed.
+        debian: Debian packages.
+        underlays: workspaces or prefixes that are sourced below, such as ``/opt/ros/jazzy``.
+    """
+
+    packages: tuple[Path, ...] = ()
+    python: Path | None = None
+    debian: tuple[str, ...] = ()
+    underlays: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
 class RobotFolder:
-    """A robot's folder, and the names of its skillsets."""
+    """A robot.
 
-    path: Path
-    skillsets: tuple[str, ...]
+    Attributes:
+        root: its folder.
+        skillsets: the folder of its models, with ``types.yaml``, ``bindings.yaml``, ``mock.yaml`` and ``faults.yaml``.
+        scenarios: the folder of its scenarios; ``worlds`` that of the files which scenarios name as their ``world``.
+        departure: resource and state; times of a run count from when this state is left first, and a run that ends in it has come back.
+        taken: resource and state; a robot that enters this state while it is away is not the mission's to bring back.
+        python: folders of plain Python packages, which missions and the parts import.
+        parts: what it adds to the general commands.
+    """
+
+    root: Path
+    name: str
+    skillsets: Path
+    scenarios: Path
+    worlds: Path
+    about: str = ""
+    departure: tuple[str, str] | None = None
+    taken: tuple[str, str] | None = None
+    python: tuple[Path, ...] = ()
+    parts: Mapping[str, str] = field(default_factory=dict)
+    ros1: RosPart = RosPart()
+    ros2: RosPart = RosPart()
+
+    @property
+    def runs(self) -> Path:
+        """Return the folder that runs are put into when nothing else is asked for."""
+        return self.root / "runs"
 
     def file(self, name: str) -> Path | None:
         """Return a file that goes with the models; None where the robot has none."""
-        path = self.path / name
+        path = self.skillsets / name
         return path if path.is_file() else None
 
+    @property
+    def behaviour_files(self) -> list[Path]:
+        """Return the file that says what its mocks do, none where it has none."""
+        file = self.file(BEHAVIOUR)
+        return [] if file is None else [file]
 
-def robot_of(skillsets: Iterable[str], folder: Path | None = None) -> RobotFolder | None:
-    """Return the robot that has one of these skillsets, None where none of this checkout has; ``folder``: that of all robots."""
-    wanted = set(skillsets)
-    for path in sorted((folder or Path(os.environ.get("ALULA_ROOT", ".")) / "skillsets").glob("*/")):
-        texts = [file.read_text(encoding="utf-8", errors="replace") for pattern in MODELS for file in sorted(path.glob(pattern))]
-        found = tuple(name for text in texts for name in _SKILLSET.findall(text))
-        if wanted & set(found):
-            return RobotFolder(path, found)
-    return None
+    def world(self, name: str) -> Path:
+        """Return the file of a world, by its name or as a path."""
+        return self.worlds / f"{name}.yaml" if name and name.isidentifier() else Path(name).expanduser()
+
+    def part(self, name: str) -> Any:
+        """Return what the robot adds to a general command; None where it adds nothing.
+
+        Raises:
+            RobotError: what its file names does not exist.
+        """
+        return self.load(self.parts[name]) if name in self.parts else None
+
+    def import_path(self) -> None:
+        """Have the robot's own packages found by imports."""
+        for folder in map(str, self.python):
+            if folder not in sys.path:
+                sys.path.append(folder)
+
+    def load(self, text: str) -> Any:
+        """Return a module, or what ``module:name`` is; raises RobotError."""
+        self.import_path()
+        module, _, attribute = text.partition(":")
+        try:
+            loaded = importlib.import_module(module)
+            return getattr(loaded, attribute) if attribute else loaded
+        except (ImportError, AttributeError) as error:
+            raise RobotError(f"{self.root / FILE}: {text} can't be imported: {error}") from error
 
 
-def behaviour_files(skillsets: Iterable[str]) -> list[Path]:
-    """Return the file that says what the mocks of these skillsets' robot do, none where it has none."""
-    robot = robot_of(skillsets)
-    file = None if robot is None else robot.file(BEHAVIOUR)
-    return [] if file is None else [file]
+def find_robot(start: Path | None = None) -> RobotFolder:
+    """Return the robot that was named, or the one of the current folder (``start``) or a folder above it.
+
+    Raises:
+        RobotError: there is none, or its file is wrong.
+    """
+    named = os.environ.get(VARIABLE)
+    if named and start is None:
+        return load_robot_folder(Path(named).resolve())
+    here = (start or Path.cwd()).resolve()
+    for folder in (here, *here.parents):
+        if (folder / FILE).is_file():
+            return load_robot_folder(folder)
+    raise RobotError(f"there is no {FILE} in {here} or above; name the robot's folder with --robot DIR, or make one: alula new robot DIR")
+
+
+def load_robot_folder(root: Path) -> RobotFolder:
+    """Read a robot's file; raises RobotError."""
+    path = root / FILE
+    try:
+        written_ns = path.stat().st_mtime_ns
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror}; name the robot's folder with --robot DIR, or make one: alula new robot DIR") from None
+    return _load(root, written_ns)
+
+
+@functools.lru_cache(maxsize=16)
+def _load(root: Path, _written_ns: int) -> RobotFolder:
+    document = read_yaml(root / FILE, RobotError)
+    if document is None:
+        raise RobotError(f"{root / FILE}: is empty; a robot needs a name")
+    said = document.record("a robot", KEYS)
+    if "name" not in said:
+        raise document.wrong("a robot needs `name`")
+    name = said["name"].text("`name`")
+    if _NAME.fullmatch(name) is None:
+        raise said["name"].wrong(f"`{name}`: a robot's name is made of a-z, 0-9 and _, and begins with a letter")
+    folder: Callable[[str, str], Path] = lambda key, default: root / (said[key].text(f"`{key}`") if key in said else default)  # noqa: E731
+    return RobotFolder(
+        root=root,
+        name=name,
+        about=said["about"].text("`about`") if "about" in said else "",
+        skillsets=_existing(said, "skillsets", folder("skillsets", "skillsets")),
+        scenarios=folder("scenarios", "scenarios"),
+        worlds=folder("worlds", "worlds"),
+        departure=_state(said, "departure"),
+        taken=_state(said, "taken"),
+        python=tuple(root / one for one in _texts(said.get("python"), "`python`")),
+        parts=_parts(said.get("parts")),
+        ros1=_ros_part(root, said.get("ros1"), "ros1_ws/src"),
+        ros2=_ros_part(root, said.get("ros2"), "ros2_ws/src"),
+    )
+
+
+def _existing(said: Mapping[str, Located], key: str, path: Path) -> Path:
+    if key in said and not path.is_dir():
+        raise said[key].wrong(f"`{key}`: {path} is no folder")
+    return path
+
+
+def _texts(part: Located | None, what: str) -> tuple[str, ...]:
+    return () if part is None else tuple(one.text(f"an entry of {what}") for one in part.elements())
+
+
+def _state(said: Mapping[str, Located], key: str) -> tuple[str, str] | None:
+    """Return resource and state, which stand as ``skillset.resource STATE``."""
+    if key not in said:
+        return None
+    place, _, state = said[key].text(f"`{key}`").partition(" ")
+    resource = place.rpartition(".")[2]
+    if not resource or not state.isidentifier():
+        raise said[key].wrong(f"`{key}` should be skillset.resource STATE, such as base.base_status DOCKED")
+    return resource, state
+
+
+def _parts(part: Located | None) -> dict[str, str]:
+    return {} if part is None else {name: one.text(f"`{name}`") for name, one in part.record("`parts`", PARTS).items()}
+
+
+def _ros_part(root: Path, part: Located | None, default: str) -> RosPart:
+    said = {} if part is None else part.record("what a robot has in a ROS world", WORLD_KEYS)
+    packages = _texts(said["packages"], "`packages`") if "packages" in said else (default,)
+    python = root / said["python"].text("`python`") if "python" in said else None
+    if python is not None and not python.is_file():
+        raise said["python"].wrong(f"`python`: there is no file {python}")
+    underlays = tuple((root / Path(one).expanduser()) for one in _texts(said.get("underlays"), "`underlays`"))
+    for underlay in underlays:
+        if not underlay.is_dir():
+            raise said["underlays"].wrong(f"`underlays`: {underlay} is no folder")
+    return RosPart(tuple(root / one for one in packages), python, _texts(said.get("debian"), "`debian`"), underlays)
+
+
+def wrong_world(robot: RobotFolder, name: str) -> str:
+    """Return what to say of a world that is not there."""
+    known = sorted(path.stem for path in robot.worlds.glob("*.yaml"))
+    return f"there is no world {name}; there are {choices(name, known)}, or give a file"

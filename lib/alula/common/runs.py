@@ -1,16 +1,18 @@
-"""The runs of this checkout that are under way, and where their ROS 2 side can be talked to."""
+"""The runs of a robot that are under way, and where their ROS 2 side can be talked to."""
 
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from alula.common.network import is_claimed
 from alula.common.processes import processes_of_run
+from alula.common.robots import RobotError, find_robot
 
 LATEST = "latest"
+INPUTS_FILE = "inputs.json"
+"""The inputs of a run's mission, in its folder."""
 
 
 class NoRunError(Exception):
@@ -32,8 +34,11 @@ class Run:
 
 
 def runs_folder() -> Path:
-    """Return the folder that runs are put into when nothing else is asked for."""
-    return Path(os.environ.get("ALULA_ROOT", ".")) / "runs"
+    """Return the folder that runs are put into when nothing else is asked for: the robot's, or ``runs`` here where there is no robot."""
+    try:
+        return find_robot().runs
+    except RobotError:
+        return Path("runs")
 
 
 def load_run(folder: Path) -> Run:

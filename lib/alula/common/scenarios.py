@@ -1,17 +1,16 @@
-"""The scenarios that can be flown: ``scenarios/NAME.yaml`` says of each everything that it is made of (docs/scenarios.md)."""
+"""The scenarios of a robot: ``scenarios/NAME.yaml`` says of each everything that it is made of (docs/scenarios.md)."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from alula.common.located_yaml import Located, choices, read_yaml
+from alula.common.located_yaml import Located, read_yaml
+from alula.common.robots import RobotError, find_robot
 from alula.common.suggestions import nearest
 
+NEEDED = ("about", "mission", "skillsets")
 KEYS = ("about", "world", "mission", "skillsets", "launch", "report", "faults", "processes", "fallback", "motion")
-PARTS = ("map", "video")
-"""What a report can have besides what every flight has."""
 
 
 class ScenarioError(Exception):
@@ -25,12 +24,12 @@ class Scenario:
     Attributes:
         name: as on the command line.
         about: in a sentence.
-        world: name or file of the world that is flown in unless another is asked for; its route is the mission's.
-        mission: ``module:function`` of the ROS 2 world that makes the plan (tree and skillsets) of a route.
+        world: name or file of the robot's worlds, unless another is asked for; the mission's inputs come from it.
+        mission: ``module:function`` that makes the plan (tree and skillsets) of the mission's inputs.
         skillsets: the skillsets whose managers are started.
-        launch: launch file of uav_bringup.
-        report: parts of the report.
-        faults: what can fail besides the sensors, each with the ways in which it can.
+        launch: ``package/file`` for roslaunch.
+        report: parts of the report, of those that the robot has.
+        faults: what can fail besides what the robot's own options say, each with the ways in which it can.
         processes: which of those faults are of a process, and its node in the launch file.
         fallback: the skill whose running means that the vehicle is safe again after a failure.
         motion: the skills that take it on then.
@@ -38,10 +37,10 @@ class Scenario:
 
     name: str
     about: str
-    world: str
     mission: str
     skillsets: tuple[str, ...]
-    launch: str
+    world: str = ""
+    launch: str = ""
     report: tuple[str, ...] = ()
     faults: tuple[tuple[str, tuple[str, ...]], ...] = ()
     processes: tuple[tuple[str, str], ...] = ()
@@ -50,12 +49,15 @@ class Scenario:
 
 
 def scenarios_folder() -> Path:
-    """Return the folder of this checkout's scenarios."""
-    return Path(os.environ.get("ALULA_ROOT", ".")) / "scenarios"
+    """Return the folder of the robot's scenarios; raises ScenarioError where there is no robot."""
+    try:
+        return find_robot().scenarios
+    except RobotError as error:
+        raise ScenarioError(str(error)) from None
 
 
 def scenario_names(folder: Path | None = None) -> list[str]:
-    """Return what can be flown."""
+    """Return what can be run."""
     return sorted(path.stem for path in (folder or scenarios_folder()).glob("*.yaml"))
 
 
@@ -67,18 +69,15 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
     path = (folder or scenarios_folder()) / f"{name}.yaml"
     document = read_yaml(path, ScenarioError)
     if document is None:
-        raise ScenarioError(f"{path}: is empty; a scenario needs about, world, mission, skillsets and launch")
+        raise ScenarioError(f"{path}: is empty; a scenario needs {', '.join(NEEDED)}")
     said = document.record("a scenario", KEYS)
-    for key in ("about", "world", "mission", "skillsets", "launch"):
+    for key in NEEDED:
         if key not in said:
             raise document.wrong(f"a scenario needs `{key}`")
     mission = said["mission"].text("`mission`")
     if mission.count(":") != 1:
         raise said["mission"].wrong(f"`mission` should be module:function, not {mission}")
     report = _words(said, "report")
-    for part in report:
-        if part not in PARTS:
-            raise said["report"].wrong(f"there is no part `{part}` of a report; there are {choices(part, PARTS)}")
     faults = said["faults"].entries("`faults`") if "faults" in said else {}
     processes = said["processes"].entries("`processes`") if "processes" in said else {}
     for what, node in processes.items():
@@ -87,16 +86,25 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
     return Scenario(
         name=name,
         about=said["about"].text("`about`"),
-        world=said["world"].text("`world`"),
+        world=said["world"].text("`world`") if "world" in said else "",
         mission=mission,
         skillsets=_words(said, "skillsets"),
-        launch=said["launch"].text("`launch`"),
+        launch=_launch(said.get("launch")),
         report=report,
         faults=tuple((what, tuple(way.text("a way to fail") for way in ways.elements())) for what, ways in faults.items()),
         processes=tuple((what, node.text("the node of a process")) for what, node in processes.items()),
         fallback=said["fallback"].text("`fallback`") if "fallback" in said else "",
         motion=_words(said, "motion"),
     )
+
+
+def _launch(part: Located | None) -> str:
+    if part is None:
+        return ""
+    text = part.text("`launch`")
+    if text.count("/") != 1:
+        raise part.wrong(f"`launch` should be package/file.launch, not {text}")
+    return text
 
 
 def _words(said: dict[str, Located], key: str) -> tuple[str, ...]:

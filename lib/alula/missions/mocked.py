@@ -101,7 +101,7 @@ class MockedMission:
 
     @property
     def departure_s(self) -> float | None:
-        """When the plan's state of departure was left first, seconds of mission clock; None also without a record."""
+        """When the robot's state of departure was left first, seconds of mission clock; None also without a record."""
         return None if self._record is None else self._record.departure_s
 
     @property

@@ -1,4 +1,4 @@
-"""What a runner has to know of a mission to run it, over whatever middleware."""
+"""What a runner has to know of a mission to run it, over whatever middleware; a scenario's plan and inputs."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from alula.common.robots import find_robot, wrong_world
+from alula.common.scenarios import Scenario
 from alula.missions.blackboard import Blackboard
 from alula.missions.director import Mission
 from alula.missions.skillset import Client, Clock
+
+Inputs = Mapping[str, Any]
+"""What a mission is given, such as a route, by name; as JSON has it, because records keep it."""
 
 MakeMission = Callable[[Mapping[str, Client], Clock, Mapping[str, float]], tuple[Mission, Blackboard]]
 """Makes the mission and its blackboard of the clients by skillset, the mission clock, and the parameters by name."""
@@ -32,7 +37,7 @@ class MissionPlan:
         skillsets: what it calls.
         make: makes the tree.
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
-        departure: resource and state; the run's files count time from when this state is left first.
+        inputs: what it was made of.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
         listen: on ROS 2, has the node listen to what says why a resource is as it is (``Blackboard.remarks``).
     """
@@ -41,6 +46,40 @@ class MissionPlan:
     skillsets: tuple[str, ...]
     make: MakeMission
     parameters: Mapping[str, float] = field(default_factory=dict)
-    departure: tuple[str, str] | None = None
+    inputs: Inputs = field(default_factory=dict)
     facts: Callable[[], Mapping[str, object]] = nothing_more
     listen: Callable[[Any, Blackboard], None] = hear_nothing
+
+
+class InputError(Exception):
+    """The inputs of a mission can't be used; the message says what is wrong and where."""
+
+
+MakePlan = Callable[[Inputs], MissionPlan]
+"""What ``mission: module:function`` of a scenario names; it raises InputError."""
+
+
+def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
+    """Return a scenario's plan for these inputs; raises RobotError where its mission can't be imported, and InputError."""
+    make_plan: MakePlan = find_robot().load(scenario.mission)
+    return make_plan(inputs)
+
+
+def inputs_of(scenario: Scenario, world: str = "") -> Inputs:
+    """Return a mission's inputs from a world (name or file), that of the scenario unless another is given.
+
+    The robot's part ``inputs`` reads them from the world's file; a robot without that part has none.
+
+    Raises:
+        RobotError, InputError: there is no such world, or it can't be used.
+    """
+    robot = find_robot()
+    read = robot.part("inputs")
+    name = world or scenario.world
+    if read is None or not name:
+        return {}
+    path = robot.world(name)
+    if not path.is_file():
+        raise InputError(wrong_world(robot, name))
+    inputs: Inputs = read(path)
+    return inputs

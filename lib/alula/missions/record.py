@@ -7,6 +7,8 @@ from pathlib import Path
 
 from alula.common.files import write_json, write_text
 from alula.common.record import BLACKBOARD, DATA, DECISIONS, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, RecordWriter
+from alula.common.robots import RobotError, find_robot
+from alula.common.runs import INPUTS_FILE
 from alula.missions.director import Director, End, Outcome
 from alula.missions.drawing import draw
 from alula.missions.plan import MissionPlan
@@ -28,6 +30,7 @@ class MissionRecord:
         self._plan = plan
         self._clock_ns = clock_ns
         self._parameters = dict(parameters)
+        self._departure = _departure()
         self._departure_s: float | None = None
         self._unended: set[str] = set()
         self._decisions = 0
@@ -36,6 +39,7 @@ class MissionRecord:
         self._writer = RecordWriter(out / FILE)
         # So that a mission that is killed leaves one that says `running`.
         self._write_mission(End(Outcome.RUNNING), None, None)
+        self._write_inputs()
 
     @property
     def unended(self) -> bool:
@@ -44,7 +48,7 @@ class MissionRecord:
 
     @property
     def departure_s(self) -> float | None:
-        """When the plan's state of departure was left first, seconds of mission clock."""
+        """When the robot's state of departure was left first, seconds of mission clock."""
         return self._departure_s
 
     # --- what the mission comes to know ------------------------------------------------------------------------------
@@ -54,7 +58,7 @@ class MissionRecord:
         self._writer.write(EVENTS, event.stamp_ns, event_record(event))
         if isinstance(event, ExecutionEvent):
             (self._unended.discard if event.state.terminal else self._unended.add)(event.id)
-        elif self._departure_s is None and self._plan.departure == (event.resource, event.from_state):
+        elif self._departure_s is None and self._departure == (event.resource, event.from_state):
             self._departure_s = event.stamp_s
 
     def report(self, skillset: str, handle: SkillHandle) -> None:
@@ -123,6 +127,12 @@ class MissionRecord:
     def _write(self, topic: str, content: Mapping[str, object]) -> None:
         self._writer.write(topic, self._clock_ns(), content)
 
+    def _write_inputs(self) -> None:
+        try:
+            write_json(self._out / INPUTS_FILE, self._plan.inputs)
+        except OSError as error:
+            self.problems.append(f"{INPUTS_FILE} could not be written: {error.strerror or error}")
+
     def _write_mission(self, end: End, start_s: float | None, end_s: float | None) -> None:
         if self._writer.error and self._writer.error not in self.problems:
             self.problems.append(self._writer.error)
@@ -134,6 +144,7 @@ class MissionRecord:
             "lift_off_s": self._departure_s,
             "end_s": end_s,
             "parameters": self._parameters,
+            "inputs": self._plan.inputs,
             "problems": self.problems,
             **self._plan.facts(),
         }
@@ -142,3 +153,10 @@ class MissionRecord:
             write_json(self._out / "mission.json", content)
         except OSError as error:
             self.problems.append(f"mission.json could not be written: {error.strerror or error}")
+
+
+def _departure() -> tuple[str, str] | None:
+    try:
+        return find_robot().departure
+    except RobotError:
+        return None

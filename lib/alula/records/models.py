@@ -1,20 +1,47 @@
-"""The models that a log is about: those that the managers execute, or others from files."""
+"""The models that a log is about: those of the robot, or others from files."""
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
-from collections.abc import Iterable, Sequence
+import functools
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from alula.common.robots import RobotError, RobotFolder, find_robot
 from alula.language.errors import LanguageError
-from alula.language.load import load_skillset
+from alula.language.load import load_robot, load_skillset
+from alula.language.robot import Robot
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
 
 
+def robot_model(folder: RobotFolder) -> Robot:
+    """Return a robot's skillsets with their types and bindings; raises AnalysisError where its models have errors."""
+    try:
+        return _loaded(folder.skillsets, tuple(path.stat().st_mtime_ns for path in sorted(folder.skillsets.glob("*"))))
+    except (LanguageError, OSError) as error:
+        raise AnalysisError(str(error)) from None
+
+
+@functools.lru_cache(maxsize=8)
+def _loaded(folder: Path, _written_ns: tuple[int, ...]) -> Robot:
+    return load_robot(folder)
+
+
+def robot_skillsets(names: Iterable[str] | None = None) -> list[Skillset]:
+    """Return models of the robot's skillsets, all of them where none are named.
+
+    Raises:
+        AnalysisError: there is no robot, it has no such skillset, or its models have errors.
+    """
+    try:
+        own = {skillset.name: skillset for skillset in robot_model(find_robot()).skillsets}
+    except RobotError as error:
+        raise AnalysisError(str(error)) from None
+    return list(own.values()) if names is None else [_known(own, name) for name in names]
+
+
 def models_of(names: Iterable[str], files: Sequence[Path] = ()) -> list[Skillset]:
-    """Return a model for each skillset: that of a file, else the one that its generated managers execute.
+    """Return a model for each skillset: that of a file, else the robot's.
 
     Raises:
         AnalysisError: a file has errors, or there is no model of a skillset.
@@ -26,12 +53,10 @@ def models_of(names: Iterable[str], files: Sequence[Path] = ()) -> list[Skillset
         except LanguageError as error:
             raise AnalysisError(str(error)) from None
         given[skillset.name] = skillset
-    return [given[name] if name in given else _generated(name) for name in names]
+    return [given[name] if name in given else robot_skillsets([name])[0] for name in names]
 
 
-def _generated(name: str) -> Skillset:
-    module = f"{name}_managers.model"
-    if not name.isidentifier() or importlib.util.find_spec(module.partition(".")[0]) is None:
-        raise AnalysisError(f"there is no model of skillset {name!r} in this checkout; give its file with --model")
-    skillset: Skillset = importlib.import_module(module).SKILLSET
-    return skillset
+def _known(own: Mapping[str, Skillset], name: str) -> Skillset:
+    if name not in own:
+        raise AnalysisError(f"there is no model of skillset {name!r} in this robot; give its file with --model")
+    return own[name]

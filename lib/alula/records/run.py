@@ -9,12 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from alula.common.record import FILE, MISSION, RecordError, read_record
+from alula.common.robots import RobotError, find_robot
 from alula.records.errors import AnalysisError
 from alula.records.logs import read_log
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 
-DEPARTURE = ("flight_status", "ON_GROUND")
-"""Times of a run count from when this resource leaves this state first: lift-off."""
+
+def departure() -> tuple[str, str] | None:
+    """Return resource and state of the robot's ``departure``: times of a run count from when this state is left first."""
+    try:
+        return find_robot().departure
+    except RobotError:
+        return None
 
 
 @dataclass(frozen=True)
@@ -41,11 +47,10 @@ class Run:
 
 
 def lift_off_of(events: Sequence[EngineEvent]) -> float | None:
-    """Return when the vehicle left the ground first, seconds of mission clock; None: never."""
-    for event in events:
-        if isinstance(event, TransitionEvent) and (event.resource, event.from_state) == DEPARTURE:
-            return event.stamp_s
-    return None
+    """Return when the robot departed first, seconds of mission clock; None: never."""
+    place = departure()
+    left = (one for one in events if isinstance(one, TransitionEvent) and (one.resource, one.from_state) == place)
+    return next((event.stamp_s for event in left), None)
 
 
 def origin_of(events: Sequence[EngineEvent]) -> float:

@@ -16,7 +16,8 @@ from alula.common.runs import NoRunError, find_run, live_runs, load_run
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
+    (tmp_path / "robot.yaml").write_text("name: rover\n")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
     (tmp_path / "runs").mkdir()
     return tmp_path / "runs"
 

@@ -7,15 +7,13 @@ from pathlib import Path
 from alula.campaign.mock_flights import load_flights
 from alula.campaign.plan import Flight
 from alula.missions.mocked import MockedMission
-from uav_missions.plan import plan_of
-from uav_missions.route import Route
 
 
 def fly_recorded(out: Path, *faults: str, kill: tuple[str, float] | None = None) -> MockedMission:
     """Map the yard over mocks; ``out`` is the run's folder, which is there; ``kill``: the managers of which skillset die when."""
     flights = load_flights("mapping")
-    plan, requests = plan_of(flights.scenario, Route(list(flights.waypoints))), Flight(0, "mapping", 0, faults).requests
-    mission = MockedMission(flights.skillsets, flights.behaviour, plan, faults=requests, out=out)
+    requests = Flight(0, "mapping", 0, faults).requests
+    mission = MockedMission(flights.skillsets, flights.behaviour, flights.plan(), faults=requests, out=out)
     if kill is not None:
         mission.world.clock.after(kill[1], lambda: mission.world.kill(kill[0]))
     mission.run()

@@ -22,9 +22,10 @@ from alula.campaign.plan import MOCKS, Flight, load_campaign
 from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.record import read_record
+from alula.common.scenarios import load_scenario, scenario_names
 from alula.records.errors import AnalysisError
+from alula.records.models import robot_skillsets
 from alula.records.tree import Places, places_in, tip_of
-from uav_missions.mock_flight import drone
 
 DRAWN = """
 scenarios: [mapping, inspection]
@@ -149,14 +150,14 @@ def test_a_wrong_campaign_is_refused_before_it_begins(text, tmp_path, capsys):
 
 
 def test_the_ways_to_fail_are_those_of_the_models():
-    names = {(way.kind, way.name) for way in ways_to_fail(drone(), ["mission"])}
+    names = {(way.kind, way.name) for way in ways_to_fail(robot_skillsets(), ["mission"])}
     assert (RESULT, "navigation.goto BLOCKED") in names
     assert (RESULT, "navigation.goto ARRIVED") not in names
     assert (INVARIANT, "perception.zed_depthmap zed_ok") in names
     assert (ARROW, "perception.zed_status OK -> BROKEN") in names
     assert (ARROW, "perception.zed_status BROKEN -> OK") not in names
     assert (PROCESS, "mission") in names
-    assert {"mission", "navigation", "ros_bridge", "uav_guidance"} <= set(processes())
+    assert {"mission", "navigation", "ros_bridge", "uav_guidance"} <= set(processes([load_scenario(name) for name in scenario_names()]))
 
 
 def failures_of(scenario, *faults):

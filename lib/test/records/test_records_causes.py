@@ -12,14 +12,14 @@ from alula.common.faults import parse_fault
 from alula.common.record import REPORTS, Entry
 from alula.model.execution_state import ExecutionState as S
 from alula.records.causes.answers import answer_to_fault
-from alula.records.causes.fault_file import reaches_of
+from alula.records.causes.fault_file import reaches_of_robot
 from alula.records.causes.faults import Fault, faults_asked, trace
 from alula.records.causes.reach import Reaches
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.tree import Places
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 
-DRONE = reaches_of(["navigation"])
+DRONE = reaches_of_robot()
 VIOLATED, TERMINATED, NOT_READY = S.RESOURCE_INVARIANT_VIOLATED, S.TERMINATED, S.NOT_READY
 
 
@@ -149,8 +149,10 @@ def test_the_end_of_an_execution_whose_managers_have_gone_is_what_the_mission_wa
     assert (traced.detected_s, [one.end for one in traced.failures]) == (30.0, [told])
 
 
-def test_a_robot_without_a_file_has_the_rule_by_names():
-    assert reaches_of(["somewhere_else"]) == Reaches()
+def test_a_robot_without_a_file_has_the_rule_by_names(monkeypatch, tmp_path):
+    (tmp_path / "robot.yaml").write_text("name: rover\n")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    assert reaches_of_robot() == Reaches()
     assert Reaches().of("zed").states == {"*.zed_status *"}
 
 

@@ -10,9 +10,8 @@ import pytest
 
 from alula.campaign.coverage import processes
 from alula.campaign.mock_flights import load_flights
-from alula.common.robots import robot_of
 from alula.common.scenarios import load_scenario, scenario_names
-from alula.records.causes.fault_file import load_reaches, reaches_of
+from alula.records.causes.fault_file import load_reaches, reaches_of_robot
 from alula.records.causes.reach import Reach
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
@@ -75,10 +74,9 @@ def test_what_is_wrong_is_told_with_file_and_line(text, line, complaint, tmp_pat
 
 
 def test_the_drones_file_is_right_and_names_what_there_is():
-    known = reaches_of(["video"]).known
-    assert robot_of(["video"]).path == ALULA_ROOT / "skillsets" / "uav"
+    known = reaches_of_robot().known
     scenarios = [load_scenario(name) for name in scenario_names()]
     faults = {what for scenario in scenarios for what, _ in scenario.faults}
     faults |= {name.partition(":")[0] for scenario in scenarios for name in load_flights(scenario.name).behaviour.faults}
-    assert known.keys() - faults - set(processes()) == {"master"}
+    assert known.keys() - faults - set(processes(scenarios)) == {"master"}
     assert faults <= known.keys()

@@ -152,7 +152,7 @@ UNREADABLE = {
         lambda path: path.write_text(
             '{"kind": "TRANSITION", "stamp_s": 0, "skillset": "os; x", "resource": "r", "from_state": "", "to_state": ""}\n'
         ),
-        "there is no model of skillset 'os; x' in this checkout; give its file with --model",
+        "there is no model of skillset 'os; x' in this robot; give its file with --model",
     ),
 }
 

@@ -34,8 +34,6 @@ def recorded_flights(tmp_path, monkeypatch):
     (tmp_path / "summary.json").write_text(SUMMARY, encoding="utf-8")
     (tmp_path / "recorded").mkdir()
     fly_recorded(tmp_path / "recorded", "zed@6")
-    for folder in ("scenarios", "skillsets", "ros1_ws"):
-        (tmp_path / folder).symlink_to(ALULA_ROOT / folder)
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
     monkeypatch.setenv("RECORDING", str(tmp_path / "recorded"))
     return tmp_path

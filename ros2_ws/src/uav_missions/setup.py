@@ -14,5 +14,4 @@ setup(
     maintainer_email="alula@alula-robotics.org",
     description="Missions of the drone as Behaviour Trees whose leaves are skills",
     license="Apache-2.0",
-    entry_points={"console_scripts": ["mission = uav_missions.runner:main"]},
 )

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 from alula.common.located_yaml import Located, choices, read_yaml
-from alula.common.robots import FAULTS, robot_of
+from alula.common.robots import FAULTS, RobotError, find_robot
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Skill, Skillset
 from alula.records.causes.reach import Reach, Reaches
 from alula.records.errors import AnalysisError
-from alula.records.models import models_of
+from alula.records.models import robot_skillsets
 
 SECTIONS = ("faults", "processes")
 PARTS = ("states", "later", "ends")
@@ -24,15 +24,17 @@ Members = Mapping[str, Collection[str]]
 """By ``skillset.resource`` its states; by ``skillset.skill`` how it can end."""
 
 
-def reaches_of(skillsets: Iterable[str]) -> Reaches:
-    """Return what is known of the robot that has these skillsets; of a robot without ``faults.yaml`` nothing is.
+def reaches_of_robot() -> Reaches:
+    """Return what is known of the robot; of one without ``faults.yaml`` nothing is.
 
     Raises:
         AnalysisError: the file can't be read or is wrong; the message names file and line.
     """
-    robot = robot_of(skillsets)
-    file = None if robot is None else robot.file(FAULTS)
-    return Reaches() if robot is None or file is None else load_reaches(file, models_of(robot.skillsets))
+    try:
+        file = find_robot().file(FAULTS)
+    except RobotError as error:
+        raise AnalysisError(str(error)) from None
+    return Reaches() if file is None else load_reaches(file, robot_skillsets())
 
 
 def load_reaches(path: Path, skillsets: Sequence[Skillset]) -> Reaches:

@@ -2,76 +2,72 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from alula.common.faults import FaultError, FaultRequest, parse_fault
-from alula.common.robots import behaviour_files
+from alula.common.robots import RobotError, find_robot
 from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.suggestions import nearest
 from alula.language.errors import LanguageError
 from alula.language.load import load_skillset
-from alula.missions.plan import MissionPlan
+from alula.missions.plan import InputError, Inputs, MakePlan, MissionPlan, plan_of
 from alula.model.model import Skillset
+from alula.records.errors import AnalysisError
+from alula.records.models import robot_skillsets
 from alula.records.replay.fitting import fitted
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.mock import Behaviour, load_behaviour
-from uav_missions.plan import ROBOT, plan_of
-from uav_missions.route import Route, RouteError, load_route
-
-MakePlan = Callable[[Route], MissionPlan]
 
 
-def route_of(recorded: Recorded) -> Route:
-    """Return the route that was flown."""
-    waypoints = recorded.mission.get("route")
-    if isinstance(waypoints, list) and waypoints:
-        try:
-            return Route([(float(x), float(y), float(z)) for x, y, z in waypoints])
-        except (TypeError, ValueError):
-            raise ReplayError(f"{recorded.path}: its route is no list of [x, y, z] in metres") from None
-    try:
-        return load_route(recorded.path.parent / "route.json")
-    except RouteError as error:
-        raise ReplayError(f"{recorded.path}: names no route, and {error}") from error
+def inputs_of_record(recorded: Recorded) -> Inputs:
+    """Return what the mission was made of."""
+    # Older records have what a mission was made of among the facts of its outcome.
+    inputs = recorded.mission.get("inputs", recorded.mission)
+    if not isinstance(inputs, Mapping):
+        raise ReplayError(f"{recorded.path}: the inputs of its mission are no mapping")
+    return inputs
 
 
 def plan_for(recorded: Recorded, tree: str) -> MissionPlan:
     """Return the mission's own plan, or that of ``tree``: a Python file or a module, with ``:function`` where it is not ``plan``."""
-    route = route_of(recorded)
+    inputs = inputs_of_record(recorded)
     try:
-        return _tree(tree)(route) if tree else plan_of(load_scenario(recorded.scenario), route)
-    except ScenarioError as error:
+        return _tree(tree)(inputs) if tree else plan_of(load_scenario(recorded.scenario), inputs)
+    except (ScenarioError, RobotError, InputError) as error:
         raise ReplayError(f"{recorded.path}: {error}") from error
 
 
 def _tree(text: str) -> MakePlan:
     place, _, function = text.partition(":")
     name = function or "plan"
+    path = Path(place)
     try:
-        path = Path(place)
-        if path.suffix == ".py":
-            spec = importlib.util.spec_from_file_location("replayed_tree", path)
-            if spec is None or spec.loader is None or not path.is_file():
-                raise ReplayError(f"--tree {text}: there is no such file")
-            module = importlib.util.module_from_spec(spec)
-            spec.loader.exec_module(module)
-        else:
-            module = importlib.import_module(place)
-        make: MakePlan = getattr(module, name)
-    except (ImportError, AttributeError, SyntaxError) as error:
-        raise ReplayError(f"--tree {text}: {error}; give a module or a file that has {name}(route) -> MissionPlan") from error
-    return make
+        if path.suffix != ".py":
+            make: MakePlan = find_robot().load(f"{place}:{name}")
+            return make
+        spec = importlib.util.spec_from_file_location("replayed_tree", path)
+        if spec is None or spec.loader is None or not path.is_file():
+            raise ReplayError(f"--tree {text}: there is no such file")
+        module = importlib.util.module_from_spec(spec)
+        find_robot().import_path()
+        spec.loader.exec_module(module)
+        own: MakePlan = getattr(module, name)
+    except (ImportError, AttributeError, SyntaxError, RobotError) as error:
+        raise ReplayError(f"--tree {text}: {error}; give a module or a file that has {name}(inputs) -> MissionPlan") from error
+    return own
 
 
 def skillsets_for(plan: MissionPlan, models: Sequence[Path]) -> list[Skillset]:
     """Return the plan's models, those of files in place of the shipped ones of the same name."""
-    own = {name: importlib.import_module(f"{name}_managers.model").SKILLSET for name in plan.skillsets}
+    try:
+        own = {skillset.name: skillset for skillset in robot_skillsets(plan.skillsets)}
+    except AnalysisError as error:
+        raise ReplayError(str(error)) from error
     for path in models:
         try:
             other = load_skillset(path)
@@ -110,12 +106,11 @@ def _number(recorded: Recorded, name: str, value: object) -> float:
 
 
 def behaviour_for(recorded: Recorded, skillsets: Sequence[Skillset], files: Sequence[Path]) -> Behaviour:
-    """Return what mocks do where the record has no answer: as the record fits, then the files, then the drone's own."""
+    """Return what mocks do where the record has no answer: as the record fits, then the files, then the robot's own."""
     names = frozenset(skillset.name for skillset in skillsets)
-    robot = [importlib.import_module(f"{name}_managers.model").SKILLSET for name in ROBOT]
     try:
-        own = load_behaviour([*behaviour_files(names), *files], robot).of(names)
-    except SkillRuntimeError as error:
+        own = load_behaviour([*find_robot().behaviour_files, *files], robot_skillsets()).of(names)
+    except (SkillRuntimeError, RobotError, AnalysisError) as error:
         raise ReplayError(str(error)) from error
     return replace(fitted(recorded).over(own), faults=own.faults)
 

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,12 +33,17 @@ class RecordedMission:
     behaviour: Behaviour
 
 
+Answers = tuple[Vehicle, Iterable[Entry]]
+"""What answers the tree, and what it is told, in the order of time."""
+MakeAnswers = Callable[[RecordedMission], Answers]
+
+
 @dataclass(frozen=True)
 class Conditions:
     """Under which conditions it is decided again.
 
     Attributes:
-        bag: of the functional layer, which answers; None: the skills end as they did.
+        answers: makes what answers the tree, such as the functional layer's bag under the real hooks; None: the skills end as they did.
         fail: what did not fail then, as on the command line.
         settings: other parameters of the mission, ``NAME=VALUE``.
         go_on: go on over mocks after the first difference.
@@ -46,7 +51,7 @@ class Conditions:
         out: folder of the replay's own record; None: it leaves none.
     """
 
-    bag: Path | None = None
+    answers: MakeAnswers | None = None
     fail: Sequence[str] = ()
     settings: Sequence[str] = ()
     go_on: bool = False
@@ -74,7 +79,7 @@ def decide(mission: RecordedMission, conditions: Conditions) -> Result:
     recorded, plan, out = mission.recorded, mission.plan, conditions.out
     parameters = parameters_for(recorded, plan, conditions.settings)
     faults = faults_for(mission.behaviour, conditions.fail)
-    vehicle, entries = _vehicle(mission, conditions.bag)
+    vehicle, entries = (conditions.answers or recorded_skills)(mission)
     for fault in faults:
         vehicle.fail(fault)
     make_record = None
@@ -87,17 +92,10 @@ def decide(mission: RecordedMission, conditions: Conditions) -> Result:
     return replay.run()
 
 
-def _vehicle(mission: RecordedMission, bag: Path | None) -> tuple[Vehicle, Iterable[Entry]]:
-    """Return what answers the tree, and what is told it."""
+def recorded_skills(mission: RecordedMission) -> Answers:
+    """Have the skills end as they did."""
     recorded = mission.recorded
-    if bag is None:
-        return RecordedSkills(mission.skillsets, recorded, mission.behaviour, start_s=recorded.begun_s), recorded.entries
-    # Late: it needs the interfaces, which a replay of skills does without.
-    from alula.records.replay.functional import RecordedFunctions
-    from alula.records.replay.functional_bag import begin_of, entries_of
-
-    functions = RecordedFunctions(mission.skillsets, bag, mission.behaviour, start_s=begin_of(recorded, bag))
-    return functions, entries_of(recorded, bag, functions.topics)
+    return RecordedSkills(mission.skillsets, recorded, mission.behaviour, start_s=recorded.begun_s), recorded.entries
 
 
 def _make_folder(out: Path) -> None:

@@ -6,13 +6,10 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from alula.common.faults import FaultRequest, changes_of, spans_of
+from alula.common.faults import MOCKED, FaultRequest, changes_of, spans_of
 from alula.common.files import write_json, write_text
 from alula.records.replay.recorded import Recorded
 from alula.records.replay.replay import Result
-from uav_missions.mock_flight import MOCK
-from uav_missions.plan import write_route
-from uav_missions.route import Route
 
 
 def trace_of(result: Result, zero_s: float) -> list[dict[str, object]]:
@@ -44,9 +41,6 @@ def verdict(recorded: Recorded, result: Result) -> list[str]:
 def write_out(out: Path, recorded: Recorded, result: Result, spoiled: Sequence[FaultRequest] = ()) -> None:
     """Write what is not in the replay's own record; ``spoiled``: faults of measurements, which no mock has had."""
     write_text(out / "trace.jsonl", "".join(json.dumps(line) + "\n" for line in trace_of(result, recorded.zero_s)))
-    route = recorded.mission.get("route")
-    if isinstance(route, list):
-        write_route(out, Route([(x, y, z) for x, y, z in route]))
     write_json(out / "mock.json", account_of(recorded, result, spoiled))
     difference = None if result.difference is None else result.difference.as_dict()
     write_json(
@@ -66,6 +60,6 @@ def account_of(recorded: Recorded, result: Result, spoiled: Sequence[FaultReques
         "wall_s": result.wall_s,
         "factor": ended_s / result.wall_s if result.wall_s else None,
         "lift_off_s": result.lift_off_s,
-        "faults": [vars(change) for change in changes_of(spans, ended_s, MOCK)],
+        "faults": [vars(change) for change in changes_of(spans, ended_s, MOCKED)],
         "notes": list(result.notes),
     }

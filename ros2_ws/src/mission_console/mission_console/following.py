@@ -28,7 +28,7 @@ class RunFollower:
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
             (folder / "run.json", RUN, self._run),
             (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
-            (folder / "route.json", ROUTE, self._route),
+            (folder / "inputs.json", ROUTE, self._route),
             (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
             (folder / "summary.json", SUMMARY, _json),
         ]

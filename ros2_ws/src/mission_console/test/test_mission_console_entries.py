@@ -145,7 +145,7 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     write_record(tmp_path, failing_story())
     for name, content in (
         ("run.json", "[1]"),
-        ("route.json", '{"route": [["x", 1, 2]]}'),
+        ("inputs.json", '{"route": [["x", 1, 2]]}'),
         ("map.ply", "ply"),
         ("operator.jsonl", "{\n[]\n1\n"),
     ):
@@ -154,7 +154,7 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     topics = {wire[0] for wire in follower.poll()}
     assert EVENTS in topics
     assert topics.isdisjoint({RUN, ROUTE, MAP, OPERATOR})
-    assert [problem.partition(":")[0] for problem in follower.problems] == ["run.json", "route.json", "map.ply"]
+    assert [problem.partition(":")[0] for problem in follower.problems] == ["run.json", "inputs.json", "map.ply"]
 
 
 def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
@@ -264,7 +264,7 @@ def test_markup_of_a_run_is_no_markup_of_the_page() -> None:
 
 def test_a_viewer_is_sent_what_it_lacks(tmp_path: Path) -> None:
     write_record(tmp_path, failing_story())
-    (tmp_path / "route.json").write_text('{"route": [[0, 0, 1]]}', encoding="utf-8")
+    (tmp_path / "inputs.json").write_text('{"route": [[0, 0, 1]]}', encoding="utf-8")
     feed, place = Feed(tmp_path), Place()
     feed.add(feed.read())
     first = json.loads(feed.message(place) or "")

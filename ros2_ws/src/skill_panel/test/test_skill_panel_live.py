@@ -190,7 +190,8 @@ def test_wrong_input_is_one_line_and_exit_code_2(tmp_path, capsys):
 
 def test_the_list_says_what_runs(skillset, ros2_domain, tmp_path):
     # No run of the checkout is listed, whichever domain it had.
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(ros2_domain), "ALULA_ROOT": str(tmp_path)}
+    (tmp_path / "robot.yaml").write_text("name: rover\n")
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(ros2_domain), "ALULA_ROBOT": str(tmp_path)}
     end = time.monotonic() + READY_S
     said = ""
     while "/panel_test/navigation" not in said:

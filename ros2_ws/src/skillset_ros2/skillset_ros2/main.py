@@ -30,7 +30,7 @@ def find_factory(place: str) -> HooksFactory:
     """Return the function ``MODULE:FACTORY`` that makes the hooks of a node; raise ImportError or ValueError when there is none."""
     module, _, name = place.partition(":")
     if not name:
-        raise ValueError("it should be MODULE:FACTORY, as uav_skills.navigation:make_hooks")
+        raise ValueError("it should be MODULE:FACTORY, as rover_skills.base:make_hooks")
     found: HooksFactory | None = getattr(importlib.import_module(module), name, None)
     if not callable(found):
         raise ValueError(f"{module} has no function {name}")  # noqa: TRY004 - a slip in the place that was given

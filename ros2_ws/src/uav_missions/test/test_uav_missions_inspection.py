@@ -13,24 +13,25 @@ from alula.common.faults import FaultRequest, parse_fault
 from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
+from alula.missions.plan import plan_of
+from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent
 from alula.runtime.mock import load_behaviour
-from uav_missions import mock_flight
 from uav_missions.inspection import plan
-from uav_missions.plan import plan_of
-from uav_missions.route import Route, load_route
+from uav_missions.route import inputs_of, route_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
 SCENARIO = load_scenario("inspection", ALULA_ROOT / "scenarios")
 WORLD = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/building.yaml"
-ROUTE = load_route(WORLD).waypoints
-SKILLSETS = mock_flight.drone(SCENARIO.skillsets)
-BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone()).of(frozenset(SCENARIO.skillsets))
+INPUTS = inputs_of(WORLD)
+ROUTE = route_of(INPUTS).waypoints
+SKILLSETS = robot_skillsets(SCENARIO.skillsets)
+BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets()).of(frozenset(SCENARIO.skillsets))
 
 
 def fly(*faults: str, seed: int = 0, tick_period_s: float = 0.1) -> MockedMission:
     requests: list[FaultRequest] = [parse_fault(fault) for fault in faults]
-    mission = MockedMission(SKILLSETS, BEHAVIOUR, plan(Route(ROUTE)), faults=requests, seed=seed, tick_period_s=tick_period_s)
+    mission = MockedMission(SKILLSETS, BEHAVIOUR, plan(INPUTS), faults=requests, seed=seed, tick_period_s=tick_period_s)
     mission.end = mission.run()
     return mission
 
@@ -47,8 +48,8 @@ def on_ground(mission: MockedMission) -> bool:
 
 
 def test_the_scenario_names_this_mission():
-    assert plan_of(SCENARIO, Route(ROUTE)).scenario == "inspection"
-    assert plan_of(SCENARIO, Route(ROUTE)).skillsets == SCENARIO.skillsets
+    assert plan_of(SCENARIO, INPUTS).scenario == "inspection"
+    assert plan_of(SCENARIO, INPUTS).skillsets == SCENARIO.skillsets
 
 
 def test_a_nominal_flight_goes_all_around_with_the_nose_to_the_walls():
@@ -142,7 +143,7 @@ def test_without_a_ground_station_the_drone_does_not_take_off():
 def test_an_encoder_that_was_never_heard_of_is_named_and_not_the_radio_alone():
     link = ("video", "link")
     silent = replace(BEHAVIOUR, timeline=tuple(event for event in BEHAVIOUR.timeline if link not in event.states))
-    end = MockedMission(SKILLSETS, silent, plan(Route(ROUTE))).run()
+    end = MockedMission(SKILLSETS, silent, plan(INPUTS)).run()
     assert end.outcome is Outcome.NOT_STARTED
     assert "neither the video encoder nor the ground station" in end.reason
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import random
@@ -14,20 +13,22 @@ from pathlib import Path
 
 import pytest
 
+from alula.campaign import mock_run
 from alula.common.faults import FaultRequest
 from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
+from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent
 from alula.runtime.mock import load_behaviour
-from uav_missions import mock_flight
 from uav_missions.mapping import plan as mapping_plan
-from uav_missions.route import Route, load_route
+from uav_missions.route import inputs_of, route_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
-ROUTE = load_route(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml").waypoints
-SKILLSETS = [importlib.import_module(f"{name}_managers.model").SKILLSET for name in ("navigation", "perception", "mapping")]
-BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], mock_flight.drone()).of(frozenset(s.name for s in SKILLSETS))
+INPUTS = inputs_of(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml")
+ROUTE = route_of(INPUTS).waypoints
+SKILLSETS = robot_skillsets(("navigation", "perception", "mapping"))
+BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets()).of(frozenset(s.name for s in SKILLSETS))
 
 # What `./alula fly mapping --rate 0 --fail zed@30` recorded in the simulator, in the order of the requests.
 SIMULATED = [
@@ -53,7 +54,7 @@ SIDE_BY_SIDE = {"zed_depthmap", "lidar_mapping"}  # two skillsets are asked in o
 
 
 def make(*faults: FaultRequest, **options) -> MockedMission:
-    return MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(Route(ROUTE)), faults=faults, **options)
+    return MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(INPUTS), faults=faults, **options)
 
 
 def landed(mission: MockedMission) -> bool:
@@ -138,13 +139,13 @@ def test_a_campaign_always_comes_to_an_end_and_down():
     """Seeds, failures of sensors at random times, and functions that fail by chance on top."""
     troubles = load_behaviour(
         [ALULA_ROOT / "skillsets/uav/mock.yaml", Path(__file__).with_name("uav_missions_troubles.yaml")],
-        mock_flight.drone(),
+        robot_skillsets(),
     ).of(frozenset(s.name for s in SKILLSETS))
     outcomes: Counter[Outcome] = Counter()
     for seed in range(100):
         chance = random.Random(seed)  # noqa: S311 - no secret
         faults = [FaultRequest(name, begin_s=chance.uniform(0.0, 110.0)) for name in chance.sample(["zed", "lidar"], chance.randint(0, 2))]
-        mission = MockedMission(SKILLSETS, troubles, mapping_plan(Route(ROUTE)), faults=faults, seed=seed, tick_period_s=1.0)
+        mission = MockedMission(SKILLSETS, troubles, mapping_plan(INPUTS), faults=faults, seed=seed, tick_period_s=1.0)
         outcomes[mission.run().outcome] += 1
         assert landed(mission), seed
         assert mission.open_executions == [], seed
@@ -171,12 +172,11 @@ WITHOUT_EYES = [
 
 
 def arguments(out: Path, *more: str) -> list[str]:
-    route, behaviour = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml", ALULA_ROOT / "skillsets/uav/mock.yaml"
-    return ["--out", str(out), "--route", str(route), "--behaviour", str(behaviour), *more]
+    return ["mapping", "--out", str(out), *more]
 
 
 def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
-    assert mock_flight.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
+    assert mock_run.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
     mission = json.loads((tmp_path / "run/mission.json").read_text())
     assert (mission["outcome"], mission["waypoints_reached"]) == ("given_up", 1)
     record = read_record(tmp_path / "run")
@@ -207,7 +207,7 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
 def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run/skills.mcap").symlink_to("/dev/full")
-    assert mock_flight.main(arguments(tmp_path / "run")) == 0
+    assert mock_run.main(arguments(tmp_path / "run")) == 0
     mission = json.loads((tmp_path / "run/mission.json").read_text())
     assert mission["outcome"] == "accomplished"
     assert mission["problems"] == ["skills.mcap ends early: No space left on device"]
@@ -216,21 +216,21 @@ def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
 def test_a_folder_that_goes_away_in_flight_does_not_end_it(tmp_path):
     out = tmp_path / "run"
     out.mkdir()
-    mission = MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(Route(ROUTE)), out=out)
+    mission = MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(INPUTS), out=out)
     mission.world.clock.after(20.0, lambda: shutil.rmtree(out))
     assert mission.run().outcome is Outcome.ACCOMPLISHED
     assert not out.exists()
 
 
 def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):
-    assert mock_flight.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
+    assert mock_run.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
     assert capsys.readouterr().err == "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, control\n"
     assert not (tmp_path / "run").exists()
 
 
 def test_no_ros_is_needed(tmp_path):
     code = (
-        "import sys; from uav_missions.mock_flight import main; code = main(sys.argv[1:]);"
+        "import sys; from alula.campaign.mock_run import main; code = main(sys.argv[1:]);"
         "assert not {m for m in sys.modules if m.startswith(('rclpy', 'rospy', 'geometry_msgs'))}; sys.exit(code)"
     )
     subprocess.run([sys.executable, "-c", code, *arguments(tmp_path / "run")], check=True, env=dict(os.environ), timeout=60)

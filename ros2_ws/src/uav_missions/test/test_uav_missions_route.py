@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uav_missions.route import Route, RouteError, load_route, wrap_rad
+from uav_missions.route import Route, RouteError, inputs_of, wrap_rad
 
 
 def test_legs_have_their_direction_on_the_ground_and_short_ones_that_of_a_neighbour():
@@ -39,13 +39,13 @@ def test_routes_are_read_from_yaml_and_json(tmp_path):
     yaml_file, json_file = tmp_path / "yard.yaml", tmp_path / "route.json"
     yaml_file.write_text("name: yard\nroute:\n  - [0, 0, 3.0]\n  - [22.0, 0.0, 3.0]\n")
     json_file.write_text(json.dumps({"route": [[0, 0, 3], [22, 0, 3]]}))
-    assert load_route(yaml_file).waypoints == load_route(json_file).waypoints == ((0.0, 0.0, 3.0), (22.0, 0.0, 3.0))
+    assert inputs_of(yaml_file) == inputs_of(json_file) == {"route": [[0.0, 0.0, 3.0], [22.0, 0.0, 3.0]]}
 
 
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("route: []", "has no key 'route'"),
+        ("route: []", "needs a `route`"),
         ("- 1", "has no key 'route'"),
         ("route: [[0, 0, 3], [0, 0]]", "waypoint 2 is [0, 0]"),
         ("route: [[0, 0, .nan]]", "waypoint 1"),
@@ -57,11 +57,11 @@ def test_a_route_that_can_not_be_used_is_named_with_its_place(tmp_path, text, co
     path = tmp_path / "bad.yaml"
     path.write_text(text)
     with pytest.raises(RouteError) as error:
-        load_route(path)
+        inputs_of(path)
     assert complaint in str(error.value)
     assert str(path) in str(error.value)
 
 
 def test_a_missing_route_file_is_named(tmp_path):
     with pytest.raises(RouteError, match="nowhere"):
-        load_route(tmp_path / "nowhere.yaml")
+        inputs_of(tmp_path / "nowhere.yaml")

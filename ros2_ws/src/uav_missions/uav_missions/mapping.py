@@ -45,12 +45,11 @@ from py_trees.decorators import SuccessIsFailure
 
 from alula.missions.conditions import Condition, condition
 from alula.missions.leaves import Check, Do, SkillLeaf
-from alula.missions.plan import MissionPlan
+from alula.missions.plan import Inputs, MissionPlan
 from alula.missions.skillset import Client
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.flying import FlightSettings, Flying, beside, conditions_of_flight, is_on, sees
 from uav_missions.plan import route_plan
-from uav_missions.route import Route
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,11 +150,11 @@ def conditions(clients: Clients, blackboard: RouteBlackboard) -> list[Condition]
     ]
 
 
-def plan(route: Route) -> MissionPlan:
-    """Return the mission along a route."""
+def plan(inputs: Inputs) -> MissionPlan:
+    """Return the mission along the route of its inputs."""
     names = ("navigation", "perception", "mapping")
 
     def make_tree(clients: Mapping[str, Client], blackboard: RouteBlackboard, settings: Settings) -> MappingMission:
         return MappingMission(Clients(*(clients[name] for name in names)), blackboard, settings)
 
-    return route_plan("mapping", names, make_tree, Settings(), route)
+    return route_plan("mapping", names, make_tree, Settings(), inputs)

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import yaml
 
+from alula.missions.plan import InputError, Inputs
+
 Waypoint = tuple[float, float, float]
 SHORT_LEG_M = 0.1  # a leg shorter than this on the ground has no heading of its own
 
 
-class RouteError(Exception):
+class RouteError(InputError):
     """A route can't be used; the message says what is wrong with it and where."""
 
 
@@ -62,8 +64,16 @@ def wrap_rad(angle_rad: float) -> float:
     return math.pi if wrapped == -math.pi else wrapped
 
 
-def load_route(path: Path) -> Route:
-    """Read the key ``route`` of a YAML or JSON file: a list of [x, y, z].
+def route_of(inputs: Inputs) -> Route:
+    """Return the route of a mission's inputs, a list of [x, y, z]; raises RouteError."""
+    waypoints = inputs.get("route")
+    if not isinstance(waypoints, list) or not waypoints:
+        raise RouteError("the mission needs a `route`, a list of [x, y, z]")
+    return Route([_read_waypoint(number, entry) for number, entry in enumerate(waypoints, start=1)])
+
+
+def inputs_of(path: Path) -> Inputs:
+    """Read the inputs of a mission of the drone from a world: the key ``route`` of a YAML or JSON file, a list of [x, y, z].
 
     Raises:
         RouteError: the file can't be read, or has no usable route.
@@ -73,12 +83,15 @@ def load_route(path: Path) -> Route:
         content = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
     except (OSError, UnicodeDecodeError, yaml.YAMLError, json.JSONDecodeError) as error:
         raise RouteError(f"{path}: {error}") from error
-    if not isinstance(content, dict) or not isinstance(content.get("route"), list) or not content["route"]:
+    if not isinstance(content, dict):
         raise RouteError(f"{path}: has no key 'route' with a list of [x, y, z]")
-    return Route([_read_waypoint(path, number, entry) for number, entry in enumerate(content["route"], start=1)])
+    try:
+        return {"route": [list(waypoint) for waypoint in route_of(content).waypoints]}
+    except RouteError as error:
+        raise RouteError(f"{path}: {error}") from None
 
 
-def _read_waypoint(path: Path, number: int, entry: object) -> Waypoint:
+def _read_waypoint(number: int, entry: object) -> Waypoint:
     if isinstance(entry, list) and len(entry) == 3 and all(isinstance(v, int | float) and math.isfinite(v) for v in entry):
         return (float(entry[0]), float(entry[1]), float(entry[2]))
-    raise RouteError(f"{path}: waypoint {number} is {entry!r}, not [x, y, z] in metres")
+    raise RouteError(f"waypoint {number} is {entry!r}, not [x, y, z] in metres")

@@ -1,4 +1,7 @@
-"""The functional layer from its bag: what it said, and its answers to what it was told, under the drone's real hooks."""
+"""The functional layer from its bag: what it said, and its answers to what it was told, under the robot's real hooks.
+
+The robot's part ``hooks`` is a package with a module a skillset, which has ``make_hooks(node)``.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from alula.common.record import Entry
+from alula.common.robots import FILE, find_robot
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
-from alula.records.replay.bag_node import BagNode, RecordedFuture, Subscribers
 from alula.records.replay.comparison import alike
-from alula.records.replay.functional_bag import CALLS, MESSAGE, Call, read_calls
-from alula.records.replay.recorded import Decision
+from alula.records.replay.deciding import Answers, MakeAnswers, RecordedMission
+from alula.records.replay.recorded import Decision, ReplayError
 from alula.records.replay.vehicle import Vehicle
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
@@ -27,6 +30,20 @@ from alula.runtime.local import LocalManagers
 from alula.runtime.mock import NEVER, Behaviour, Choice, MockSkill, follow
 from alula.runtime.plain import to_plain
 from skillset_ros2.convert import fill, values_of
+from skillset_ros2.replay.bag import CALLS, MESSAGE, Call, begin_of, entries_of, read_calls
+from skillset_ros2.replay.node import BagNode, RecordedFuture, Subscribers
+
+
+def from_bag(bag: Path) -> MakeAnswers:
+    """Return what has a bag of the functional layer answer a replay; raises ReplayError, also when it is called."""
+
+    def make(mission: RecordedMission) -> Answers:
+        begun_s = begin_of(mission.recorded, bag)
+        functions = RecordedFunctions(mission.skillsets, bag, mission.behaviour, start_s=begun_s)
+        return functions, entries_of(mission.recorded, bag, functions.topics)
+
+    return make
+
 
 # --- hooks that are real as long as the record knows what comes of them -----------------------------------------------------
 
@@ -134,6 +151,12 @@ class RecordedFunctions(Vehicle):
 
     def __init__(self, skillsets: Sequence[Skillset], bag: Path, behaviour: Behaviour, *, start_s: float) -> None:
         super().__init__(behaviour, start_s=start_s)
+        self._robot = find_robot()
+        self._hooks = self._robot.parts.get("hooks")
+        if self._hooks is None:
+            raise ReplayError(
+                f"{self._robot.root / FILE}: names no hooks; add `parts: {{hooks: PACKAGE}}` to replay from the functional layer"
+            )
         self._subscribers: Subscribers = {}
         self._silent = False
         """What the bag tells is not, or no more, what happens: the real hooks look at it no longer."""
@@ -158,7 +181,7 @@ class RecordedFunctions(Vehicle):
     def _serve(self, skillset: Skillset) -> None:
         name = skillset.name
         node = BagNode(self.world.clock, self._called, self._subscribers, lambda: self._silent)
-        real = importlib.import_module(f"uav_skills.{name}").make_hooks(node)
+        real = self._robot.load(f"{self._hooks}.{name}").make_hooks(node)
         actions = importlib.import_module(f"{name}_interfaces.action")
         mocks = self.robot.hooks_of(skillset, ShadowSkill)
         hooks = {

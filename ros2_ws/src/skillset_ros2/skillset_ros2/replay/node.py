@@ -1,4 +1,4 @@
-"""What the drone's hooks need of a node, in virtual time, with the answers of a recorded flight."""
+"""What hooks need of an rclpy node, in virtual time, with the answers of a recorded flight."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class RecordedService:
 
 
 class BagNode:
-    """What the drone's hooks use of an rclpy node, in virtual time, over a bag.
+    """What hooks use of an rclpy node, in virtual time, over a bag.
 
     Args:
         clock: the mission clock.

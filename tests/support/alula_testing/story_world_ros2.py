@@ -1,4 +1,4 @@
-"""A story's world over rclpy, in a DDS domain of its own; as a process it plays stories (see ``live_story``)."""
+"""A story's world over rclpy, in a DDS domain of its own; as a process it plays stories (see ``alula_testing.live_story``)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from skillset_interfaces import action
 
 from alula.common.network import claim_domain
 from alula.model.model import Skillset
-from alula.runtime.live_story import LiveWorld, interfaces_of, serve
 from alula.runtime.story_world import Hooks
+from alula_testing.live_story import LiveWorld, interfaces_of, serve
 from skillset_ros2.middleware import RclpyMiddleware
 from skillset_ros2.session import Session
 

@@ -1,4 +1,4 @@
-"""A story's world over rospy, with a master of its own; as a process it plays stories (see ``alula.runtime.live_story``)."""
+"""A story's world over rospy, with a master of its own; as a process it plays stories (see ``alula_testing.live_story``)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from rosmaster.master import Master
 from skillset_interfaces import msg as messages
 
 from alula.model.model import Skillset
-from alula.runtime.live_story import LiveWorld, interfaces_of, serve
 from alula.runtime.story_world import Hooks
+from alula_testing.live_story import LiveWorld, interfaces_of, serve
 from skillset_ros1.middleware import RospyMiddleware
 from skillset_ros1.names import place
 

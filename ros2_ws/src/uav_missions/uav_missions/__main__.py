@@ -1,7 +1,0 @@
-"""``python -m uav_missions``: fly a mission."""
-
-import sys
-
-from uav_missions.runner import main
-
-sys.exit(main())
