@@ -23,7 +23,7 @@ def places(world: str) -> list[Path]:
     """Return the folders in the order in which they are looked into."""
     if world == "1":
         built = STATE / "ros1" / "devel" / "lib" / "python3" / "dist-packages"
-        packages = find_packages([STATE / "generated"], "*_managers") | find_packages([ROOT / "ros2_ws/src"], "mission_console")
+        packages = find_packages([STATE / "generated"], "*_managers")
     else:
         built = STATE / "ros2" / "install" / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
         packages = find_packages([ROOT / "ros2_ws/src", ROOT / "bridge", STATE / "generated"])
