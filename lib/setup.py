@@ -7,6 +7,6 @@ setup(
     version="0.2.0",
     packages=find_packages(include=["alula", "alula.*"]),
     package_dir={"": "."},  # so that an editable installation is a path, not an import hook
-    package_data={"alula": ["py.typed"], "alula.scaffold": ["robot/**/*.in"]},
+    package_data={"alula": ["py.typed"], "alula.console": ["page/*"], "alula.scaffold": ["robot/**/*.in"]},
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],
 )

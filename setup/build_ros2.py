@@ -43,7 +43,9 @@ def read_built(workspace: Workspace, states: dict[str, str], tools: str) -> Buil
     built = Built.read(workspace.folder / "built.json")
     if built is None:  # an interrupted build, or one by colcon itself: what is younger than its sources counts
         return Built(tools, {name: states[name] for name, package in workspace.packages.items() if is_younger(workspace, name, package)})
-    if built.tools != tools or built.gone(states):
+    # Of a package in Python that is gone nothing is found any more; what was compiled would be.
+    compiled = [name for name in built.gone(states) if (workspace.folder / "build" / name / "CMakeCache.txt").exists()]
+    if built.tools != tools or compiled:
         workspace.clear()
         return Built(tools, {})
     return built

@@ -37,8 +37,7 @@ def sources(workspace: Workspace) -> list[Path]:
 def alulas_lines(world: str) -> list[str]:
     """Return the lines of Alula's path file in the order in which they are looked into."""
     workspace = alulas_workspace(world)
-    console = [ROOT / "ros2_ws/src/mission_console"] if world == "1" else []
-    places = [built(workspace, world), *(ROOT / place for place in LIBRARY_TOOLS_AND_TESTS), *sources(workspace), *console]
+    places = [built(workspace, world), *(ROOT / place for place in LIBRARY_TOOLS_AND_TESTS), *sources(workspace)]
     return [str(place.resolve()) for place in places]
 
 

@@ -66,7 +66,7 @@ title_ros1="ROS 1 workspace (catkin_make)"
 key_ros1() { key_workspace 1 "$ALULA_ROOT"/ros1_ws/src/{skillset_interfaces,skillset_ros1,resource_reporter}; }
 make_ros1() { make_workspace 1; }
 title_ros2="ROS 2 workspace (colcon build)"
-key_ros2() { key_workspace 2 "$ALULA_ROOT/bridge" "$ALULA_ROOT"/ros2_ws/src/{skillset_ros2,skill_panel,mission_console}; }
+key_ros2() { key_workspace 2 "$ALULA_ROOT/bridge" "$ALULA_ROOT"/ros2_ws/src/{skillset_ros2,skill_panel}; }
 make_ros2() { make_workspace 2; }
 
 if [ -f "$state/sealed" ]; then   # an image that flies, without what builds

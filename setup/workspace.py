@@ -18,7 +18,7 @@ from xml.etree import ElementTree as ET
 ROOT, STATE = Path(os.environ["ALULA_ROOT"]), Path(os.environ["ALULA_STATE"])
 GENERAL = {
     "1": ("skillset_interfaces", "skillset_ros1", "resource_reporter"),
-    "2": ("skillset_interfaces", "tf2_msgs", "ros_bridge", "ros_bridge_native", "skillset_ros2", "skill_panel", "mission_console"),
+    "2": ("skillset_interfaces", "tf2_msgs", "ros_bridge", "ros_bridge_native", "skillset_ros2", "skill_panel"),
 }
 """Alula's packages that any robot uses, by world; a robot has them from the installation, also where its folders hold them."""
 PLACES = {"1": ("ros1_ws/src",), "2": ("ros2_ws/src", "bridge")}
@@ -157,9 +157,9 @@ class Built:
         """Write the record."""
         path.write_text(json.dumps({"tools": self.tools, "packages": self.packages}, indent=1) + "\n", encoding="utf-8")
 
-    def gone(self, states: Mapping[str, str]) -> bool:
-        """Tell whether there are packages no more that were built."""
-        return not self.packages.keys() <= states.keys()
+    def gone(self, states: Mapping[str, str]) -> set[str]:
+        """Return the packages that were built and are there no more."""
+        return self.packages.keys() - states.keys()
 
     def changed(self, states: Mapping[str, str]) -> list[str]:
         """Return the packages that were not built as they are now."""

@@ -18,11 +18,12 @@ ROS1_PACKAGES = (
     "lidar_obstacles",
     "lidar_mapping",
     "uav_simulator",
+    "uav_report",
     "radio_link",
     "video_stream",
     "ground_station",
 )
-ROS2_PACKAGES = ("skillset_ros2", "skill_panel", "mission_console", "uav_skills", "uav_missions")
+ROS2_PACKAGES = ("skillset_ros2", "skill_panel", "uav_skills", "uav_missions")
 TYPED = [
     "lib/alula",
     "flight/alula_flight",

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mission_console.entries import PICTURES_FILE
+from alula.console.entries import PICTURES_FILE
 
 CAMERAS = {"depth": "/zed_depth/depth", "screen": "/ground_station/screen"}
 WIDTH_PX = 256

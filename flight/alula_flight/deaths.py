@@ -6,12 +6,11 @@ import contextlib
 import json
 import signal
 import threading
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
 
-DIED = "died"
-"""The way of failing of a process that ended without being told to."""
+from alula.report.deaths import Death
 
 
 class Consequence(Enum):
@@ -29,25 +28,6 @@ CONSEQUENCES = {
     "uav_simulator": Consequence.END,
     "master": Consequence.ABORT,
 }
-
-
-@dataclass(frozen=True)
-class Death:
-    """A process that ended without being told to.
-
-    ``when_s``: absolute mission clock, None before it runs. ``respawned``: the launch file has it started again.
-    """
-
-    name: str
-    how: str
-    when_s: float | None
-    respawned: bool = False
-
-    def sentence(self) -> str:
-        """Return what a person wants to read."""
-        when = "" if self.when_s is None else f" at {self.when_s:.1f} s of mission clock"
-        again = "; it was started again" if self.respawned else ""
-        return f"{self.name} died ({self.how}){when}{again}"
 
 
 def describe_exit(code: int | None) -> str:
@@ -79,14 +59,3 @@ class DeathRecord:
         """All deaths so far."""
         with self._lock:
             return tuple(self._deaths)
-
-
-def read_deaths(path: Path) -> list[Death]:
-    """Read what a `DeathRecord` wrote; a line cut off by a crash is left out."""
-    deaths = []
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        try:
-            deaths.append(Death(**json.loads(line)))
-        except (json.JSONDecodeError, TypeError):
-            continue
-    return deaths

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from alula.records.conformance import Monitor
-from alula_flight.deaths import read_deaths
+from alula.report.deaths import read_deaths
 from alula_flight.spec import RunSpec
 
 GIVEN_UP, CANNOT_START = 1, 2
@@ -16,9 +16,9 @@ GIVEN_UP, CANNOT_START = 1, 2
 def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = None) -> int:
     """Make the report from the run's folder, say how it went, and return the exit code."""
     # Late, because a wrong command line should not have to wait for matplotlib and Open3D.
-    from alula_flight.report.facts import RunFacts
-    from alula_flight.report.making import make_report
-    from alula_flight.verdict import verdict_lines
+    from alula.report.facts import RunFacts
+    from alula.report.making import make_report
+    from alula.report.verdict import verdict_lines
 
     out = Path(spec.out_dir)
     died = read_deaths(out / "deaths.jsonl")

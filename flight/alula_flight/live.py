@@ -9,8 +9,8 @@ from alula.common.record import EVENTS, FILE, RecordFollower
 from alula.model.execution_state import ExecutionState
 from alula.records.conformance import Monitor
 from alula.records.run import departure
+from alula.report.deaths import read_deaths
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
-from alula_flight.deaths import read_deaths
 
 
 def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: float = 0.0) -> str | None:

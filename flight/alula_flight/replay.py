@@ -177,7 +177,7 @@ def perceive(bag: Path, folder: Path, faults: Sequence[str], settings: Sequence[
 def make_report(out: Path, recorded: Recorded, faults: Sequence[str]) -> None:
     """Make summary, timeline and page of what lies in the folder, as of a flight; raises ReplayError where they could not be made."""
     of_run = ["--scenario", recorded.scenario, "--of", recorded.path.parent.name]
-    said, code = in_ros1("alula_flight.report", str(out), *of_run, *each("--fail", faults))
+    said, code = in_ros1("alula.report", str(out), *of_run, *each("--fail", faults))
     if code:
         raise ReplayError(f"{out}: no report: {said or f'it ended with {code}'}")
 

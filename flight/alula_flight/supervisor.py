@@ -21,8 +21,9 @@ from typing import Any
 from alula.common.processes import end_run
 from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
+from alula.report.deaths import Death
 from alula_flight.album import Album
-from alula_flight.deaths import CONSEQUENCES, Consequence, Death, DeathRecord, describe_exit
+from alula_flight.deaths import CONSEQUENCES, Consequence, DeathRecord, describe_exit
 from alula_flight.ending import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started
 from alula_flight.spec import RunSpec

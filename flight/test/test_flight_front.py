@@ -17,17 +17,18 @@ from alula.common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
 from alula.model.execution_state import ExecutionState
+from alula.report.deaths import Death, read_deaths
+from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula_flight import mocked
 from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
-from alula_flight.deaths import Death, DeathRecord, describe_exit, read_deaths
+from alula_flight.deaths import DeathRecord, describe_exit
 from alula_flight.ending import CANNOT_START
 from alula_flight.fly import main, monitor_of, sensors_words
 from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import MockFront, command
 from alula_flight.spec import RequestError, RunSpec
-from alula_flight.verdict import conformance_lines
 from uav_simulator.world.config import find_world
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 
-from alula_flight.deaths import Consequence, DeathRecord, read_deaths
+from alula.report.deaths import read_deaths
+from alula_flight.deaths import Consequence, DeathRecord
 from alula_flight.supervisor import MissionClock, Watch
 
 

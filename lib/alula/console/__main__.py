@@ -1,0 +1,105 @@
+"""`./alula console`: serve the operator's page until told to end.
+
+Ends with 0, and with 2 when what was asked for can't be.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import secrets
+import signal
+import socket
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.common.network import free_port
+from alula.common.runs import LATEST, live_runs
+from alula.console.admission import Admission, is_loopback
+from alula.console.server import Console
+
+PORT = 8440
+DOMAINS = range(233)
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the arguments."""
+    parser = argparse.ArgumentParser(
+        prog="alula console",
+        description="Serve the operator's page: start a mission, watch it, understand it afterwards.",
+        epilog="Without --run and --domain the page shows the newest run, and goes on to the next one when that starts.",
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
+    which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
+    parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); any other needs the printed token")
+    parser.add_argument("--port", type=int, help=f"listen on this port (default {PORT}, or a free one where that is taken)")
+    options = parser.parse_args(arguments)
+    if options.domain is not None and options.domain not in DOMAINS:
+        parser.error(f"--domain {options.domain}: a DDS domain is a number from 0 to {DOMAINS[-1]}")
+    if options.port is not None and not 0 < options.port < 2**16:
+        parser.error(f"--port {options.port}: a port is a number from 1 to {2**16 - 1}")
+    return options
+
+
+def first_run(options: argparse.Namespace) -> Path | None:
+    """Return the run that is shown first; None: the newest.
+
+    Raises:
+        ValueError: there is no such run.
+    """
+    if options.domain is not None:
+        found = next((run.folder for run in live_runs() if run.domain == options.domain), None)
+        if found is None:
+            raise ValueError(f"--domain {options.domain}: no run is under way there; start one (./alula fly mapping), or leave it out")
+        return found
+    if options.run == LATEST:
+        return None
+    folder = Path(options.run).expanduser().absolute()
+    if not (folder / "run.json").is_file():
+        raise ValueError(f"--run {options.run}: is no run's folder, it has no run.json")
+    return folder
+
+
+def port_of(options: argparse.Namespace) -> int:
+    """Return the port to listen on."""
+    if options.port is not None:
+        return int(options.port)
+    with socket.socket(socket.AF_INET6 if ":" in options.host else socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((options.host, PORT))
+        except OSError:
+            return free_port()
+    return PORT
+
+
+async def serve_until_told(console: Console, admission: Admission) -> None:
+    """Serve until SIGINT, SIGTERM or SIGHUP."""
+    told = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        asyncio.get_running_loop().add_signal_handler(number, told.set)
+    async with console.open():
+        sys.stdout.write(f"{admission.address}\n")
+        sys.stdout.flush()
+        sys.stderr.write("the operator's page is served there; Ctrl-C ends the server, not a flight\n")
+        await told.wait()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serve; return the exit code."""
+    options = parse(arguments)
+    try:
+        fixed = first_run(options)
+        token = "" if is_loopback(options.host) else secrets.token_urlsafe(24)
+        admission = Admission(options.host, port_of(options), token)
+        asyncio.run(serve_until_told(Console(admission, fixed=fixed), admission))
+    except (ValueError, OSError) as error:
+        sys.stderr.write(f"alula console: {error}\n")
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

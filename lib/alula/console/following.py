@@ -1,0 +1,88 @@
+"""Follows what a run leaves in its folder, while it goes on or afterwards: the record, and the files beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
+from alula.console import journal
+from alula.console.areas import areas_of
+from alula.console.clouds import CloudError, packed, read_points
+from alula.console.entries import AREAS, MAP, PICTURE, PICTURES_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
+from alula.console.lines import LinesFollower
+
+
+class RunFollower:
+    """Follows one run. ``problems`` names what could not be read."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.problems: list[str] = []
+        self.behind = False
+        self._converter = Converter()
+        self._record = RecordFollower(folder / FILE)
+        self._lines = [LinesFollower(folder / journal.FILE, OPERATOR), LinesFollower(folder / PICTURES_FILE, PICTURE)]
+        self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
+            (folder / "run.json", RUN, self._run),
+            (folder / "run.json", AREAS, lambda path: areas_of(str(_json(path).get("world") or ""))),
+            (folder / "inputs.json", ROUTE, self._route),
+            (folder / "map.ply", MAP, lambda path: packed(read_points(path))),
+            (folder / "summary.json", SUMMARY, _json),
+        ]
+        self._seen: dict[str, tuple[int, int]] = {}
+
+    def poll(self, limit: int | None = None) -> list[Wire]:
+        """Return what came since the last call, what belongs to the whole run first.
+
+        ``limit``: read so many entries of the record at most; ``behind`` says then that there may be more.
+        """
+        return [*self._changed_files(), *self._new_entries(limit)]
+
+    def _changed_files(self) -> Iterator[Wire]:
+        for path, topic, read in self._files:
+            try:
+                stat = path.stat()
+                version = (stat.st_mtime_ns, stat.st_size)
+                if self._seen.get(topic) == version:
+                    continue
+                self._seen[topic] = version
+                yield topic, None, read(path)
+            except FileNotFoundError:
+                continue
+            except (OSError, ValueError, TypeError, CloudError) as error:
+                self._note(f"{path.name}: {error}")
+
+    def _new_entries(self, limit: int | None) -> list[Wire]:
+        entries: list[Entry] = []
+        try:
+            entries += self._record.poll(limit)
+            self.behind = limit is not None and len(entries) >= limit
+            entries += [entry for lines in self._lines for entry in lines.poll()]
+        except (RecordError, OSError) as error:
+            self._note(str(error))
+        if self._record.broken:
+            self._note(f"{FILE}: {self._record.broken}")
+        return [wire for entry in entries for wire in self._converter.convert(entry)]
+
+    def _note(self, sentence: str) -> None:
+        if sentence not in self.problems:
+            self.problems.append(sentence)
+
+    def _run(self, path: Path) -> dict[str, Any]:
+        keep = ("scenario", "seed", "faults", "world", "mock", "rate", "autopilot", "imperfections")
+        values = _json(path)
+        world = Path(str(values.get("world") or "")).stem
+        return {**{key: values.get(key) for key in keep}, "world": world, "name": self.folder.name}
+
+    def _route(self, path: Path) -> list[list[float]]:
+        return [[float(number) for number in waypoint[:3]] for waypoint in _json(path)["route"]]
+
+
+def _json(path: Path) -> Any:
+    value = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(value, dict):
+        raise TypeError("is no JSON object")
+    return value

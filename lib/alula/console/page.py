@@ -1,0 +1,79 @@
+"""Makes the page: one HTML file with its style, its program and, in a report, the run's entries inside. It fetches nothing."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from alula.common.files import write_text
+from alula.console.entries import PICTURE, Wire, written
+from alula.console.following import RunFollower
+
+REPORT = "report.html"
+PARTS = Path(__file__).parent / "page"
+MAX_PICTURES = 400
+"""In a report: 3 MB of it at most."""
+PROGRAM = ("dom", "fold", "flight", "story", "tree", "timeline", "map", "figures", "pictures", "operator", "hands", "main")
+"""Files of the program, in the order in which they need each other."""
+
+
+def packed_entries(entries: Iterable[Wire]) -> bytes:
+    """Return entries as a gzipped array of JSON."""
+    text = f"[{','.join(written(entry) for entry in entries)}]"
+    return gzip.compress(text.encode(), compresslevel=6, mtime=0)
+
+
+def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
+    """Return the page: a report of ``entries``, or, without any, the live page that gets them over its server's WebSocket."""
+    style = (PARTS / "page.css").read_text(encoding="utf-8")
+    program = '"use strict";\n(() => {\n' + "\n".join(_part(name) for name in PROGRAM) + "\n})();\n"
+    record = "" if entries is None else base64.b64encode(packed_entries(entries)).decode("ascii")
+    connect = "'self'" if entries is None else "'none'"
+    policy = (
+        f"default-src 'none'; script-src {_hash(program)}; style-src {_hash(style)}; img-src data: blob:; connect-src {connect}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    skeleton = (PARTS / "page.html").read_text(encoding="utf-8")
+    values = {"policy": html.escape(policy), "title": html.escape(title), "style": style, "program": program, "record": record}
+    for name, value in values.items():
+        skeleton = skeleton.replace(f"<!--{name}-->", value)
+    return skeleton
+
+
+def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> None:
+    """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` that its other recordings tell.
+
+    Raises:
+        OSError: it can't be written.
+    """
+    entries = few_pictures([*RunFollower(folder).poll(), *more])
+    write_text(folder / REPORT, make_page(title=title, entries=sorted(entries, key=lambda entry: (entry[1] is not None, entry[1] or 0.0))))
+
+
+def few_pictures(entries: list[Wire]) -> list[Wire]:
+    """Return the entries with at most so many pictures, evenly in time, that the report stays a file to send around."""
+    step = -(-sum(topic == PICTURE for topic, _, _ in entries) // MAX_PICTURES)
+    cameras: Counter[str] = Counter()
+
+    def kept(entry: Wire) -> bool:
+        if entry[0] != PICTURE or step <= 1:
+            return True
+        camera = str(entry[2].get("camera")) if isinstance(entry[2], Mapping) else ""
+        cameras[camera] += 1
+        return cameras[camera] % step == 1
+
+    return [entry for entry in entries if kept(entry)]
+
+
+def _part(name: str) -> str:
+    return (PARTS / f"{name}.js").read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+    return f"'sha256-{digest}'"

@@ -1,0 +1,282 @@
+"""The server of the operator's page: follows runs, sends every viewer what it lacks, and does what the operator asks for.
+
+A process of its own that only reads files: no viewer, slow, hung or hostile, can hold up a mission.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from alula.common.runs import NoRunError, runs_folder
+from alula.common.scenarios import scenario_names
+from alula.console import acts, commands, journal
+from alula.console.admission import Admission
+from alula.console.feed import Feed, place_of
+from alula.console.page import REPORT, make_page
+
+FEED = "/feed"
+STATUS_S = 0.3
+"""A viewer that hears nothing for longer than a second knows that what it shows is old."""
+STUCK_S = 5.0
+"""A viewer that takes nothing for so long is dropped; it comes back by itself and is sent what it lacks."""
+HELLO_S = 5.0
+MAX_VIEWERS = 64
+MAX_MESSAGE_BYTES = 1 << 14
+MAX_COMMANDS_PER_S = 10
+LOOK_S = 0.5
+SHOWN_RUNS = 20
+
+
+@dataclass(eq=False)
+class Viewer:
+    """A connection that watches. ``key`` is its own secret: a connection that comes back with it is the same viewer."""
+
+    connection: ServerConnection
+    key: str
+    name: str
+    run: str = ""
+    hands: bool = False
+    """Whether skills by hand are looked at."""
+    commands: list[float] = field(default_factory=list)
+
+
+class Console:
+    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest."""
+
+    def __init__(self, admission: Admission, *, fixed: Path | None = None) -> None:
+        self._admission = admission
+        self._fixed = fixed
+        self._offers = {"scenarios": scenario_names(), "worlds": acts.world_names(), "vehicles": acts.VEHICLES}
+        self._page = make_page(title="Alula", entries=None).encode()
+        self._feeds: dict[Path, tuple[Feed, asyncio.Task[None]]] = {}
+        self._viewers: set[Viewer] = set()
+        self._commander = ""
+        self._runs: list[Path] = []
+        self._live: set[Path] = set()
+        self._starting = asyncio.Lock()
+        self._commands = commands.Commands()
+        self._by_hand: dict[Path, str] = {}
+        self._answering: set[asyncio.Task[None]] = set()
+
+    @contextlib.asynccontextmanager
+    async def open(self) -> Any:
+        """Serve as long as the context lasts."""
+        server: Server
+        looking = [asyncio.create_task(job) for job in (self._look_for_runs(), self._look_at_skills())]
+        async with serve(
+            self._serve_viewer,
+            self._admission.host,
+            self._admission.port,
+            process_request=self._answer,
+            max_size=MAX_MESSAGE_BYTES,
+            write_limit=1 << 18,
+            open_timeout=3,  # browsers open connections ahead of need
+            close_timeout=1,
+            compression=None,  # it would take the event loop's time, and most viewers are on this machine
+            server_header=None,
+        ) as server:
+            try:
+                yield server
+            finally:
+                for task in [*looking, *(task for _, task in self._feeds.values())]:
+                    task.cancel()
+                await asyncio.to_thread(self._commands.hands_off, set())
+
+    # --- pages ---------------------------------------------------------------------------------------------------------
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request for a page; None lets a WebSocket be opened."""
+        path = unquote(urlsplit(request.path).path)
+        headers = request.headers
+        socket = path == FEED
+        refusal = self._admission.refusal(target=request.path, host=headers.get("Host"), origin=headers.get("Origin"), socket=socket)
+        if refusal:
+            return self._page_of(HTTPStatus.FORBIDDEN, f"{refusal}\n".encode(), "text/plain; charset=utf-8")
+        if socket:
+            full = len(self._viewers) >= MAX_VIEWERS
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many viewers\n") if full else None
+        if path == "/":
+            return self._page_of(HTTPStatus.OK, self._page, "text/html; charset=utf-8")
+        return self._report(path)
+
+    def _report(self, path: str) -> Response:
+        run = next((folder for folder in self._runs if path == f"/runs/{folder.name}/{REPORT}"), None)
+        if run is None or not (run / REPORT).is_file():
+            return self._page_of(HTTPStatus.NOT_FOUND, b"there is no such page\n", "text/plain; charset=utf-8")
+        # In a sandbox, a page of a run has an origin of its own: nothing in it can command.
+        return self._page_of(HTTPStatus.OK, (run / REPORT).read_bytes(), "text/html; charset=utf-8", policy="sandbox allow-scripts")
+
+    def _page_of(self, status: HTTPStatus, body: bytes, kind: str, *, policy: str = "frame-ancestors 'none'") -> Response:
+        headers = Headers(
+            {
+                "Content-Type": kind,
+                "Content-Length": str(len(body)),
+                "Content-Security-Policy": policy,
+                "X-Content-Type-Options": "nosniff",
+                "Referrer-Policy": "no-referrer",
+                "Cache-Control": "no-store",
+                "Connection": "close",
+            }
+        )
+        return Response(status.value, status.phrase, headers, body)
+
+    # --- runs ----------------------------------------------------------------------------------------------------------
+
+    async def _look_for_runs(self) -> None:
+        while True:
+            self._runs = await asyncio.to_thread(commands.runs_in, runs_folder(), self._fixed)
+            self._live = await asyncio.to_thread(lambda: {run for run in self._runs[:SHOWN_RUNS] if commands.is_live(run)})
+            await asyncio.sleep(LOOK_S)
+
+    async def _look_at_skills(self) -> None:
+        """Keep an eye on the skillsets of the runs whose viewers look at them, and on no others: listening costs."""
+        while True:
+            watched = {run for viewer in self._viewers if viewer.hands and (run := self._run_of(viewer)) in self._live}
+            self._by_hand = {run: await asyncio.to_thread(self._seen_by_hand, run) for run in watched}
+            await asyncio.to_thread(self._commands.hands_off, watched)
+            await asyncio.sleep(STATUS_S)
+
+    def _seen_by_hand(self, run: Path) -> str:
+        try:
+            shown = self._commands.hands_on(run).describe()
+        except Exception as error:  # noqa: BLE001 - whatever a skillset says, the next look may be better
+            shown = {"problems": [f"{type(error).__name__}: {error}"], "skillsets": []}
+        return json.dumps({"hands": {"run": run.name, **shown}})
+
+    def _run_of(self, viewer: Viewer) -> Path | None:
+        """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
+        chosen = next((folder for folder in self._runs if folder.name == viewer.run), None)
+        return chosen or self._fixed or (self._runs[0] if self._runs else None)
+
+    def _feed(self, folder: Path) -> Feed:
+        if folder not in self._feeds:
+            feed = Feed(folder)
+            self._feeds[folder] = (feed, asyncio.create_task(feed.follow()))
+        return self._feeds[folder][0]
+
+    # --- viewers -------------------------------------------------------------------------------------------------------
+
+    async def _serve_viewer(self, connection: ServerConnection) -> None:
+        with contextlib.suppress(ConnectionClosed, TimeoutError, ValueError):
+            hello = _object(await asyncio.wait_for(connection.recv(), HELLO_S))
+            viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "a viewer")[:40])
+            viewer.run, viewer.hands = str(hello.get("run") or ""), hello.get("hands") is True
+            self._viewers.add(viewer)
+            self._commander = self._commander or viewer.key
+            sending = asyncio.create_task(self._send(viewer, hello))
+            try:
+                async for message in connection:
+                    await self._obey(viewer, _object(message))
+            finally:
+                sending.cancel()
+                self._viewers.discard(viewer)
+
+    async def _send(self, viewer: Viewer, hello: Mapping[str, Any]) -> None:
+        """Send what the viewer lacks, and how things are, until it is gone."""
+        place, due = place_of(hello), 0.0
+        clock = asyncio.get_running_loop().time
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                run = self._run_of(viewer)
+                feed = None if run is None else self._feed(run)
+                changed = asyncio.Event() if feed is None else feed.changed
+                text = None if feed is None else feed.message(place)
+                try:
+                    if text is not None:
+                        await asyncio.wait_for(viewer.connection.send(text), STUCK_S)
+                    if clock() >= due:
+                        due = clock() + STATUS_S
+                        await asyncio.wait_for(viewer.connection.send(json.dumps({"status": self._status(viewer, run, feed)})), STUCK_S)
+                        if viewer.hands and run in self._by_hand:
+                            await asyncio.wait_for(viewer.connection.send(self._by_hand[run]), STUCK_S)
+                except TimeoutError:
+                    viewer.connection.transport.abort()
+                    return
+                if text is None:
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(changed.wait(), max(0.0, due - clock()))
+
+    def _status(self, viewer: Viewer, run: Path | None, feed: Feed | None) -> dict[str, Any]:
+        commander = next((other.name for other in self._viewers if other.key == self._commander), "")
+        return {
+            "run": "" if run is None else run.name,
+            "live": run in self._live,
+            "report": run is not None and (run / REPORT).is_file(),
+            "runs": [folder.name for folder in self._runs[:SHOWN_RUNS]],
+            **self._offers,
+            "commands": viewer.key == self._commander,
+            "commander": commander,
+            "viewers": len(self._viewers),
+            "problems": [] if feed is None else feed.problems,
+        }
+
+    # --- commands ------------------------------------------------------------------------------------------------------
+
+    async def _obey(self, viewer: Viewer, asked: Mapping[str, Any]) -> None:
+        clock = asyncio.get_running_loop().time()
+        viewer.commands = [stamp for stamp in viewer.commands if clock - stamp < 1.0] + [clock]
+        if len(viewer.commands) > MAX_COMMANDS_PER_S:
+            await viewer.connection.close(1008, "too many commands")
+            return
+        if "watch" in asked:
+            viewer.run = str(asked["watch"])[:200]
+        elif "hands" in asked:
+            viewer.hands = asked["hands"] is True
+        else:  # beside one another: a skill that is slow to answer must not keep its operator from landing
+            answering = asyncio.create_task(self._answer_command(viewer, str(asked.get("command")), asked))
+            self._answering.add(answering)
+            answering.add_done_callback(self._answering.discard)
+
+    async def _answer_command(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> None:
+        try:
+            answer = await self._do(viewer, command, asked)
+        except (acts.ActError, NoRunError, OSError, KeyError) as error:
+            answer = f"refused: {error}"
+        started = viewer.run if command == "start" else ""
+        with contextlib.suppress(ConnectionClosed):
+            await viewer.connection.send(json.dumps({"answer": answer, "command": command, "started": started}))
+
+    async def _do(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> str:
+        run = self._run_of(viewer)
+        if command == "take":
+            self._commander = viewer.key
+            self._note(run, viewer, command, "commands now")
+            return "you command now"
+        if viewer.key != self._commander:
+            raise acts.ActError("you watch; take over first")
+        async with self._starting if command == "start" else contextlib.nullcontext():
+            done = await asyncio.to_thread(self._commands.do, command, asked, run)
+        if command == "start":
+            viewer.run = done.run.name
+        if done.noted:
+            self._note(done.run, viewer, done.what, done.answer)
+        return done.answer
+
+    def _note(self, run: Path | None, viewer: Viewer, command: str, answer: str) -> None:
+        if run is None or not run.is_dir():
+            return
+        stamp_s = self._feed(run).last_s
+        with contextlib.suppress(OSError):  # a disk that is full ends the record, not the command
+            journal.note(run, stamp_s, {"command": command, "by": viewer.name, "answer": answer})
+
+
+def _object(message: str | bytes) -> dict[str, Any]:
+    """Return a message's object; raise ValueError when it holds none."""
+    value = json.loads(message)
+    if not isinstance(value, dict):
+        raise ValueError("a message is a JSON object")  # noqa: TRY004 - as for what is no JSON at all
+    return value

@@ -1,0 +1,127 @@
+"""What failed in a run, what followed from each fault, and what the mission did about it (see ``alula.records.causes``)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypedDict
+
+from alula.common.faults import MENDED, FaultChange, parse_fault
+from alula.common.scenarios import Scenario
+from alula.records.causes.answers import Answer, answer_to_fault
+from alula.records.causes.faults import Fault, Traced, faults_asked, trace
+from alula.records.causes.reach import Reaches
+from alula.report.deaths import DIED
+from alula.report.facts import RunFacts
+from alula.report.history import History
+from alula.report.observed import Observed
+from alula.report.phases import Phases
+from alula.runtime.core.events import EngineEvent, TransitionEvent
+
+
+@dataclass(frozen=True)
+class FaultAnswer:
+    """A fault, what followed from it, and the recovery's seconds; ``mode`` is empty where it is not known in which way it failed."""
+
+    what: str
+    mode: str
+    traced: Traced
+    answer: Answer
+    after_s: float | None
+
+
+class AnswerSummary(TypedDict):
+    """A fault, a process that died, or the radio that ended the video, and what followed from it (``alula.records.causes``).
+
+    ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the
+    executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table of a campaign.
+    """
+
+    sensor: str
+    mode: str
+    t_s: float | None
+    until_s: float | None
+    detected_s: float | None
+    detected_by: str
+    failed: list[str]
+    answered_by: str
+    skill: str
+    after_s: float | None
+
+
+Known = tuple[FaultChange, Fault]
+"""What failed as it is told, and as a cause."""
+
+
+def injected(observed: Observed) -> tuple[FaultChange, ...]:
+    """Return what was broken, in the order of time."""
+    return tuple(change for change in observed.all_faults if change.mode != MENDED)
+
+
+def known_faults(
+    facts: RunFacts, scenario: Scenario, history: History, observed: Observed, phases: Phases, reaches: Reaches
+) -> list[Known]:
+    """Return every fault of the run that is known by what was asked for and recorded, and every process that died."""
+    return [*_told(observed, reaches), *_asked(facts, scenario, history, phases, reaches), *_died(facts, scenario, observed, reaches)]
+
+
+def find_answers(known: Sequence[Known], history: History) -> tuple[FaultAnswer, ...]:
+    """Return every fault with its answer, in the order of time."""
+    known = sorted(known, key=lambda one: one[1].at_s)
+    found = []
+    for (change, _), traced in zip(known, trace([fault for _, fault in known], history.events), strict=True):
+        answer, after_s = answer_to_fault(traced, history.events, history.places)
+        found.append(FaultAnswer(change.sensor, change.mode, traced, answer, after_s))
+    return tuple(found)
+
+
+def _told(observed: Observed, reaches: Reaches) -> Iterator[Known]:
+    """Yield what the recordings tell; a fault lasts until the next change of the same thing."""
+    for at, change in enumerate(observed.all_faults):
+        if change.mode != MENDED:
+            until_s = next((later.t_s for later in observed.all_faults[at + 1 :] if later.sensor == change.sensor), math.inf)
+            yield change, Fault(change.sensor, change.t_s, until_s, reaches.of(change.sensor))
+
+
+def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases, reaches: Reaches) -> Iterator[Known]:
+    """Yield what was asked for and no recording tells: in the simulator the radio's faults."""
+    if not facts.mock:
+        untold = dict(scenario.faults).keys() - dict(scenario.processes).keys()
+        requests = [request for request in map(parse_fault, facts.faults) if request.what in untold]
+        lift_off_s = phases.zero_s if phases.departed else None
+        for request, fault in faults_asked(requests, history.events, lift_off_s, reaches):
+            yield FaultChange(request.what, request.how, fault.at_s), fault
+
+
+def _died(facts: RunFacts, scenario: Scenario, observed: Observed, reaches: Reaches) -> Iterator[Known]:
+    """Yield the processes that ended without being told to, but for those that a fault has ended."""
+    nodes = dict(scenario.processes)
+    ended = {nodes.get(change.sensor) for change in observed.processes}
+    for death in facts.died:
+        if death["when_s"] is not None and death["name"] not in ended:
+            yield FaultChange(death["name"], DIED, death["when_s"]), Fault(death["name"], death["when_s"], reach=reaches.of(death["name"]))
+
+
+def summarise_answer(one: FaultAnswer, phases: Phases) -> AnswerSummary:
+    """Return a fault with its answer for ``summary.json``."""
+    fault = one.traced.fault
+    first = one.traced.first
+    return AnswerSummary(
+        sensor=one.what,
+        mode=one.mode,
+        t_s=phases.since(fault.at_s),
+        until_s=phases.since(fault.until_s) if math.isfinite(fault.until_s) else None,
+        detected_s=phases.since(one.traced.detected_s),
+        detected_by="" if first is None else _in_words(first),
+        failed=[failure.end.id for failure in one.traced.failures],
+        answered_by=one.answer.branch,
+        skill=one.answer.skill,
+        after_s=None if one.after_s is None else round(one.after_s, 3),
+    )
+
+
+def _in_words(event: EngineEvent) -> str:
+    if isinstance(event, TransitionEvent):
+        return f"{event.skillset}.{event.resource} {event.from_state} -> {event.to_state}"
+    return f"{event.skillset}.{event.skill} {event.state.value} {event.result}".rstrip()

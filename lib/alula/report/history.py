@@ -1,0 +1,151 @@
+"""From the events of all skillsets to executions of skills and transitions of resources.
+
+Each message on ``/events`` of ``skills.mcap`` is the record of an event (see ``alula.runtime.core.events``). Stamps become seconds
+since lift-off only when they are shown: here they are absolute seconds of mission clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from alula.common.record import EVENTS, Entry, RecordFollower
+from alula.model.execution_state import ExecutionState
+from alula.records.causes.told_ends import with_told_ends
+from alula.records.tree import Places, places_in
+from alula.report.files import Problems, mapping
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
+
+
+@dataclass(frozen=True)
+class PastExecution:
+    """A skill's execution from request to end; ``outcome`` is the last state seen, so RUNNING or REQUESTED if no end was."""
+
+    skillset: str
+    skill: str
+    id: str
+    inputs: dict[str, object]
+    start_s: float
+    running_s: float | None
+    end_s: float | None
+    outcome: str
+    result: str
+    message: str
+
+
+@dataclass(frozen=True)
+class History:
+    """Everything that happened in the skillsets, in the order of time."""
+
+    executions: tuple[PastExecution, ...] = ()
+    transitions: tuple[TransitionEvent, ...] = ()
+    events: tuple[EngineEvent, ...] = ()
+    places: Places = field(default_factory=Places)
+    """Where in the tree each execution was started."""
+    first_s: float | None = None
+    last_s: float | None = None
+
+    def of_skill(self, skill: str) -> list[PastExecution]:
+        """Return the executions of a skill, whatever skillset it belongs to."""
+        return [execution for execution in self.executions if execution.skill == skill]
+
+
+def read_history(path: Path, problems: Problems) -> History:
+    """Read ``skills.mcap``; a missing file, a missing end, what is no event and lost events are noted as problems.
+
+    Raises:
+        RecordError: the file is no record.
+    """
+    if not path.exists():
+        problems.note(f"{path.name} is missing: nothing is known of skills and resources")
+        return History()
+    record = RecordFollower(path)
+    entries = record.poll()
+    events = read_events(path, entries, problems)
+    if not record.ended:
+        problems.note(f"{path.name} was cut off{f': {record.broken}' if record.broken else ''}")
+    for sentence in gaps(events):
+        problems.note(f"{path.name}: {sentence}")
+    return fold(with_told_ends(events, entries), problems, places_in(entries))
+
+
+def read_events(path: Path, entries: Iterable[Entry], problems: Problems) -> list[EngineEvent]:
+    """Return the events of a record in the order of time; what is no event is noted as a problem."""
+    events: list[EngineEvent] = []
+    for number, entry in enumerate((entry for entry in entries if entry.topic == EVENTS), start=1):
+        try:
+            events.append(read_event(entry.value))
+        except ValueError as error:
+            problems.note(f"{path.name}: event {number} is no event ({error})")
+    return in_order(events)
+
+
+def in_order(events: Iterable[EngineEvent]) -> list[EngineEvent]:
+    """Sort by time, the order of arrival deciding between equals, and drop repetitions (latched topics are sent again)."""
+    seen: set[tuple[object, ...]] = set()
+    unique: list[EngineEvent] = []
+    for event in events:
+        key = (event.skillset, event.sequence, event.stamp_s, *_what(event))
+        if key not in seen:
+            seen.add(key)
+            unique.append(event)
+    return sorted(unique, key=lambda event: event.stamp_s)
+
+
+def _what(event: EngineEvent) -> tuple[str, ...]:
+    if isinstance(event, TransitionEvent):
+        return ("", event.resource, event.from_state, event.to_state)
+    return (event.skill, event.id, event.state.value)
+
+
+def gaps(events: Sequence[EngineEvent]) -> Iterator[str]:
+    """Yield a sentence for each hole in a skillset's numbering, which begins at 1 and again at 1 with each restart."""
+    last: dict[str, int] = {}
+    for event in events:
+        before = last.get(event.skillset, 0)
+        last[event.skillset] = max(before, event.sequence) if event.sequence != 1 else 1
+        if event.sequence > before + 1:
+            yield f"{event.skillset} lost {event.sequence - before - 1} events before {event.stamp_s:.2f} s of mission clock"
+
+
+def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | None = None) -> History:
+    """Put the events of each execution together. The first terminal state counts; another one is noted as a problem."""
+    executions: dict[tuple[str, str, str], PastExecution] = {}
+    transitions: list[TransitionEvent] = []
+    stamps: list[float] = []
+    for event in events:
+        stamps.append(event.stamp_s)
+        if isinstance(event, TransitionEvent):
+            transitions.append(event)
+            continue
+        key = (event.skillset, event.skill, event.id)
+        before = executions.get(key)
+        if before is not None and before.end_s is not None:
+            problems.note(f"{event.skillset}.{event.skill} {event.id}: {event.state.value} after its end as {before.outcome}")
+            continue
+        executions[key] = _advance(before or _begin(event), event)
+    return History(
+        executions=tuple(executions.values()),
+        transitions=tuple(transitions),
+        events=tuple(events),
+        places=places or Places(),
+        first_s=min(stamps, default=None),
+        last_s=max(stamps, default=None),
+    )
+
+
+def _begin(event: ExecutionEvent) -> PastExecution:
+    return PastExecution(event.skillset, event.skill, event.id, mapping(event.inputs), event.stamp_s, None, None, event.state.value, "", "")
+
+
+def _advance(execution: PastExecution, event: ExecutionEvent) -> PastExecution:
+    return replace(
+        execution,
+        inputs=execution.inputs or mapping(event.inputs),
+        running_s=event.stamp_s if event.state is ExecutionState.RUNNING and execution.running_s is None else execution.running_s,
+        end_s=event.stamp_s if event.state.terminal else None,
+        outcome=event.state.value,
+        result=event.result or execution.result,
+        message=event.message or execution.message,
+    )

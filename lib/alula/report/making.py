@@ -1,0 +1,128 @@
+"""The report's main flow: from what a run left in its folder to numbers, pictures and a page.
+
+1. the history of the skillsets, and what the robot's own recordings tell       4. the timeline
+2. when it departed, and when it was back                                        5. what the robot's part measures and draws
+3. what failed, and what the mission did about it                                6. the summary, and the page of it all
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from alula.common.files import write_aside, write_json
+from alula.common.record import FILE as RECORD
+from alula.common.scenarios import load_scenario
+from alula.console.entries import FAULT, Wire
+from alula.console.page import write_report
+from alula.records.causes.fault_file import reaches_of_robot
+from alula.records.causes.reach import Reaches
+from alula.report.answers import FaultAnswer, Known, find_answers, known_faults
+from alula.report.facts import RunFacts
+from alula.report.files import Problems
+from alula.report.history import History, read_history
+from alula.report.mock_account import MockSummary, read_mock
+from alula.report.observed import Observed
+from alula.report.part import Findings, ReportPart, Run, part_of_robot
+from alula.report.phases import Phases, find_phases
+from alula.report.recovery import Recovery, find_recovery
+from alula.report.summary import Summary, summarise
+from alula.report.timeline import Timeline, make_timeline
+from alula.report.timeline_picture import draw_timeline
+
+
+@dataclass(frozen=True)
+class Account:
+    """What happened in the skillsets, and what is known besides."""
+
+    observed: Observed
+    mock: MockSummary | None
+    phases: Phases
+    answers: tuple[FaultAnswer, ...]
+    recovery: Recovery | None
+
+
+def make_report(facts: RunFacts) -> Summary:
+    """Make ``timeline.json``, ``timeline.svg``, ``summary.json`` and ``report.html`` in the run's folder; return the summary.
+
+    The robot's part adds files and numbers of its own. Whatever is missing, cut off, makes no sense or can't be written is named in the
+    summary's ``problems``; numbers that depend on it are None.
+    """
+    run = _begin(facts)
+    part = part_of_robot(run)
+    account = _account(run, part)
+    timeline = _timeline(run, account)
+    findings = Findings()
+    with run.problems.survive("the robot's part of the report"):
+        findings = part.measure(account.phases, account.recovery, timeline)
+    # The numbers come behind the pictures, because they tell what went wrong with the rest.
+    summary = summarise(
+        facts,
+        history=run.history,
+        observed=account.observed,
+        phases=account.phases,
+        answers=account.answers,
+        recovery=account.recovery,
+        findings=findings,
+        mock=account.mock,
+        problems=run.problems,
+    )
+    _write_summary(run, summary)
+    _write_page(run, part, account, summary)
+    return summary
+
+
+def _begin(facts: RunFacts) -> Run:
+    problems, history = Problems(), History()
+    with problems.survive(RECORD):
+        history = read_history(facts.out_dir / RECORD, problems)
+    return Run(facts, load_scenario(facts.scenario), history, problems)
+
+
+def _account(run: Run, part: ReportPart) -> Account:
+    observed, mock = Observed(), None
+    if run.facts.mock:
+        observed, mock = read_mock(run.folder, run.problems)
+    else:
+        with run.problems.survive("the robot's recordings"):
+            observed = part.observe(run)
+    phases = find_phases(run.history, observed)
+    reaches = Reaches()
+    with run.problems.survive("what faults can bring about"):
+        reaches = reaches_of_robot()
+    known: list[Known] = known_faults(run.facts, run.scenario, run.history, observed, phases, reaches)
+    with run.problems.survive("what else failed"):
+        known += part.failures(phases, [fault for _, fault in known], reaches)
+    answers = find_answers(known, run.history)
+    recovery = find_recovery(run.scenario, run.history, observed, phases, answers)
+    return Account(observed, mock, phases, answers, recovery)
+
+
+def _timeline(run: Run, account: Account) -> Timeline | None:
+    timeline: Timeline | None = None
+    with run.problems.survive("timeline"):
+        timeline = made = make_timeline(run.history, account.phases, account.recovery)
+        write_json(run.folder / "timeline.json", made)
+        write_aside(run.folder / "timeline.svg", lambda aside: draw_timeline(made, aside, title=run.title))
+    return timeline
+
+
+def _write_page(run: Run, part: ReportPart, account: Account, summary: Summary) -> None:
+    """Write the page, of all that is in the folder by now."""
+    problems = Problems()
+    with problems.survive("report.html"):
+        write_report(run.folder, [*fault_entries(account.observed), *part.entries()], title=run.title)
+    if problems.sentences:
+        summary["problems"] = [*summary["problems"], *problems.sentences]
+        _write_summary(run, summary)
+
+
+def fault_entries(observed: Observed) -> list[Wire]:
+    """Return what the page is told of things that failed and worked again."""
+    return [(FAULT, round(fault.t_s, 3), {"sensor": fault.sensor, "mode": fault.mode}) for fault in observed.all_faults]
+
+
+def _write_summary(run: Run, summary: Summary) -> None:
+    try:
+        write_json(run.folder / "summary.json", summary)
+    except OSError as error:
+        summary["problems"].append(f"summary.json could not be written: {error.strerror or error}")

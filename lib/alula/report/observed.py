@@ -1,0 +1,64 @@
+"""What is known of a run besides the events of its skillsets: from the robot's own recordings, the supervisor, or mocks."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from alula.common.faults import FaultChange
+from alula.report.files import finite, mapping, sequence
+
+PROCESS_FAULTS = "process_faults.jsonl"
+"""What the supervisor did to processes, a line each."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Times are absolute seconds of mission clock.
+
+    Attributes:
+        departed_s: when the robot departed, by ``departed_by``, where something but the skillsets tells it.
+        first_s: when the recordings begin; ``last_s``: when they end.
+        back_s: when it was back in its state of departure, where something but the skillsets tells it.
+        is_back: whether it was said to be there last; None: not said.
+        faults: what a simulator or mocks broke and mended; ``tells_faults``: they tell all of them.
+        processes: what the supervisor did to processes.
+        moving_again: returns when the robot moves again from a time on, None: never; None where its motion is not known.
+    """
+
+    departed_s: float | None = None
+    departed_by: str = ""
+    first_s: float | None = None
+    last_s: float | None = None
+    back_s: float | None = None
+    is_back: bool | None = None
+    faults: tuple[FaultChange, ...] = ()
+    tells_faults: bool = False
+    processes: tuple[FaultChange, ...] = ()
+    moving_again: Callable[[float], float | None] | None = None
+
+    @property
+    def all_faults(self) -> tuple[FaultChange, ...]:
+        """What was broken and mended, in the order of time."""
+        return tuple(sorted((*self.faults, *self.processes), key=lambda change: change.t_s))
+
+
+def read_process_faults(folder: Path) -> tuple[FaultChange, ...]:
+    """Read what the supervisor did to processes, as far as it is whole; nothing where it did nothing."""
+    path, lines = folder / PROCESS_FAULTS, []
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        with contextlib.suppress(ValueError):
+            lines.append(json.loads(line))
+    return tuple(fault_changes(lines))
+
+
+def fault_changes(value: object) -> Iterator[FaultChange]:
+    """Yield what failed and what worked again, as it was written, as far as it makes sense."""
+    for entry in sequence(value):
+        values = mapping(entry)
+        t_s = finite(values.get("t_s"))
+        if t_s is not None:
+            yield FaultChange(str(values.get("sensor", "")), str(values.get("mode", "")), t_s)

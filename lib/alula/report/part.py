@@ -1,0 +1,107 @@
+"""What a robot adds to the report of its runs: its part ``report`` in ``robot.yaml``, a class that is made once a report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from alula.common.faults import FaultChange
+from alula.common.robots import find_robot
+from alula.common.scenarios import Scenario
+from alula.records.causes.faults import Fault
+from alula.records.causes.reach import Reaches
+from alula.report.facts import RunFacts
+from alula.report.files import Problems
+from alula.report.history import History
+from alula.report.observed import Observed, read_process_faults
+from alula.report.phases import Phases
+from alula.report.recovery import Recovery
+from alula.report.timeline import Timeline
+
+Entry = tuple[str, float | None, object]
+"""An entry of the page: topic, seconds of mission clock, value."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a report is about."""
+
+    facts: RunFacts
+    scenario: Scenario
+    history: History
+    problems: Problems
+
+    @property
+    def folder(self) -> Path:
+        """Where it left its files."""
+        return self.facts.out_dir
+
+    @property
+    def title(self) -> str:
+        """Return what stands above its pictures."""
+        facts = self.facts
+        failing = f", failing {', '.join(facts.faults)}" if facts.faults else ""
+        if facts.replay_of:
+            return f"{facts.scenario}{failing}, replay of {facts.replay_of}"
+        return f"{facts.scenario}, seed {facts.seed}{failing}{', over mocks' if facts.mock else ''}"
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the parts of a report have found. ``landed``: came back as far as more is known than the skillsets tell; None: nothing more."""
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+    """What goes into ``summary.json`` besides what every run has."""
+    landed: bool | None = None
+
+
+class ReportPart(Protocol):
+    """A robot's part of a report; its methods are called once each, in this order. Errors become problems of the report."""
+
+    def observe(self, run: Run) -> Observed:
+        """Read the robot's own recordings; not called of a run over mocks."""
+        ...
+
+    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:
+        """Return what else failed, by the recordings, than is known by now."""
+        ...
+
+    def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:
+        """Measure what is left, and draw the robot's pictures into the run's folder."""
+        ...
+
+    def entries(self) -> Iterable[Entry]:
+        """Return what the page gets besides what lies in the run's folder."""
+        ...
+
+
+class NoPart:
+    """The report of a robot that adds nothing."""
+
+    def observe(self, run: Run) -> Observed:
+        """Know what the supervisor did."""
+        return Observed(processes=read_process_faults(run.folder))
+
+    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
+        """Find nothing."""
+        return ()
+
+    def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
+        """Measure nothing."""
+        return Findings()
+
+    def entries(self) -> Iterable[Entry]:
+        """Add nothing."""
+        return ()
+
+
+def part_of_robot(run: Run) -> ReportPart:
+    """Make the robot's part; what its file names has to be importable, else that is a problem of the report."""
+    part: ReportPart = NoPart()
+    with run.problems.survive("the robot's part of the report"):
+        make = find_robot().part("report")
+        if make is not None:
+            part = make(run)
+    return part

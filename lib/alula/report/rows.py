@@ -1,0 +1,63 @@
+"""Executions and transitions of a run as rows of its summary; times are seconds since the departure."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+from alula.report.history import History
+from alula.report.phases import Phases
+
+
+class SkillSummary(TypedDict):
+    """One execution; ``outcome`` RUNNING or REQUESTED: its end was never seen."""
+
+    skillset: str
+    skill: str
+    id: str
+    inputs: dict[str, object]
+    start_s: float | None
+    running_s: float | None
+    end_s: float | None
+    outcome: str
+    result: str
+    message: str
+
+
+ResourceSummary = TypedDict(
+    "ResourceSummary",
+    {"t_s": float | None, "skillset": str, "resource": str, "from": str, "to": str, "cause": str},
+)
+
+
+def skills(history: History, phases: Phases) -> list[SkillSummary]:
+    """Return the executions in the order of their requests."""
+    return [
+        SkillSummary(
+            skillset=execution.skillset,
+            skill=execution.skill,
+            id=execution.id,
+            inputs=execution.inputs,
+            start_s=phases.since(execution.start_s),
+            running_s=phases.since(execution.running_s),
+            end_s=phases.since(execution.end_s),
+            outcome=execution.outcome,
+            result=execution.result,
+            message=execution.message,
+        )
+        for execution in history.executions
+    ]
+
+
+def resources(history: History, phases: Phases) -> list[ResourceSummary]:
+    """Return the transitions in the order of time."""
+    return [
+        {
+            "t_s": phases.since(change.stamp_s),
+            "skillset": change.skillset,
+            "resource": change.resource,
+            "from": change.from_state,
+            "to": change.to_state,
+            "cause": change.cause,
+        }
+        for change in history.transitions
+    ]

@@ -1,0 +1,161 @@
+"""``summary.json``: one run in numbers. Times are seconds since the departure, rounded to the millisecond; null is "not known"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypedDict
+
+from alula.common.faults import parse_fault
+from alula.common.scenarios import load_scenario
+from alula.report.answers import FaultAnswer, injected, summarise_answer
+from alula.report.facts import Death, RunFacts
+from alula.report.files import Problems, ReportError, mapping, read_json, sequence
+from alula.report.history import History
+from alula.report.mock_account import MockSummary
+from alula.report.observed import Observed
+from alula.report.part import Findings
+from alula.report.phases import Phases, home, status_changes
+from alula.report.recovery import Recovery
+from alula.report.rows import resources, skills
+
+OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "running"})
+
+
+class RecoverySummary(TypedDict):
+    """See `recovery`."""
+
+    failure_s: float | None
+    detected_s: float | None
+    fallback_running_s: float | None
+    moving_again_s: float | None
+
+
+class InjectedFault(TypedDict):
+    """A sensor that the simulator broke."""
+
+    sensor: str
+    mode: str
+    t_s: float | None
+
+
+class LiftOff(TypedDict):
+    """The origin of all times: its absolute stamp of mission clock, and what it was read from."""
+
+    stamp_s: float
+    source: str
+
+
+Summary = dict[str, Any]
+"""The whole file: what every run has (``summarise``), and what the robot's part of the report adds."""
+
+
+def read_outcome(facts: RunFacts, problems: Problems) -> tuple[str | None, str | None]:
+    """Return the mission's outcome and its reason as ``mission.json`` gives them."""
+    outcome: str | None = None
+    reason: str | None = None
+    with problems.survive("mission.json"):
+        values = mapping(read_json(facts.out_dir / "mission.json"))
+        outcome, reason = (str(values[name]) if values.get(name) is not None else None for name in ("outcome", "reason"))
+        for problem in sequence(values.get("problems")):
+            problems.note(str(problem))
+        if outcome not in OUTCOMES:
+            problems.note(f"mission.json names no outcome that is known: {outcome}")
+            outcome = None
+    if outcome == "running":
+        problems.note(
+            "the replay stopped before the mission's end" if facts.replay_of else "the mission's process ended before the mission did"
+        )
+    return outcome, reason or None
+
+
+def read_bridge(facts: RunFacts, problems: Problems) -> dict[str, object] | None:
+    """Return the bridge's statistics, topic by topic."""
+    statistics: object = None
+    with problems.survive("bridge.json"):
+        statistics = mapping(read_json(facts.out_dir / "bridge.json")).get("topics")
+        if not isinstance(statistics, dict):
+            raise ReportError("bridge.json holds no statistics of topics")
+    return mapping(statistics) or None
+
+
+def came_back(history: History, observed: Observed, phases: Phases) -> bool | None:
+    """Tell whether the robot is said to be back in its state of departure; None: it never departed, or nothing is said."""
+    place = home()
+    if not phases.departed or place is None:
+        return None
+    said = [] if observed.is_back is None else [observed.is_back]
+    said += [change.to_state == place[1] for change in status_changes(history)[-1:]]
+    return any(said) if said else None
+
+
+def duration_s(history: History, observed: Observed, phases: Phases) -> float | None:
+    """Return seconds from the departure until the robot was back, or to the last thing that was recorded if it never was."""
+    if not phases.departed:
+        return None
+    ends = [history.last_s, observed.last_s]
+    end_s = phases.back_s or max((end for end in ends if end is not None), default=None)
+    return phases.since(end_s)
+
+
+def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
+    """Say what the numbers alone would hide: a run without a departure, faults that never came."""
+    if not phases.departed:
+        problems.note(f"no lift-off is known: times count from {phases.zero_from}")
+    broken = {fault.sensor for fault in injected(observed)}
+    scenario = load_scenario(facts.scenario)
+    others = dict(scenario.faults).keys() - dict(scenario.processes).keys()  # the radio's: nothing of them is in the bag
+    for fault in facts.faults:
+        what = parse_fault(fault).what
+        if observed.tells_faults and what not in others and what not in broken:
+            problems.note(f"the fault {fault} never happened")
+
+
+def summarise(
+    facts: RunFacts,
+    *,
+    history: History,
+    observed: Observed,
+    phases: Phases,
+    answers: Sequence[FaultAnswer],
+    recovery: Recovery | None,
+    findings: Findings,
+    problems: Problems,
+    mock: MockSummary | None = None,
+) -> Summary:
+    """Put everything together."""
+    outcome, reason = read_outcome(facts, problems)
+    bridge = None if facts.mock else read_bridge(facts, problems)
+    note_doubts(facts, observed, phases, problems)
+    return {
+        "scenario": facts.scenario,
+        "outcome": outcome,
+        "reason": reason,
+        "landed": came_back(history, observed, phases) if findings.landed is None else findings.landed,
+        "seed": facts.seed,
+        "duration_s": duration_s(history, observed, phases),
+        "skills": skills(history, phases),
+        "resources": resources(history, phases),
+        "recovery": _recovery(recovery, phases),
+        "bridge": bridge,
+        "faults": list(facts.faults),
+        "injected": [InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(observed)],
+        "answers": [summarise_answer(one, phases) for one in answers],
+        "died": [Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],
+        "mission_exit": facts.mission_exit,
+        "conformance": None if facts.conformance is None else dict(facts.conformance),
+        "mock": mock,
+        "lift_off": LiftOff(stamp_s=phases.zero_s, source=phases.zero_from),
+        **findings.values,
+        "problems": problems.sentences,
+    }
+
+
+def _recovery(recovery: Recovery | None, phases: Phases) -> RecoverySummary | None:
+    if recovery is None:
+        return None
+    return RecoverySummary(
+        failure_s=phases.since(recovery.failure_s),
+        detected_s=phases.since(recovery.detected_s),
+        fallback_running_s=phases.since(recovery.fallback_running_s),
+        moving_again_s=phases.since(recovery.moving_again_s),
+    )

@@ -1,0 +1,127 @@
+"""The last lines of a flight: how it went, in words and numbers, and where the pictures are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from alula.report.deaths import DIED, Death
+
+MEANING = {
+    "accomplished": "mission accomplished",
+    "degraded": "mission accomplished in degraded mode",
+    "given_up": "mission given up",
+    "aborted": "mission aborted by the operator",
+    "not_started": "the mission could not start",
+    "running": "the mission's process ended before the mission did",
+}
+BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
+PICTURES = ("report.html", "timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
+
+
+def number(value: float | None, unit: str, digits: int = 2) -> str:
+    """Return ``1.23 m``, or ``unknown``."""
+    return "unknown" if value is None else f"{value:.{digits}f} {unit}".rstrip()
+
+
+def landed(summary: Mapping[str, Any]) -> str:
+    """Return whether it came down well, in words; nothing is said of what is not known to have flown."""
+    if summary.get("crash"):
+        return f"no, it crashed: {summary['crash']}"
+    return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
+
+
+def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> str:
+    """Return how the mission ended, in words; where its files are lost, by the exit code of its process, or by what died."""
+    outcome, code, reason = summary.get("outcome"), summary.get("mission_exit"), summary.get("reason")
+    if outcome is not None:
+        return MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")
+    if code in BY_EXIT_CODE and all(death.respawned for death in died):  # else it may be the supervisor's
+        return f"{MEANING[BY_EXIT_CODE[code]]} (by its exit code; its own account is lost)"
+    names = ", ".join(dict.fromkeys(death.name for death in died))
+    return f"the mission came to no outcome: {f'{names} died' if names else 'the run ended early'}; {out / 'logs'} tells why"
+
+
+def death_lines(died: Sequence[Death]) -> list[str]:
+    """Return how each process died the last time, and how often it did."""
+    last = {death.name: death for death in died}
+    times = {name: sum(death.name == name for death in died) for name in last}
+    return [f"  {death.sentence()}" + (f" ({times[name]} times in all)" if times[name] > 1 else "") for name, death in last.items()]
+
+
+def flight_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what a flight through a world was."""
+    chart = summary.get("map") or {}
+    coverage, collisions = chart.get("coverage"), summary.get("collisions")
+    lines = [
+        f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}, "
+        f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {'unknown' if collisions is None else collisions}, "
+        f"nearest surface {number(summary.get('min_clearance_m'), 'm')}"
+    ]
+    if summary.get("video"):
+        return [*lines, video_line(summary["video"])]
+    if chart.get("points") is None:
+        return [*lines, "  map: none"]
+    return [
+        *lines,
+        f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
+        f"coverage {number(None if coverage is None else 100 * coverage, '%', 1)}",
+    ]
+
+
+def video_line(video: Mapping[str, Any]) -> str:
+    """Return what the telepilot saw."""
+    return (
+        f"  video: at least {number(video.get('min_fps'), 'frames a second', 0)}, SSIM {number(video.get('mean_ssim'), '', 3)} "
+        f"(least {number(video.get('min_ssim'), '', 3)}), delay {number(video.get('p95_delay_s'), 's')} (95 %), "
+        f"{video.get('freezes')} freezes, {video.get('adaptations')} adaptations, criterion missed: {video.get('criterion') or 'none'}"
+    )
+
+
+def mock_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Return what a flight over mocks was; there is no world to collide with or to map."""
+    mock = summary["mock"]
+    return [
+        f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}; "
+        f"flown over mocks in {number(mock.get('wall_s'), 's')}, {number(mock.get('factor'), 'times faster than the clock', 0)}"
+    ]
+
+
+def what_failed(summary: Mapping[str, Any]) -> str:
+    """Return what the vehicle had to recover from."""
+    failure_s = summary["recovery"]["failure_s"]
+    sensor, mode = next(((one["sensor"], one["mode"]) for one in summary["answers"] if one["t_s"] == failure_s), ("sensor", ""))
+    return f"{sensor} {DIED if mode == DIED else 'lost' if sensor == 'radio' else 'failed'}"
+
+
+def conformance_lines(found: Mapping[str, Any]) -> list[str]:
+    """Return what the monitor has to say."""
+    if found["conforms"]:
+        return [f"  monitor: all {found['events']} events conform to the models"]
+    told = [
+        f"{one['skillset']} event {one['sequence']} at {one['stamp_s']:.3f} s: {one['event']}: {one['why']}" for one in found["findings"]
+    ]
+    return [f"  monitor: does not conform: {one}" for one in told]
+
+
+def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
+    """Return the verdict, a line each."""
+    lines = ["", outcome_words(summary, died, out), *death_lines(died)]
+    if summary.get("mock"):
+        lines += mock_lines(summary)
+    elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known to have flown
+        lines += flight_lines(summary)
+    recovery = summary.get("recovery") or {}
+    if recovery.get("failure_s") is not None:
+        failure = recovery["failure_s"]
+        steps = [f"{what_failed(summary)} at {failure:.2f} s"]
+        for key, words in (("detected_s", "detected"), ("fallback_running_s", "fallback running"), ("moving_again_s", "moving again")):
+            if recovery.get(key) is not None:
+                steps.append(f"{words} {recovery[key] - failure:.2f} s later")
+        lines.append("  recovery: " + ", ".join(steps))
+    if summary.get("conformance") is not None:
+        lines += conformance_lines(summary["conformance"])
+    lines += [f"  problem: {problem}" for problem in summary.get("problems") or ()]
+    lines += [f"  {out / name}" for name in PICTURES if (out / name).exists()]
+    return lines

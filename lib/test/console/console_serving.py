@@ -1,0 +1,110 @@
+"""A console that is served, and clients that talk to it over real sockets on loopback."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from websockets.asyncio.client import ClientConnection, connect
+
+from alula.common.network import free_port
+from alula.console.admission import Admission
+from alula.console.server import FEED, Console
+
+WAIT_S = 60.0
+
+
+class Bench:
+    """A console that is served, and its address."""
+
+    def __init__(self, port: int, token: str = "") -> None:
+        self.base = f"127.0.0.1:{port}"
+        self.token = token
+
+    async def viewer(self, key: str, **hello: object) -> ClientConnection:
+        connection = await connect(f"ws://{self.base}{FEED}?token={self.token}", origin=f"http://{self.base}", max_size=None)  # type: ignore[arg-type]
+        await connection.send(json.dumps({"key": key, "name": key, **hello}))
+        return connection
+
+    async def get(self, path: str, **headers: str) -> tuple[int, str]:
+        return await asyncio.to_thread(self._get, path, headers)
+
+    def _get(self, path: str, headers: dict[str, str]) -> tuple[int, str]:
+        try:
+            with urllib.request.urlopen(urllib.request.Request(f"http://{self.base}{path}", headers=headers), timeout=WAIT_S) as answer:
+                return answer.status, answer.read().decode()
+        except urllib.error.HTTPError as error:
+            return error.code, error.read().decode()
+
+
+def serve(play: Callable[[Bench], Awaitable[None]], *, token: str = "", fixed: Path | None = None) -> None:
+    """Serve a console, and play a story against it."""
+
+    async def story() -> None:
+        bench = Bench(free_port(), token)
+        async with Console(Admission("127.0.0.1", int(bench.base.rpartition(":")[2]), token), fixed=fixed).open():
+            await asyncio.wait_for(play(bench), 3 * WAIT_S)
+
+    asyncio.run(story())
+
+
+async def heard(viewer: ClientConnection, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    """Return the first message that is as wanted."""
+    async with asyncio.timeout(WAIT_S):
+        while True:
+            message = json.loads(await viewer.recv())
+            if wanted(message):
+                return dict(message)
+
+
+async def answer_to(viewer: ClientConnection, **asked: object) -> str:
+    await viewer.send(json.dumps(asked))
+    return str((await heard(viewer, lambda message: "answer" in message))["answer"])
+
+
+class Served:
+    """A console in a thread of its own, which can be stopped and started."""
+
+    def __init__(self, fixed: Path) -> None:
+        self._fixed, self.port = fixed, free_port()
+        self._stop: Callable[[], None] = lambda: None
+
+    def start(self) -> None:
+        up = threading.Event()
+
+        async def main() -> None:
+            over = asyncio.Event()
+            loop = asyncio.get_running_loop()
+            self._stop = lambda: loop.call_soon_threadsafe(over.set)
+            async with Console(Admission("127.0.0.1", self.port, ""), fixed=self._fixed).open():
+                up.set()
+                await over.wait()
+
+        self._thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
+        self._thread.start()
+        assert up.wait(WAIT_S)
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}/"
+
+    def stop(self) -> None:
+        self._stop()
+        self._thread.join(WAIT_S)
+
+
+@contextlib.contextmanager
+def served(fixed: Path) -> Iterator[Served]:
+    console = Served(fixed)
+    console.start()
+    try:
+        yield console
+    finally:
+        console.stop()

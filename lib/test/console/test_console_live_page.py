@@ -1,0 +1,310 @@
+"""The live page in a browser: what it shows of a run that goes on, and what the operator does on it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from console_page import SIZES, UNNAMED, Page
+from console_records import HOSTILE, LIFT_OFF_S, failing_story, write_record
+from console_reports import SUMMARY
+from console_serving import WAIT_S, served
+
+from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
+from alula.console.acts import ActError, Flight
+
+
+def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    story = failing_story()
+    monkeypatch.setattr("alula.console.commands.is_live", lambda run: not (run / "summary.json").exists())
+    early = [entry for entry in story if entry[0] < LIFT_OFF_S + 20]
+    folder = make_run("live", story=[])
+    writer = write_record(folder, early, over=False)
+    with served(folder) as console:
+        page = Page(browser, console.address)
+        page.wait("document.querySelector('.row') !== null && alula.run.end > 31")
+        assert page.status("watch with the ZED") == "RUNNING"
+        assert page.text("#headline") == "The mission is under way"
+        assert page.complaints() == []
+        for t_s, topic, value in story:
+            if t_s >= LIFT_OFF_S + 20 and topic in {EVENTS, TREE}:
+                writer.write(topic, round(t_s * 1e9), value)
+        page.wait("document.querySelector('.chain') !== null")
+        assert page.status("watch with the ZED") == "FAILURE"
+        console.stop()
+        page.wait("document.querySelector('#link').dataset.state === 'stale'")
+        assert "disconnected" in page.text("#link")
+        assert page.run("document.querySelector('#flight .danger:not(:disabled)') === null")
+        writer.write(MISSION, round((LIFT_OFF_S + 61) * 1e9), story[-1][2])
+        console.start()
+        page.wait("document.querySelector('#link').dataset.state !== 'stale'")
+        page.wait("document.querySelector('#headline').textContent === 'Mission accomplished in degraded mode'")
+        assert "30.00 sThe zed was made to fail." in page.text("#lines li")  # as asked for
+        assert page.run("document.querySelector('#operator form select').value") != "mapping"
+        page.run("document.querySelector('#operator form select').value = 'mapping'")
+        lift_off = {"stamp_s": LIFT_OFF_S - 0.5, "source": "simulator"}
+        injected = [{"sensor": "zed", "mode": "dead", "t_s": 30.4}]
+        (folder / "summary.json").write_text(json.dumps({**SUMMARY, "injected": injected, "lift_off": lift_off}))
+        page.wait("document.querySelector('#lines').textContent.includes('The zed was made to fail (dead).')")
+        chain = page.text(".chain li")
+        assert chain.startswith("failure30.40 szed failed (dead, injected) | resource30.50 s")  # all times count from the same lift-off
+        assert page.run("document.querySelector('#operator form select').value") == "mapping", "another lift-off leaves the form alone"
+    writer.close()
+    assert [line for line in page.complaints() if "WebSocket connection" not in line and "ERR_" not in line] == []
+
+
+def test_a_run_that_ends_without_a_verdict_is_not_said_to_be_under_way(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, live = make_run("live", story=[]), [True]
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: live[0])
+    writer = write_record(folder, [entry for entry in failing_story() if entry[0] < LIFT_OFF_S + 20], over=False)
+    with served(folder) as console:
+        page = Page(browser, console.address)
+        page.wait("document.querySelector('#headline').textContent === 'The mission is under way' && alula.live.state === 'live'")
+        live[0] = False
+        page.wait("document.querySelector('#headline').textContent === 'The mission\\'s process ended before the mission did'")
+        page.wait("document.querySelector('#link').dataset.state === 'over'")
+        assert page.run("document.querySelector('#flight .danger:not(:disabled)') === null")
+        assert page.complaints() == []
+    writer.close()
+
+
+def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from selenium.webdriver.support.ui import Select
+
+    first, asked = make_run("first"), []
+
+    def start(flight: Flight) -> Path:
+        asked.append(flight)
+        if flight.world:
+            raise ActError(f"there is no world {flight.world}")
+        return make_run("second", story=[])
+
+    monkeypatch.setattr("alula.console.acts.start", start)
+    with served(first) as console:
+        page = Page(browser, console.address)
+        page.wait("document.querySelectorAll('#operator form select option').length > 3 && alula.live.state === 'over'")
+        browser.find_element("css selector", "#operator summary").click()
+        scenario, vehicle = browser.find_elements("css selector", "#operator form select")
+        Select(scenario).select_by_visible_text("mapping")
+        Select(vehicle).select_by_visible_text("mocks")
+        world = browser.find_element("css selector", "#operator form input[list]")
+        world.send_keys(HOSTILE)
+        seed = browser.find_element("css selector", "#operator form input[type=number]")
+        seed.clear()
+        seed.send_keys("7")
+        browser.find_element("css selector", "#operator form input[aria-label^=failures]").send_keys("zed@30, lidar@60")
+        button = browser.find_element("css selector", "#operator form .go")
+        button.click()
+        assert asked == []
+        button.click()
+        page.wait("document.querySelector('#flight output').textContent.includes('refused: there is no world')")
+        assert page.run("document.querySelector('#operator details').open") is True
+        world.clear()
+        button.click()
+        button.click()
+        page.wait("alula.live.link.status.run === 'second'")
+        assert page.run("document.querySelector('#operator details').open") is False
+        assert page.complaints() == []
+    assert asked[1] == Flight("mapping", 7, ("zed@30", "lidar@60"), "", "mocks", "")
+
+
+def test_an_act_needs_two_presses_and_everything_off_a_word(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, done = make_run("live"), []
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
+    for act in ("abort", "everything_off"):
+        monkeypatch.setattr(f"alula.console.acts.{act}", lambda run, act=act: done.append((act, run.name)) or f"{act} is done")
+    with served(folder) as console:
+        page = Page(browser, console.address)
+        abort, off = (f"[...document.querySelectorAll('#flight .danger')][{index}]" for index in (1, 2))
+        page.wait(f"{abort} !== undefined && !{abort}.disabled")
+        page.run(f"{abort}.click()")
+        assert page.run(f"{abort}.textContent") == "press again: stop and land"
+        assert done == []
+        page.run(f"{abort}.click()")
+        page.wait("document.querySelector('#flight output').textContent.includes('abort is done')")
+        assert page.run(f"{off}.disabled") is True
+        page.browser.find_element("css selector", "#flight input[placeholder='type OFF']").send_keys("off")
+        page.run(f"{off}.click(), {off}.click()")
+        page.wait("document.querySelector('#flight output').textContent.includes('everything_off is done')")
+        page.wait("document.querySelector('#lines').textContent.includes('The operator switched everything off')")
+        assert page.complaints() == []
+    assert done == [("abort", "live"), ("everything_off", "live")]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_acts_on_a_flight_stay_in_sight_and_an_answer_moves_nothing(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
+    folder = make_run("live")
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
+    monkeypatch.setattr("alula.console.acts.pause", lambda _run: "held: " + "a skill that goes on, " * 40)
+    pause = "[...document.querySelectorAll('#flight button')][0]"
+    with served(folder) as console:
+        page = Page(browser, console.address, size)
+        page.wait(f"{pause} !== undefined && !{pause}.disabled && document.querySelector('.row') !== null")
+        page.run("scrollTo(0, document.documentElement.scrollHeight / 2)")
+        page.wait("document.querySelector('#flight').getBoundingClientRect().top === 0")
+        buttons = "[...document.querySelectorAll('#flight button:not([hidden])')]"
+        assert page.run(f"{buttons}.every((one) => one.getBoundingClientRect().top < 120)")
+        page.run("scrollTo(0, 0)")
+        before = page.run("document.querySelector('main').getBoundingClientRect().top")
+        page.run(f"{pause}.click(), {pause}.click()")
+        page.wait("document.querySelector('#flight output').textContent.includes('a skill that goes on')")
+        assert page.run("document.querySelector('main').getBoundingClientRect().top") == before
+        assert page.complaints() == []
+
+
+def test_what_the_mission_needs_to_start_is_shown_and_turns_green(browser: Any, make_run: Callable[..., Path]) -> None:
+    folder = make_run("live", story=[])
+    ready, fence = ["the home point is valid", "the home point is not valid"], [f"a fence {HOSTILE}", ""]
+    writer = write_record(folder, [(1.0, TICKS, {"unmet": [ready[1]], "conditions": [ready, fence]})], over=False)
+    with served(folder) as console:
+        page = Page(browser, console.address)
+        page.wait("document.querySelectorAll('#operator .checks li').length === 2")
+        assert page.text("#operator .checks li") == f"not met: the home point is not valid | met: a fence {HOSTILE}"
+        assert page.run("document.querySelectorAll('#operator .checks li.met').length") == 1
+        assert "before the start: 1 of 2 conditions met" in page.text("#operator summary")
+        writer.write(TICKS, 2_000_000_000, {"unmet": [], "conditions": [[ready[0], ""], fence]})
+        writer.write(TICKS, 3_000_000_000, {"unmet": []})
+        page.wait("document.querySelectorAll('#operator .checks li.met').length === 2")
+        assert page.text("#operator .checks li").startswith("met: the home point is valid")
+        assert page.complaints() == []
+    writer.close()
+
+
+def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    folder = make_run("live", story=[])
+    writer = write_record(folder, [entry for entry in failing_story() if entry[0] < LIFT_OFF_S + 20], over=False)
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
+    for act in ("pause", "resume"):
+        monkeypatch.setattr(f"alula.console.acts.{act}", lambda run, act=act: done.append(f"{act} {run.name}") or act)
+    button = "[...document.querySelectorAll('#flight button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
+    with served(folder) as console:
+        page = Page(browser, console.address)
+        page.wait(f"{button.format('pause')} !== undefined")
+        assert page.run(f"{button.format('go on')} === undefined")
+        page.run(f"{button.format('pause')}.click()")
+        assert done == []
+        page.run(f"{button.format('press again: pause')}.click()")
+        page.wait("document.querySelector('#flight output').textContent === 'pause: pause'")
+        writer.write(OPERATOR, round(33e9), {"command": "paused", "by": "mission", "reason": "navigation.goto holds"})
+        page.wait("document.querySelector('.held').textContent === 'The mission is paused. navigation.goto holds'")
+        page.wait("document.querySelector('#headline').textContent === 'The mission is paused'")
+        page.run(f"{button.format('go on')}.click(), {button.format('press again: go on')}.click()")
+        writer.write(OPERATOR, round(40e9), {"command": "resume", "by": "mission", "reason": ""})
+        page.wait("document.querySelector('.held').textContent === ''")
+        page.wait("document.querySelector('#lines').textContent.includes('The mission goes on.')")
+        assert page.complaints() == []
+    writer.close()
+    assert done == ["pause live", "resume live"]
+
+
+BY_HAND = {
+    "problems": [],
+    "skillsets": [
+        {
+            "root": "/navigation",
+            "alive": True,
+            "skills": [
+                {
+                    "name": "takeoff", "status": "not ready", "unmet": [f"on_ground: flight_status is {HOSTILE}"], "running": [],
+                    "last": {"state": "TERMINATED", "result": "AT_ALTITUDE", "message": HOSTILE, "t_s": 15.0, "inputs": {}, "outputs": {}},
+                    "inputs": [{"name": "height", "kind": "float64", "said": "< h_geo_fence", "text": "0.0"}],
+                },
+                {
+                    "name": "hover", "status": "RUNNING", "unmet": [], "last": None,
+                    "running": [{"id": "abcdef012", "state": "RUNNING", "progress": 0.5}],
+                    "inputs": [{"name": "duration", "kind": "float64", "said": "> 0", "text": "0.0"}],
+                },
+            ],
+            "resources": [{"name": "flight_status", "state": "IN_AIR", "targets": ["ON_GROUND"], "every_target": ["IN_AIR", "ON_GROUND"]}],
+            "data": [{"name": "guidance_state", "value": HOSTILE, "age_s": 0.2, "stale": False}],
+        }
+    ],
+}  # fmt: skip
+
+
+class Listened:
+    """Stands for the skillsets of a run."""
+
+    def __init__(self, _domain: int) -> None:
+        self.asked: list[dict[str, Any]] = []
+        LISTENED.append(self)
+
+    def describe(self) -> dict[str, Any]:
+        return BY_HAND
+
+    def do(self, asked: dict[str, Any]) -> tuple[str, str]:
+        self.asked.append({name: asked[name] for name in asked if name not in {"command", "run"}})
+        return f"{asked['act']} it", f"done {HOSTILE}"
+
+    def close(self) -> None:
+        self.asked.append({"act": "close"})
+
+
+LISTENED: list[Listened] = []
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_skills_are_driven_by_hand(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, size: tuple[int, int]
+) -> None:
+    folder = make_run("live")
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
+    monkeypatch.setattr("alula.console.commands.Hands", Listened)
+    LISTENED.clear()
+    with served(folder) as console:
+        page = Page(browser, console.address, size)
+        page.wait("document.querySelector('#hands') !== null && !document.querySelector('#hands').hidden && alula.live.state === 'live'")
+        assert LISTENED == []
+        page.browser.find_element("css selector", "#hands summary").send_keys(" ")  # a key of its own, not the one that plays
+        assert page.run("document.querySelector('#play').getAttribute('aria-pressed')") != "true"
+        page.wait("document.querySelectorAll('.skills li').length === 2")
+        assert "could not start now:" in page.text(".needs")
+        assert HOSTILE in page.text(".needs")
+        assert page.text(".skill label b + .hint") == " float64, < h_geo_fence"
+        height = page.browser.find_element("css selector", ".skill input")
+        height.clear()
+        height.send_keys("4.5")
+        start = "document.querySelector('#hands form .go')"
+        page.run(f"{start}.click()")
+        assert page.run(f"{start}.textContent") == "press again: start takeoff"
+        assert LISTENED[0].asked == []
+        page.run(f"{start}.click()")
+        page.wait("document.querySelector('#hands output').textContent.includes('done')")
+        page.run("[...document.querySelectorAll('.pick')][1].click()")
+        assert page.run("document.querySelector('.skills progress:not([style*=hidden])').value") == 0.5
+        interrupt = "document.querySelector('.skill .danger')"
+        page.run(f"{interrupt}.click(), {interrupt}.click()")
+        assert page.text(".resources button:not([hidden])") == "→ ON_GROUND"
+        change = "document.querySelector('.resources button:not([hidden])')"
+        page.run(f"{change}.click(), {change}.click()")
+        page.wait("document.querySelector('#lines').textContent.includes('transition it')")
+        assert LISTENED[0].asked == [
+            {"act": "start", "root": "/navigation", "skill": "takeoff", "texts": {"height": "4.5"}},
+            {"act": "interrupt", "root": "/navigation", "skill": "hover"},
+            {"act": "transition", "root": "/navigation", "resource": "flight_status", "to": "ON_GROUND"},
+        ]
+        assert page.run("document.documentElement.scrollWidth") <= size[0]
+        assert page.run(UNNAMED) == []
+        assert page.run("document.title") == "Alula"
+        page.run("document.querySelector('#hands summary').click()")
+        page.wait("document.querySelector('#hands').open === false")
+        end = time.monotonic() + WAIT_S
+        while LISTENED[0].asked[-1] != {"act": "close"}:
+            assert time.monotonic() < end
+            page.run("new Promise((done) => setTimeout(done, 50))")
+        assert page.complaints() == []

@@ -1,0 +1,332 @@
+"""The server as its viewers, good and bad, meet it: over real sockets on loopback."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from console_records import failing_story, write_record
+from console_serving import WAIT_S, Bench, answer_to, heard, serve
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from alula.common.record import EVENTS
+from alula.console import acts, commands, server
+from alula.console.__main__ import main
+from alula.console.acts import ActError, Flight, read_flight
+from alula.console.admission import is_loopback
+from alula.console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES
+
+
+def events_in(message: dict[str, Any]) -> int:
+    return sum(entry[0] == EVENTS for entry in message.get("entries", []))
+
+
+def test_viewers_follow_a_run_that_grows(make_run: Callable[..., Path]) -> None:
+    folder = make_run("growing", story=failing_story()[:3])
+    (folder / "skills.mcap").unlink()
+    writer = write_record(folder, failing_story()[:3], over=False)
+
+    async def play(bench: Bench) -> None:
+        viewers = [await bench.viewer(name) for name in ("one", "two")]
+        for viewer in viewers:
+            await heard(viewer, lambda message: events_in(message) == 1)
+        writer.write(EVENTS, 1, failing_story()[3][2])
+        for viewer in viewers:
+            assert events_in(await heard(viewer, lambda message: "entries" in message)) == 1
+        writer.close()
+
+    serve(play, fixed=folder)
+
+
+def test_a_viewer_that_comes_back_is_sent_what_is_new(make_run: Callable[..., Path]) -> None:
+    folder = make_run()
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        first = await heard(viewer, lambda message: message.get("upTo", 0) > 0)
+        await viewer.close()
+        again = await bench.viewer("me", session=first["session"], entries=first["upTo"])
+        second = await heard(again, lambda message: "entries" in message)
+        assert second["reset"] is False
+        assert {entry[1] for entry in second["entries"]} == {None}
+
+    serve(play, fixed=folder)
+
+
+def test_several_runs_can_be_watched_at_once(make_run: Callable[..., Path]) -> None:
+    make_run("first"), make_run("second")
+
+    async def play(bench: Bench) -> None:
+        for name in ("first", "second"):
+            viewer = await bench.viewer(name)
+            await heard(viewer, lambda message: len(message.get("status", {}).get("runs", [])) == 2)
+            await viewer.send(json.dumps({"watch": name}))
+            seen = await heard(viewer, lambda message, name=name: message.get("status", {}).get("run") == name)  # type: ignore[misc]
+            assert seen["status"]["live"] is False
+
+    serve(play)
+
+
+# --- commands ------------------------------------------------------------------------------------------------------------
+
+
+def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = make_run()
+    done: list[str] = []
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+    monkeypatch.setattr(acts, "abort", lambda run: done.append(run.name) or "the robot stops where it is")
+
+    async def play(bench: Bench) -> None:
+        one, two = await bench.viewer("one"), None
+        await heard(one, lambda message: message.get("upTo", 0) > 0)
+        await heard(one, lambda message: message.get("status", {}).get("commands") is True)
+        two = await bench.viewer("two")
+        assert await answer_to(two, command="abort", run="run") == "refused: you watch; take over first"
+        assert await answer_to(two, command="take") == "you command now"
+        assert await answer_to(one, command="abort", run="run") == "refused: you watch; take over first"
+        assert done == []
+        assert "another one by now" in await answer_to(two, command="abort", run="an older one")
+        assert "another one by now" in await answer_to(two, command="abort")
+        assert await answer_to(two, command="abort", run="run") == "the robot stops where it is"
+        assert done == ["run"]
+        assert await answer_to(two, command="reboot") == "refused: there is no command reboot"
+
+    serve(play, fixed=folder)
+    acts_done = [json.loads(line) for line in (folder / "operator.jsonl").read_text().splitlines()]
+    assert [(act["command"], act["by"]) for act in acts_done] == [("take", "two"), ("abort", "two")]
+    assert acts_done[1]["stamp_s"] == pytest.approx(73.0)
+
+
+def test_an_act_that_waits_keeps_no_other_from_being_done(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, landed = make_run(), threading.Event()
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+    monkeypatch.setattr(acts, "pause", lambda _run: "paused" if landed.wait(WAIT_S) else "nothing came")
+    monkeypatch.setattr(acts, "abort", lambda _run: landed.set() or "landing")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: message.get("status", {}).get("commands") is True)
+        for command in ("pause", "abort"):
+            await viewer.send(json.dumps({"command": command, "run": "run"}))
+        answers = {(await heard(viewer, lambda message: "answer" in message))["answer"] for _ in range(2)}
+        assert answers == {"paused", "landing"}
+
+    serve(play, fixed=folder)
+
+
+def test_a_run_that_is_over_is_not_commanded(make_run: Callable[..., Path]) -> None:
+    folder = make_run()
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: "status" in message)
+        for command in ("abort", "off"):
+            assert await answer_to(viewer, command=command, run="run") == "refused: this run is over"
+
+    serve(play, fixed=folder)
+
+
+def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[tuple[str, float]] = []
+    monkeypatch.setattr(acts, "end_run", lambda run_id, *, patience_s: ended.append((run_id, patience_s)) or [1, 2, 3])
+    assert acts.everything_off(make_run()) == "3 processes were ended at once"
+    assert ended == [("id-run", 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        ({"scenario": "nowhere"}, "there is no scenario 'nowhere'; there are inspection, mapping"),
+        ({"scenario": ["mapping"]}, "there is no scenario"),
+        ({"scenario": "mapping", "seed": -1}, "the seed has to be a whole number"),
+        ({"scenario": "mapping", "seed": True}, "the seed has to be a whole number"),
+        ({"scenario": "mapping", "faults": "zed"}, "faults are a list of at most 8"),
+        ({"scenario": "mapping", "faults": ["zed@30"] * 9}, "faults are a list of at most 8"),
+        ({"scenario": "mapping", "faults": ["--world=/etc/passwd"]}, "is no fault"),
+        ({"scenario": "mapping", "faults": ["zed@soon"]}, "zed@soon"),
+        ({"scenario": "mapping", "world": "--help"}, "is no world"),
+        ({"scenario": "mapping", "world": "yard\n"}, "is no world"),
+        ({"scenario": "mapping", "world": 3}, "is no world"),
+        ({"scenario": "mapping", "vehicle": "balloon"}, "there is no vehicle 'balloon'; there are simulator, mocks, vehicle"),
+        ({"scenario": "mapping", "vehicle": "vehicle"}, "needs the MAVLink connection"),
+        ({"scenario": "mapping", "autopilot": "tcp:127.0.0.1:5760"}, "a vehicle, and only that"),
+        ({"scenario": "mapping", "vehicle": "vehicle", "autopilot": "-o x"}, "is no MAVLink connection"),
+    ],
+)
+def test_a_flight_that_can_not_be_is_refused(asked: dict[str, object], why: str) -> None:
+    with pytest.raises(ActError, match=why.replace("'", ".")):
+        read_flight(asked)
+
+
+def test_a_flight_is_the_command_line_that_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = {"scenario": "mapping", "seed": 3, "faults": ["zed@30"]}
+    mocked, elsewhere = read_flight({**asked, "vehicle": "mocks"}), read_flight({**asked, "world": "forest"})
+    real = read_flight({"scenario": "mapping", "vehicle": "vehicle", "autopilot": "/dev/ttyACM0"})
+    monkeypatch.setenv("ALULA_ROOT", "/alula")
+    words = ["/alula/alula", "fly", "mapping", "--seed", "3", "--out", "/out", "--fail", "zed@30"]
+    assert mocked.words(Path("/out")) == [*words, "--mock"]
+    assert elsewhere.words(Path("/out")) == [*words, "--world=forest"]
+    assert real.words(Path("/out")) == ["/alula/alula", "fly", "mapping", "--seed", "0", "--out", "/out", "--autopilot=/dev/ttyACM0"]
+
+
+def test_a_flight_that_does_not_start_says_why(make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = tmp_path / "alula"
+    script.write_text("#!/bin/sh\necho looking >&2\necho 'alula fly: all DDS domains are taken' >&2\nexit 2\n", encoding="utf-8")
+    script.chmod(0o755)
+    monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
+    with pytest.raises(ActError, match="alula fly: all DDS domains are taken"):
+        acts.start(Flight("mapping", 0, vehicle="mocks"))
+
+
+# --- admission --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("headers", "why"),
+    [
+        ({"Host": "evil.example"}, "reached as localhost only"),
+        ({"Host": "127.0.0.1.evil.example:80"}, "reached as localhost only"),
+        ({"Host": "["}, "reached as localhost only"),
+        ({"Origin": "http://evil.example"}, "other sites are refused"),
+        ({"Origin": "null"}, "other sites are refused"),
+    ],
+)
+def test_requests_of_other_sites_are_refused(headers: dict[str, str], why: str, make_run: Callable[..., Path]) -> None:
+    async def play(bench: Bench) -> None:
+        for path in ("/", FEED, "/runs/run/report.html"):
+            status, text = await bench.get(path, **headers)
+            assert (status, why in text) == (403, True)
+
+    serve(play)
+
+
+def test_a_socket_of_another_site_or_of_none_is_refused(make_run: Callable[..., Path]) -> None:
+    async def play(bench: Bench) -> None:
+        for origin in ("http://evil.example", "null", None, f"https://{bench.base}.evil.example"):
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(f"ws://{bench.base}{FEED}", origin=origin)  # type: ignore[arg-type]
+            assert refused.value.response.status_code == 403
+
+    serve(play)
+
+
+def test_elsewhere_a_token_is_needed(make_run: Callable[..., Path]) -> None:
+    async def play(bench: Bench) -> None:
+        assert (await bench.get("/"))[0] == 403
+        assert (await bench.get("/?token=guess"))[0] == 403
+        assert (await bench.get("/?token=%E2%82%AC"))[0] == 403
+        assert (await bench.get("/?token=secret"))[0] == 200
+        assert (await bench.get("/?token=secret", Host="robot.local:8440"))[0] == 200
+        with pytest.raises(InvalidStatus):
+            await connect(f"ws://{bench.base}{FEED}", origin=f"http://{bench.base}")  # type: ignore[arg-type]
+        await heard(await bench.viewer("me"), lambda message: "status" in message)
+
+    serve(play, token="secret")  # noqa: S106
+
+
+@pytest.mark.parametrize(
+    ("host", "ours"), [("127.0.0.1", True), ("::1", True), ("localhost", True), ("192.168.1.7", False), ("robot", False)]
+)
+def test_loopback_is_told_from_the_rest(host: str, *, ours: bool) -> None:
+    assert is_loopback(host) is ours
+
+
+def test_only_reports_of_runs_are_served_and_they_can_not_command(make_run: Callable[..., Path]) -> None:
+    folder = make_run()
+    (folder / "report.html").write_text("the report", encoding="utf-8")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: message.get("status", {}).get("report") is True)
+        assert await bench.get("/runs/run/report.html") == (200, "the report")
+        for path in ("/runs/run/run.json", "/runs/../run/report.html", "/runs/%2e%2e/report.html", "/etc/passwd", "/runs/"):
+            assert (await bench.get(path))[0] == 404
+        policy = await asyncio.to_thread(
+            lambda: urllib.request.urlopen(f"http://{bench.base}/runs/run/report.html").headers["Content-Security-Policy"]
+        )
+        assert policy == "sandbox allow-scripts"
+
+    serve(play, fixed=folder)
+
+
+# --- floods ------------------------------------------------------------------------------------------------------------------
+
+
+async def flood(viewer: ClientConnection) -> None:
+    for _ in range(20 * MAX_COMMANDS_PER_S):
+        await viewer.send(json.dumps({"command": "take"}))
+    await heard(viewer, lambda _message: False)
+
+
+def test_a_flood_of_commands_ends_its_own_connection_only(make_run: Callable[..., Path]) -> None:
+    folder = make_run()
+
+    async def play(bench: Bench) -> None:
+        good, bad = await bench.viewer("good"), await bench.viewer("bad")
+        with pytest.raises(ConnectionClosed) as ended:
+            await flood(bad)
+        assert ended.value.rcvd is not None
+        assert ended.value.rcvd.reason == "too many commands"
+        await heard(good, lambda message: message.get("status", {}).get("viewers") == 1)
+
+    serve(play, fixed=folder)
+
+
+@pytest.mark.parametrize("message", ["", "[]", "{", '"x"', "x" * (MAX_MESSAGE_BYTES + 1), b"\x00\xff"])
+def test_messages_that_make_no_sense_end_their_connection_only(message: str | bytes, make_run: Callable[..., Path]) -> None:
+    folder = make_run()
+
+    async def play(bench: Bench) -> None:
+        good, bad = await bench.viewer("good"), await bench.viewer("bad")
+        await bad.send(message)
+        with pytest.raises(ConnectionClosed):
+            await heard(bad, lambda _message: False)
+        await heard(good, lambda message: message.get("status", {}).get("viewers") == 1)
+
+    serve(play, fixed=folder)
+
+
+def test_a_viewer_that_hangs_is_dropped_and_the_others_go_on(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "STUCK_S", 0.3)
+    blob = os.urandom(1 << 16).hex()  # can't be made smaller by compression
+    folder = make_run(story=[(float(number), "/blackboard", {"blob": blob[number:]}) for number in range(200)])
+
+    async def play(bench: Bench) -> None:
+        reader, writer = await asyncio.open_connection(*bench.base.split(":"), limit=1 << 10)
+        key = "AAAAAAAAAAAAAAAAAAAAAA=="
+        head = f"GET {FEED} HTTP/1.1\r\nHost: {bench.base}\r\nOrigin: http://{bench.base}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        writer.write(f"{head}Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode())
+        await reader.readuntil(b"\r\n\r\n")
+        hello = b'{"key": "hung"}'
+        writer.write(bytes([0x81, 0x80 | len(hello), 0, 0, 0, 0]) + hello)  # a masked text frame; then nothing is read any more
+        good = await bench.viewer("good")
+        await heard(good, lambda message: message.get("status", {}).get("viewers") == 2)
+        await heard(good, lambda message: message.get("status", {}).get("viewers") == 1)
+        writer.close()
+
+    serve(play, fixed=folder)
+
+
+# --- the command line --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["--run", "/nowhere"], "--run /nowhere: is no run's folder"),
+        (["--domain", "99"], "--domain 99: no run is under way there"),
+        (["--host", "256.0.0.1"], "alula console:"),
+    ],
+)
+def test_what_can_not_be_served_ends_with_2(words: list[str], why: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words) == 2
+    assert why in capsys.readouterr().err

@@ -1,0 +1,75 @@
+"""The last lines of a flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from alula.report.deaths import Death
+from alula.report.verdict import verdict_lines
+
+LATER = {"detected_s": 40.5, "fallback_running_s": None, "moving_again_s": None}
+MOCK = {"wall_s": 1.0, "factor": 100.0, "notes": []}
+
+
+@pytest.mark.parametrize(
+    ("answers", "told"),
+    [
+        ([("zed", "dead", 12.0), ("encoder", "killed", 40.0)], "encoder failed at 40.00 s"),
+        ([("perception", "died", 40.0)], "perception died at 40.00 s"),
+        ([("zed", "dead", 12.0), ("radio", "", 40.0)], "radio lost at 40.00 s"),
+        ([], "sensor failed at 40.00 s"),
+    ],
+)
+def test_what_failed_is_named(answers, told, tmp_path: Path):
+    found = [{"sensor": sensor, "mode": mode, "t_s": t_s} for sensor, mode, t_s in answers]
+    summary = {"outcome": "degraded", "mock": MOCK, "answers": found, "recovery": {"failure_s": 40.0, **LATER}}
+    lines = verdict_lines(summary, [], tmp_path)
+    assert f"  recovery: {told}, detected 0.50 s later" in lines
+
+
+OUT = Path("/runs/one")
+
+
+def test_a_flight_whose_nodes_all_died_names_them_and_their_logs() -> None:
+    died = [Death("uav_simulator", "exit code 1", None)]
+    died += [Death("zed_depth", "exit code 1", None, respawned=True) for _ in range(3)]
+    lines = verdict_lines({"outcome": None, "mission_exit": 1, "landed": None, "collisions": None}, died, OUT)
+    assert lines == [
+        "",
+        "the mission came to no outcome: uav_simulator, zed_depth died; /runs/one/logs tells why",
+        "  uav_simulator died (exit code 1)",
+        "  zed_depth died (exit code 1); it was started again (3 times in all)",
+    ]
+
+
+def test_a_mission_that_could_not_start_tells_no_figures() -> None:
+    summary = {"outcome": "not_started", "reason": "the mission clock stands still", "landed": None, "collisions": None}
+    lines = verdict_lines(summary, [Death("uav_simulator", "exit code 1", None)], OUT)
+    assert lines == ["", "the mission could not start: the mission clock stands still", "  uav_simulator died (exit code 1)"]
+
+
+def test_what_is_not_known_of_a_flight_is_said_so() -> None:
+    lines = verdict_lines({"outcome": "given_up", "landed": True, "duration_s": 9.0, "collisions": None}, [], OUT)
+    assert lines[2:] == [
+        "  landed: yes, duration 9.0 s, flown unknown, collisions unknown, nearest surface unknown",
+        "  map: none",
+    ]
+
+
+def test_a_crash_is_no_landing() -> None:
+    summary = {"outcome": "given_up", "landed": False, "crash": "it met the ground at 7.6 m/s", "duration_s": 9.0}
+    assert verdict_lines(summary, [], OUT)[2].startswith("  landed: no, it crashed: it met the ground at 7.6 m/s, duration 9.0 s")
+
+
+def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
+    summary = {"outcome": None, "landed": False, "duration_s": 12.0, "distance_m": 9.0}
+    lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)
+    assert lines[1] == "the mission came to no outcome: mission died; /runs/one/logs tells why"
+    assert lines[3].startswith("  landed: no, duration 12.0 s")
+
+
+def test_an_outcome_is_told_with_its_reason() -> None:
+    summary = {"outcome": "given_up", "reason": "no sensor left", "landed": True}
+    assert verdict_lines(summary, [], OUT)[1] == "mission given up: no sensor left"

@@ -1,0 +1,54 @@
+"""The drone's part of a report, as ``robot.yaml`` names it. Of flights over mocks it says that nothing was measured, and needs nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from alula.common.faults import FaultChange
+from alula.records.causes.faults import Fault
+from alula.records.causes.reach import Reaches
+from alula.report.observed import Observed
+from alula.report.part import Entry, Findings, ReportPart, Run
+from alula.report.phases import Phases
+from alula.report.recovery import Recovery
+from alula.report.timeline import Timeline
+
+NOTHING_MEASURED = {
+    "crash": None,
+    "collisions": None,
+    "min_clearance_m": None,
+    "distance_m": None,
+    "map": {"points": None, "coverage": None, "rmse_m": None, "patches_in_reach": None},
+    "video": None,
+    "accounts": {"simulator": None, "recomputed": None},
+}
+
+
+def make(run: Run) -> ReportPart:
+    """Make the part of a report."""
+    if run.facts.mock:
+        return Mocked()
+    # Late: it needs ROS 1 and Open3D, which flights over mocks do without.
+    from uav_report.flight import FlightReport
+
+    return FlightReport(run)
+
+
+class Mocked:
+    """Of a flight over mocks: there is no world to collide with or to map."""
+
+    def observe(self, run: Run) -> Observed:  # noqa: ARG002
+        """Observe nothing."""
+        return Observed()
+
+    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
+        """Find nothing."""
+        return ()
+
+    def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
+        """Say that nothing was measured."""
+        return Findings(NOTHING_MEASURED)
+
+    def entries(self) -> Iterable[Entry]:
+        """Add nothing."""
+        return ()
