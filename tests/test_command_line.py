@@ -25,6 +25,7 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
     [
         (["nosuch"], "nosuch"),
         (["fyl"], "did you mean `fly`?"),
+        (["flie"], "did you mean `fly`?"),
         (["fly", "maping"], "did you mean `mapping`?"),
         (["bench", "skils"], "did you mean `skills`?"),
         (["events", "--run", "no/such/run"], "no/such/run"),

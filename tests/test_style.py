@@ -31,6 +31,7 @@ TYPED = [
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
     "tools/skill_bench",
+    "tools/console_bench",
     "tools/perception_bench",
     "tools/log_mutations",
     *(f"ros2_ws/src/{name}/{name}" for name in ROS2_PACKAGES),

@@ -16,7 +16,7 @@ PATIENCE_S = 5.0  # wall clock, for the server to say goodbye to its viewers
 def page_beside(out: Path, say: Callable[[str], None], command: tuple[str, ...] = ()) -> Iterator[None]:
     """Serve the page of the run in ``out`` while the context lasts, and say its address; a page that can't be served stops no flight."""
     root = Path(os.environ["ALULA_ROOT"])
-    words = command or (str(root / "setup" / "in_ros2"), "python", "-m", "alula.console", "--run", str(out))
+    words = command or (str(root / "setup" / "in_ros2"), "python", "-m", "skill_panel.console", "--run", str(out))
     with (
         (out / "logs" / "console.log").open("wb") as log,
         # A session of its own, so that a Ctrl-C lands the vehicle and leaves the page.

@@ -11,6 +11,7 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from time import monotonic
 
 from alula.common.robots import RobotError, find_robot
@@ -100,8 +101,13 @@ def _prove(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) 
             if number and monotonic() >= end:
                 found.append(_not_begun(file.skillsets[number:], timeout_s))
                 break
-            found += prove(skillset, closed_world=closed_world, timeout_s=max(0.0, end - monotonic()))
+            left_s = max(0.0, end - monotonic())
+            found += prove(skillset, closed_world=closed_world, timeout_s=left_s, tell=partial(_tell, f"{file.path}: {skillset.name}"))
         file.add(found)
+
+
+def _tell(what: str, progress: str) -> None:
+    sys.stderr.write(f"alula check: {what}: proving: {progress}\n")
 
 
 def stories_of(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> list[tuple[Skillset, Diagnostic]]:

@@ -1,4 +1,7 @@
-"""``./alula conform``: holds a log against the models of its skillsets. Ends with 0: it conforms, 1: it does not, 2: it can't be read."""
+"""``./alula conform``: holds a log against the models of its skillsets. Ends with 0: it conforms, 1: it does not, 2: it can't be read.
+
+With ``--complete`` a log that misses something conforms only up to there, and that ends with 1, too.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--model", type=Path, action="append", default=[], metavar="FILE", help="hold it against this model (default: the managers' own)"
     )
+    parser.add_argument("--complete", action="store_true", help="end with 1 where the log has a hole: it breaks off, or ends within a step")
     parser.add_argument("--json", action="store_true", help="print the verdict as JSON")
     return parser.parse_args(arguments)
 
@@ -62,6 +66,11 @@ def lines(log: Log, verdict: Verdict) -> Iterator[str]:
         yield f"  read up to its break: {log.cut}"
 
 
+def holes(log: Log, verdict: Verdict) -> tuple[str, ...]:
+    """Return what a log misses: what lies behind its break, and the rest of the step that it ends within."""
+    return (*([f"it breaks off: {log.cut}"] if log.cut else []), *(f"{owed} should follow" for owed in verdict.owed))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Judge; return the exit code."""
     given = parse(sys.argv[1:] if arguments is None else arguments)
@@ -76,7 +85,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         text = "\n".join(lines(log, verdict))
     sys.stdout.write(text + "\n")
-    return CONFORMS if verdict.conforms else DIFFERS
+    missing = holes(log, verdict) if given.complete else ()
+    if missing:
+        sys.stderr.write(f"alula conform: {log.path}: is not complete: {'; '.join(missing)}\n")
+    return CONFORMS if verdict.conforms and not missing else DIFFERS
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ import yaml
 from alula.common.suggestions import nearest
 
 MAX_CHARACTERS = 1_000_000
+SHOWN_CHARACTERS = 40
+"""Of a value that a message quotes: the message is one line, and the file may be any."""
 MakeError = Callable[[str], Exception]
 
 
@@ -122,5 +124,6 @@ def read_yaml(path: Path, make_error: MakeError = YamlError) -> Located | None:
 
 def _shown(node: yaml.Node) -> str:
     if isinstance(node, yaml.ScalarNode):
-        return f"`{node.value}`"
+        text = " ".join(node.value.split())
+        return f"`{text if len(text) <= SHOWN_CHARACTERS else f'{text[:SHOWN_CHARACTERS]} …'}`"
     return "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterable, Sequence
 
 _FEW = 8
+_SHORT = 5
+"""In a name of fewer letters two slips weigh more: ``flie`` for fly."""
 _MANY = 500
 """More names than this are not looked through for a hint: it has to come at once."""
 
@@ -18,7 +20,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     folded: dict[str, str] = {}
     for candidate in candidates:
         folded.setdefault(candidate.lower(), candidate)
-    match = difflib.get_close_matches(name.lower()[:80], folded, n=1, cutoff=0.6)
+    cutoff = 0.55 if len(name) < _SHORT else 0.6
+    match = difflib.get_close_matches(name.lower()[:80], folded, n=1, cutoff=cutoff)
     if match:
         return f"did you mean `{folded[match[0]]}`?"
     if 0 < len(candidates) <= _FEW:

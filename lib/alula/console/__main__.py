@@ -7,16 +7,21 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import functools
+import os
 import secrets
 import signal
 import socket
+import ssl
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from alula.common.network import free_port
 from alula.common.runs import LATEST, live_runs
 from alula.console.admission import Admission, is_loopback
+from alula.console.certificates import fingerprint, own_certificate, server_context
+from alula.console.link import ActError, Link, Mission, Skillsets
 from alula.console.server import Console
 
 PORT = 8440
@@ -33,14 +38,37 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
     which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
-    parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); any other needs the printed token")
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="listen here (default 127.0.0.1); any other is served over TLS, and needs the printed address"
+    )
+    parser.add_argument("--certificate", type=Path, metavar="FILE", help="TLS certificate, PEM (default elsewhere: one that signs itself)")
+    parser.add_argument("--key", type=Path, metavar="FILE", help="its private key, PEM, without a passphrase")
+    parser.add_argument("--plain", action="store_true", help="with --host: no TLS; other machines may only watch then")
     parser.add_argument("--port", type=int, help=f"listen on this port (default {PORT}, or a free one where that is taken)")
     options = parser.parse_args(arguments)
     if options.domain is not None and options.domain not in DOMAINS:
         parser.error(f"--domain {options.domain}: a DDS domain is a number from 0 to {DOMAINS[-1]}")
     if options.port is not None and not 0 < options.port < 2**16:
         parser.error(f"--port {options.port}: a port is a number from 1 to {2**16 - 1}")
+    if (options.certificate is None) != (options.key is None):
+        parser.error("--certificate and --key belong together: give both, or none")
+    if options.plain and options.certificate is not None:
+        parser.error("--plain serves without TLS, so it takes no --certificate")
     return options
+
+
+def tls_of(options: argparse.Namespace) -> tuple[ssl.SSLContext | None, str]:
+    """Return the TLS to serve with, and the fingerprint of a certificate that signs itself; None and nothing for plain HTTP.
+
+    Raises:
+        ValueError, OSError: the certificate or its key can't be used.
+    """
+    if options.certificate is not None:
+        return server_context(options.certificate, options.key), ""
+    if options.plain or is_loopback(options.host):
+        return None, ""
+    own = own_certificate(Path(os.environ.get("ALULA_STATE") or Path(os.environ["ALULA_ROOT"], ".alula")) / "console")
+    return server_context(own, own), fingerprint(own)
 
 
 def first_run(options: argparse.Namespace) -> Path | None:
@@ -75,7 +103,7 @@ def port_of(options: argparse.Namespace) -> int:
     return PORT
 
 
-async def serve_until_told(console: Console, admission: Admission) -> None:
+async def serve_until_told(console: Console, admission: Admission, known_by: str) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP."""
     told = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -83,18 +111,41 @@ async def serve_until_told(console: Console, admission: Admission) -> None:
     async with console.open():
         sys.stdout.write(f"{admission.address}\n")
         sys.stdout.flush()
+        if known_by:
+            sys.stderr.write(f"its certificate signs itself; the browser has to show this SHA-256 fingerprint: {known_by}\n")
         sys.stderr.write("the operator's page is served there; Ctrl-C ends the server, not a flight\n")
         await told.wait()
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Serve; return the exit code."""
+class LateLink:
+    """The link to robots, made when one is reached first: a server that only shows runs needs no ROS."""
+
+    def __init__(self, make: Callable[[], Link]) -> None:
+        self._make = functools.cache(make)
+
+    def connect(self, domain: int) -> Mission:
+        """Return the mission in a domain."""
+        return self._make().connect(domain)
+
+    def listen(self, domain: int) -> Skillsets:
+        """Return the skillsets in a domain."""
+        return self._make().listen(domain)
+
+
+def no_link() -> Link:
+    """Reach no robot."""
+    raise ActError("there is no ROS 2 here: this server only shows runs")
+
+
+def main(arguments: Sequence[str] | None = None, make_link: Callable[[], Link] = no_link) -> int:
+    """Serve; return the exit code. ``make_link`` makes what reaches robots."""
     options = parse(arguments)
     try:
         fixed = first_run(options)
         token = "" if is_loopback(options.host) else secrets.token_urlsafe(24)
-        admission = Admission(options.host, port_of(options), token)
-        asyncio.run(serve_until_told(Console(admission, fixed=fixed), admission))
+        tls, known_by = tls_of(options)
+        admission = Admission(options.host, port_of(options), token, tls)
+        asyncio.run(serve_until_told(Console(admission, LateLink(make_link), fixed=fixed), admission, known_by))
     except (ValueError, OSError) as error:
         sys.stderr.write(f"alula console: {error}\n")
         return 2

@@ -1,4 +1,4 @@
-"""What the operator can do: start a flight, have it pause and go on, have it stop and land, switch everything off."""
+"""What the operator can do without the mission: start a flight, and switch everything off."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from alula.common.faults import FaultError, parse_fault
+from alula.common.located_yaml import YamlError, read_yaml
 from alula.common.processes import end_run
-from alula.common.runs import load_run, runs_folder
+from alula.common.robots import find_robot
+from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
+from alula.console.link import ActError
 
-ANSWER_S = 5.0
-"""How long (wall clock) the mission may take to answer."""
 START_S = 20.0
 LOOK_S = 0.05
 MAX_FAULTS = 8
@@ -28,10 +28,6 @@ VEHICLES = ("simulator", "mocks", "vehicle")
 _WORD = re.compile(r"[A-Za-z0-9_:.@-]{1,60}")
 _WORLD = re.compile(r"[^\x00-\x1f-][^\x00-\x1f]{0,300}")
 _CONNECTION = re.compile(r"[A-Za-z0-9/][A-Za-z0-9_./:\[\]-]{0,120}")
-
-
-class ActError(Exception):
-    """What was asked for can't be done; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ class Flight:
 
 def world_names() -> list[str]:
     """Return the worlds that come with the simulator; each holds a route."""
-    worlds = Path(os.environ["ALULA_ROOT"]) / "ros1_ws" / "src" / "uav_simulator" / "worlds"
+    worlds = find_robot().worlds
     return sorted(path.stem for path in worlds.glob("*.yaml"))
 
 
@@ -75,10 +71,27 @@ def read_flight(asked: Mapping[str, object]) -> Flight:
     if vehicle not in VEHICLES:
         raise ActError(f"there is no vehicle {vehicle!r}; there are {', '.join(VEHICLES)}")
     world = _text(asked, "world", _WORLD, "is no world; give a name, or a file that does not begin with a dash")
+    _check_world(world)
     autopilot = _text(asked, "autopilot", _CONNECTION, "is no MAVLink connection; one looks like udpin:127.0.0.1:14550 or /dev/ttyACM0")
     if (vehicle == "vehicle") != bool(autopilot):
         raise ActError("a vehicle, and only that, needs the MAVLink connection of its autopilot")
     return Flight(str(scenario), seed, _faults(asked.get("faults", [])), world, str(vehicle), autopilot)
+
+
+def _check_world(world: str) -> None:
+    """Refuse a file that is no world before `alula fly` does so: its messages quote what stands there, and any file can be asked for."""
+    if not world or world in world_names():
+        return
+    path = Path(world)
+    try:
+        read = read_yaml(path) if path.is_file() else None
+        known = {} if read is None else read.entries("a world")
+    except (YamlError, OSError):
+        known = {}
+    if "route" not in known:
+        raise ActError(
+            f"{world} is no world: give one of {', '.join(world_names())}, or a YAML file on the robot's computer that has a route"
+        )
 
 
 def _text(asked: Mapping[str, object], name: str, pattern: re.Pattern[str], why: str) -> str:
@@ -121,53 +134,6 @@ def start(flight: Flight) -> Path:
             raise ActError(words[-1] if words else f"alula fly ended with {process.returncode}")
         time.sleep(LOOK_S)
     return out
-
-
-def abort(folder: Path) -> str:
-    """Have the mission of a run stop and land; return what it answers.
-
-    Raises:
-        ActError: the mission does not answer.
-    """
-    from std_srvs.srv import Trigger
-
-    return str(_ask_mission(folder, Trigger, "/mission/abort", Trigger.Request()).message)
-
-
-def pause(folder: Path) -> str:
-    """Have the mission of a run hold; raise ActError where it can't, or does not answer."""
-    return _set_paused(folder, paused=True)
-
-
-def resume(folder: Path) -> str:
-    """Have the mission of a run go on; raise ActError where it can't, or does not answer."""
-    return _set_paused(folder, paused=False)
-
-
-def _set_paused(folder: Path, *, paused: bool) -> str:
-    from std_srvs.srv import SetBool
-
-    answer = _ask_mission(folder, SetBool, "/mission/pause", SetBool.Request(data=paused))
-    if not answer.success:
-        raise ActError(str(answer.message))
-    return str(answer.message)
-
-
-def _ask_mission(folder: Path, kind: Any, service: str, request: Any) -> Any:
-    """Call a service of the mission of a run; raise ActError."""
-    from skillset_ros2.session import Session
-
-    session = Session("alula.console", domain=load_run(folder).domain)
-    try:
-        client = session.node.create_client(kind, service)
-        if not client.wait_for_service(timeout_sec=ANSWER_S):
-            raise ActError("the mission does not answer; 'everything off' ends its processes")
-        answer = client.call(request, timeout_sec=ANSWER_S)
-    finally:
-        session.close()
-    if answer is None:
-        raise ActError(f"the mission gave no answer within {ANSWER_S:g} s")
-    return answer
 
 
 def everything_off(folder: Path) -> str:

@@ -35,7 +35,9 @@ def _zones(path: Path) -> Iterator[dict[str, Any]]:
         for zone in (world.get("radio_zones") or [])[:MAX_ZONES]:
             quality = str(zone["quality"])
             yield {"name": str(zone["name"]), "quality": quality if quality in QUALITIES else "critical", **_volume(zone)}
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+    except yaml.YAMLError as error:  # its own words quote the file
+        raise ValueError(f"{path.name} is no YAML: {getattr(error, 'problem', None) or 'its text is damaged'}") from error
+    except (AttributeError, KeyError, TypeError) as error:
         raise ValueError(f"radio_zones of {path.name} can't be read: {error}") from error
 
 

@@ -6,13 +6,15 @@ import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
-from alula.common.runs import NoRunError, load_run
+from alula.common.runs import NoRunError, Run, load_run
 from alula.console import acts
-from alula.console.acts import ActError
 from alula.console.hands import QUESTIONS, Hands
+from alula.console.link import ActError, Kept, Link, Mission
+
+ON_THE_FLIGHT = frozenset({"abort", "pause", "resume", "off"})
+"""Acts of which each is begun once: a request that comes while the act is under way gets the same answer."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +33,15 @@ Asked = Mapping[str, Any]
 class Commands:
     """The acts by name. They wait for answers, so they are called in threads."""
 
-    def __init__(self) -> None:
-        self._hands: dict[Path, Hands] = {}
-        self._lock = Lock()
+    def __init__(self, link: Link) -> None:
+        self._missions: Kept[Mission] = Kept(link.connect)
+        self._hands: Kept[Hands] = Kept(lambda domain: Hands(link.listen(domain)))
         self._acts: Mapping[str, Callable[[Asked, Path | None], Done]] = {
             "start": self._start,
-            "abort": lambda asked, run: _done("abort", asked, run, acts.abort),
-            "pause": lambda asked, run: _done("pause", asked, run, acts.pause),
-            "resume": lambda asked, run: _done("resume", asked, run, acts.resume),
-            "off": lambda asked, run: _done("off", asked, run, acts.everything_off),
+            "abort": lambda asked, run: self._told("abort", asked, run, lambda mission: mission.abort()),
+            "pause": lambda asked, run: self._told("pause", asked, run, lambda mission: mission.set_paused(paused=True)),
+            "resume": lambda asked, run: self._told("resume", asked, run, lambda mission: mission.set_paused(paused=False)),
+            "off": self._off,
             "skill": self._skill,
         }
 
@@ -55,21 +57,30 @@ class Commands:
 
     def hands_on(self, run: Path) -> Hands:
         """Return the skillsets of a run under way, to be driven by hand; they are listened to from the first call on."""
-        with self._lock:
-            if run not in self._hands:
-                self._hands[run] = Hands(load_run(run).domain)
-            return self._hands[run]
+        return self._hands.of(load_run(run))
 
-    def hands_off(self, keep: set[Path]) -> None:
-        """End listening to the skillsets of runs other than these."""
-        with self._lock:
-            leaving = [self._hands.pop(run) for run in set(self._hands) - keep]
-        for hands in leaving:
-            hands.close()
+    def keep(self, watched: set[Path], by_hand: set[Path]) -> None:
+        """Be connected to the missions of the runs that are watched, ahead of any command, and to no others.
+
+        Listen to no skillsets but those of the runs that are driven by hand: listening costs.
+        """
+        missions = _runs_of(watched)
+        for run in missions:
+            self._missions.of(run)
+        self._missions.keep(missions)
+        self._hands.keep(_runs_of(by_hand))
 
     def _start(self, asked: Asked, _run: Path | None) -> Done:
         folder = acts.start(acts.read_flight(asked))
         return Done(folder, "start", f"{folder.name} is started")
+
+    def _told(self, what: str, asked: Asked, run: Path | None, act: Callable[[Mission], str]) -> Done:
+        folder = _confirmed(asked, run)
+        return Done(folder, what, act(self._missions.of(load_run(folder))))
+
+    def _off(self, asked: Asked, run: Path | None) -> Done:
+        folder = _confirmed(asked, run)
+        return Done(folder, "off", acts.everything_off(folder))
 
     def _skill(self, asked: Asked, run: Path | None) -> Done:
         folder = _confirmed(asked, run)
@@ -77,9 +88,12 @@ class Commands:
         return Done(folder, what, answer, noted=asked.get("act") not in QUESTIONS)
 
 
-def _done(what: str, asked: Asked, run: Path | None, act: Callable[[Path], str]) -> Done:
-    folder = _confirmed(asked, run)
-    return Done(folder, what, act(folder))
+def _runs_of(folders: set[Path]) -> set[Run]:
+    runs = set()
+    for folder in folders:
+        with contextlib.suppress(NoRunError):
+            runs.add(load_run(folder))
+    return runs
 
 
 def _confirmed(asked: Asked, run: Path | None) -> Path:
@@ -94,7 +108,7 @@ def _confirmed(asked: Asked, run: Path | None) -> Path:
 def is_live(folder: Path) -> bool:
     """Tell whether a run is under way."""
     try:
-        return load_run(folder).live and not (folder / "summary.json").exists()
+        return not (folder / "summary.json").exists() and load_run(folder).live
     except NoRunError:
         return False
 

@@ -1,4 +1,7 @@
-"""What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock; without a time for what holds for the whole run.
+"""What the page is made of: entries ``[topic, t_s, value]``, seconds of mission clock.
+
+Without a time are facts of the whole run (``FACTS``), and what came before the mission clock was heard: a clock that was not heard
+reads zero, and zero is no time of a flight whose clock is Unix time.
 
 Topics of the record (``alula.common.record``) keep their names and contents, with three exceptions. Of the tree the page gets the shape
 once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what the
@@ -32,6 +35,8 @@ FAULT = "/fault"
 """Something was made to fail: ``{sensor, mode}``."""
 HEALTH = "/health"
 """A watch changed its mind about a sensor: ``{sensor, ok, fault, reason}``."""
+FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY})
+"""Topics of which the last entry counts."""
 NODES = "/nodes"
 """Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""
 
@@ -39,6 +44,9 @@ PICTURE = "/picture"
 """A small picture of a camera: ``{camera, jpeg}``, base64; ``depth``: from yellow, near, to violet, 20 m and more; ``screen``: received."""
 PICTURES_FILE = "pictures.jsonl"
 """Where a flight writes them, a line each, with ``stamp_s``."""
+
+RECORDINGS_FILE = "page.jsonl"
+"""Where a report leaves, an entry a line, what it told of the run's other recordings: with these the live page is the report's equal."""
 
 Wire = tuple[str, float | None, object]
 """An entry as the page gets it."""
@@ -69,19 +77,21 @@ class Converter:
 
     def convert(self, entry: Entry) -> Iterator[Wire]:
         """Yield what the page gets of an entry."""
-        t_s = round(entry.stamp_s, 3)
+        t_s = round(entry.stamp_s, 3) if entry.stamp_ns > 0 else None
         if entry.topic == TREE:
             yield from self._tree(t_s, entry.value)
         elif self._wanted(t_s, entry):
             yield entry.topic, t_s, entry.value
 
-    def _wanted(self, t_s: float, entry: Entry) -> bool:
+    def _wanted(self, t_s: float | None, entry: Entry) -> bool:
         if entry.topic == TICKS:
             before, self._start = self._start, (entry.value.get("unmet"), entry.value.get("conditions"))
             return before != self._start
         return entry.topic != REPORTS and (entry.topic != DATA or self._due(t_s, entry.value))
 
-    def _due(self, t_s: float, sample: Mapping[str, Any]) -> bool:
+    def _due(self, t_s: float | None, sample: Mapping[str, Any]) -> bool:
+        if t_s is None:
+            return True
         key = (sample.get("skillset"), sample.get("data"))
         last_s = self._sampled_s.get(key)
         if last_s is not None and 0.0 <= t_s - last_s < DATA_PERIOD_S - 1e-6:
@@ -89,7 +99,7 @@ class Converter:
         self._sampled_s[key] = t_s
         return True
 
-    def _tree(self, t_s: float, view: Mapping[str, Any]) -> Iterator[Wire]:
+    def _tree(self, t_s: float | None, view: Mapping[str, Any]) -> Iterator[Wire]:
         shape: list[Shape] = []
         nodes: list[tuple[str, str]] = []
         _flatten(view, 0, shape, nodes)

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from alula.console.entries import written
+from alula.console.entries import FACTS, written
 from alula.console.following import RunFollower
 
 POLL_S = 0.1
@@ -34,8 +34,8 @@ class Feed:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.session = secrets.token_hex(8)
-        self.last_s = 0.0
-        """Mission clock of the newest entry."""
+        self.last_s: float | None = None
+        """Mission clock of the newest entry; None: it has not been heard yet."""
         self.changed = asyncio.Event()
         self._follower = RunFollower(folder)
         self._log: list[str] = []
@@ -61,11 +61,12 @@ class Feed:
         came = False
         for topic, t_s, text in entries:
             came = True
-            if t_s is None:
+            if topic in FACTS:
                 self._facts[topic] = (self._facts.get(topic, (0, ""))[0] + 1, text)
             else:
                 self._log.append(text)
-                self.last_s = max(self.last_s, t_s)
+                if t_s is not None:
+                    self.last_s = t_s if self.last_s is None else max(self.last_s, t_s)
         if came:
             self.changed.set()
             self.changed = asyncio.Event()

@@ -11,7 +11,7 @@ from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollow
 from alula.console import journal
 from alula.console.areas import areas_of
 from alula.console.clouds import CloudError, packed, read_points
-from alula.console.entries import AREAS, MAP, PICTURE, PICTURES_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
+from alula.console.entries import AREAS, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
 
 
@@ -33,13 +33,14 @@ class RunFollower:
             (folder / "summary.json", SUMMARY, _json),
         ]
         self._seen: dict[str, tuple[int, int]] = {}
+        self._told = False
 
     def poll(self, limit: int | None = None) -> list[Wire]:
         """Return what came since the last call, what belongs to the whole run first.
 
         ``limit``: read so many entries of the record at most; ``behind`` says then that there may be more.
         """
-        return [*self._changed_files(), *self._new_entries(limit)]
+        return [*self._changed_files(), *self._recordings(), *self._new_entries(limit)]
 
     def _changed_files(self) -> Iterator[Wire]:
         for path, topic, read in self._files:
@@ -54,6 +55,18 @@ class RunFollower:
                 continue
             except (OSError, ValueError, TypeError, CloudError) as error:
                 self._note(f"{path.name}: {error}")
+
+    def _recordings(self) -> list[Wire]:
+        """Return, once, what the report told of the other recordings."""
+        path = self.folder / RECORDINGS_FILE
+        if self._told or not path.is_file():
+            return []
+        self._told = True
+        try:
+            return [(str(topic), t_s, value) for topic, t_s, value in map(json.loads, path.read_text(encoding="utf-8").splitlines())]
+        except (OSError, ValueError, TypeError) as error:
+            self._note(f"{path.name}: {error}")
+            return []
 
     def _new_entries(self, limit: int | None) -> list[Wire]:
         entries: list[Entry] = []

@@ -7,17 +7,16 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from alula.console.acts import ActError
+from alula.console.form import Field, FormError, fields, values
+from alula.console.link import ActError, Skillset, Skillsets
 from alula.model.execution_state import ExecutionState
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.plain import to_plain
-from skill_panel.form import Field, FormError, fields, values
 
 if TYPE_CHECKING:
+    from alula.console.view import ResourceRow, SkillRow, SkillsetView
     from alula.runtime.core.records import ExecutionRecord
     from alula.runtime.handle import SkillHandle
-    from skill_panel.view import ResourceRow, SkillRow, SkillsetView
-    from skill_panel.watcher import Watched
 
 ANSWER_S = 5.0
 """How long (wall clock) managers may take to answer."""
@@ -27,13 +26,11 @@ QUESTIONS = frozenset({"why"})
 
 
 class Hands:
-    """The skillsets in one DDS domain. Listens in a thread of its own until it is closed; everything may be called from any thread."""
+    """The skillsets of a run, until it is closed; everything may be called from any thread."""
 
-    def __init__(self, domain: int) -> None:
-        from skill_panel.watcher import Watcher  # rclpy takes its time; a server that only shows runs does without
-
-        self._watcher = Watcher(domain=domain)
-        self._acts: Mapping[str, Callable[[Watched, Mapping[str, Any]], str]] = {
+    def __init__(self, skillsets: Skillsets) -> None:
+        self._skillsets = skillsets
+        self._acts: Mapping[str, Callable[[Skillset, Mapping[str, Any]], str]] = {
             "start": self._start,
             "interrupt": self._interrupt,
             "pause": lambda one, asked: self._set_paused(one, asked, paused=True),
@@ -44,16 +41,16 @@ class Hands:
 
     def close(self) -> None:
         """End listening; what runs goes on running."""
-        self._watcher.close()
+        self._skillsets.close()
 
     # --- what is shown -------------------------------------------------------------------------------------------------
 
     def describe(self) -> dict[str, Any]:
         """Return what is known now: ``{problems, skillsets: [{root, alive, skills, resources, data}]}``; ages in seconds."""
-        shown = [self._skillset(one, one.view) for one in self._watcher.watched if one.view is not None]
-        return {"problems": self._watcher.problems, "skillsets": shown}
+        shown = [self._skillset(one, one.view) for one in self._skillsets.watched if one.view is not None]
+        return {"problems": self._skillsets.problems, "skillsets": shown}
 
-    def _skillset(self, one: Watched, view: SkillsetView) -> dict[str, Any]:
+    def _skillset(self, one: Skillset, view: SkillsetView) -> dict[str, Any]:
         records = one.client.skills
         ends = {name: record.last for name, record in records.items()}
         return {
@@ -63,7 +60,7 @@ class Hands:
             "resources": [_resource(row) for row in view.resource_rows()],
             "data": [
                 {"name": row.name, "value": row.value, "age_s": None if row.age_s is None else round(row.age_s, 1), "stale": row.stale}
-                for row in view.data_rows(self._watcher.now_ns)
+                for row in view.data_rows(self._skillsets.now_ns)
             ],
         }
 
@@ -78,9 +75,9 @@ class Hands:
             ActError: it makes no sense, or the managers do not answer.
         """
         act, root = asked.get("act"), asked.get("root")
-        one = next((one for one in self._watcher.watched if one.root == root), None)
+        one = next((one for one in self._skillsets.watched if one.root == root), None)
         if one is None:
-            raise ActError(f"there is no skillset {root} in this run; there are {', '.join(one.root for one in self._watcher.watched)}")
+            raise ActError(f"there is no skillset {root} in this run; there are {', '.join(one.root for one in self._skillsets.watched)}")
         if not isinstance(act, str) or act not in self._acts:
             raise ActError(f"there is no act {act}; there are {', '.join(self._acts)}")
         try:
@@ -89,7 +86,7 @@ class Hands:
             raise ActError(str(error)) from error
         return _words(act, one, asked), answer
 
-    def _start(self, one: Watched, asked: Mapping[str, Any]) -> str:
+    def _start(self, one: Skillset, asked: Mapping[str, Any]) -> str:
         skill = _skill_name(one, asked)
         handle = one.start(skill, _inputs(one, skill, asked))
         _wait_for_first_news(handle)
@@ -97,23 +94,23 @@ class Hands:
             return f"{skill} is {handle.state.value}"
         return " ".join(word for word in (handle.outcome, handle.result, handle.message) if word)
 
-    def _interrupt(self, one: Watched, asked: Mapping[str, Any]) -> str:
+    def _interrupt(self, one: Skillset, asked: Mapping[str, Any]) -> str:
         count = one.client.interrupt_all(_skill_name(one, asked)).get(ANSWER_S)
         return f"{count} execution{'' if count == 1 else 's'} told to end" if count else "nothing runs of it"
 
-    def _set_paused(self, one: Watched, asked: Mapping[str, Any], *, paused: bool) -> str:
+    def _set_paused(self, one: Skillset, asked: Mapping[str, Any], *, paused: bool) -> str:
         skill = _skill_name(one, asked)
         open_ones = one.client.skills[skill].open if skill in one.client.skills else ()
         answers = [one.client.set_paused(execution.id, paused).get(ANSWER_S) for execution in open_ones]
         return "; ".join(answer or ("paused" if paused else "goes on") for answer in answers) or "nothing runs of it"
 
-    def _why(self, one: Watched, asked: Mapping[str, Any]) -> str:
+    def _why(self, one: Skillset, asked: Mapping[str, Any]) -> str:
         skill = _skill_name(one, asked)
         why = one.client.why(skill, _inputs(one, skill, asked)).get(ANSWER_S)
         past = [f"{change.stamp_ns / 1e9:.2f} s {change.resource} → {change.to_state} by {change.cause}" for change in why.history]
         return "; ".join(["it could start now" if why.ready else why.reason or why.refusal, *past[-3:]])
 
-    def _transition(self, one: Watched, asked: Mapping[str, Any]) -> str:
+    def _transition(self, one: Skillset, asked: Mapping[str, Any]) -> str:
         resource, to = str(asked.get("resource")), str(asked.get("to"))
         answer = one.client.transition(resource, to).get(ANSWER_S)
         return f"{resource} is {answer.state or to}" if answer.accepted else f"refused: {answer.reason}"
@@ -142,11 +139,11 @@ def _resource(row: ResourceRow) -> dict[str, Any]:
     return {"name": row.name, "state": row.state, "targets": list(row.targets), "every_target": list(row.every_target)}
 
 
-def _fields(one: Watched, skill: str) -> list[Field]:
+def _fields(one: Skillset, skill: str) -> list[Field]:
     return fields(one.client.model.skill(skill), one.client.input_types(skill), {})
 
 
-def _skill_name(one: Watched, asked: Mapping[str, Any]) -> str:
+def _skill_name(one: Skillset, asked: Mapping[str, Any]) -> str:
     name = asked.get("skill")
     known = [skill.name for skill in one.client.model.skills]
     if name not in known:
@@ -154,7 +151,7 @@ def _skill_name(one: Watched, asked: Mapping[str, Any]) -> str:
     return str(name)
 
 
-def _inputs(one: Watched, skill: str, asked: Mapping[str, Any]) -> dict[str, object]:
+def _inputs(one: Skillset, skill: str, asked: Mapping[str, Any]) -> dict[str, object]:
     """Return the values that the texts of a form mean; raise FormError and ActError."""
     texts, made = asked.get("texts"), _fields(one, skill)
     if not isinstance(texts, dict) or not all(isinstance(texts.get(field.name), str) for field in made):
@@ -173,7 +170,7 @@ def _wait_for_first_news(handle: SkillHandle) -> None:
         news.wait(ANSWER_S)
 
 
-def _words(act: str, one: Watched, asked: Mapping[str, Any]) -> str:
+def _words(act: str, one: Skillset, asked: Mapping[str, Any]) -> str:
     """Return an act as the record names it, as ``start navigation.hover duration 2.0``."""
     root = one.root.strip("/").replace("/", ".")
     if act == "transition":

@@ -12,7 +12,8 @@ from pathlib import Path
 FILE = "operator.jsonl"
 
 
-def note(folder: Path, stamp_s: float, act: Mapping[str, object]) -> None:
-    """Write an act down: ``{command, by, answer}`` and what belongs to it; seconds of mission clock."""
+def note(folder: Path, stamp_s: float | None, act: Mapping[str, object]) -> None:
+    """Write an act down: ``{command, by, answer}`` and what belongs to it; seconds of mission clock, None before that is heard."""
+    stamp = {} if stamp_s is None else {"stamp_s": round(stamp_s, 3)}
     with (folder / FILE).open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"stamp_s": round(stamp_s, 3), **act}) + "\n")
+        file.write(json.dumps({**stamp, **act}) + "\n")

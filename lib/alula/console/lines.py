@@ -9,7 +9,7 @@ from alula.common.record import Entry
 
 
 class LinesFollower:
-    """Reads the lines of a file as entries of a topic; each line has ``stamp_s``, seconds of mission clock."""
+    """Reads the lines of a file as entries of a topic; ``stamp_s`` is mission clock, and lines without one are of before that was heard."""
 
     def __init__(self, path: Path, topic: str) -> None:
         self._path = path
@@ -29,6 +29,6 @@ class LinesFollower:
     def _entries(self, line: bytes) -> list[Entry]:
         try:
             value = json.loads(line)
-            return [Entry(self._topic, round(float(value["stamp_s"]) * 1e9), value)]
-        except (ValueError, KeyError, TypeError, OverflowError):
+            return [Entry(self._topic, round(float(value.get("stamp_s", 0.0)) * 1e9), value)]
+        except (ValueError, AttributeError, TypeError, OverflowError):
             return []

@@ -11,14 +11,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from alula.common.files import write_text
-from alula.console.entries import PICTURE, Wire, written
+from alula.console.entries import PICTURE, RECORDINGS_FILE, Wire, written
 from alula.console.following import RunFollower
 
 REPORT = "report.html"
 PARTS = Path(__file__).parent / "page"
 MAX_PICTURES = 400
 """In a report: 3 MB of it at most."""
-PROGRAM = ("dom", "fold", "flight", "story", "tree", "timeline", "map", "figures", "pictures", "operator", "hands", "main")
+PROGRAM = ("dom", "fold", "flight", "story", "state", "tree", "timeline", "map", "figures", "pictures", "operator", "hands", "main")
 """Files of the program, in the order in which they need each other."""
 
 
@@ -48,10 +48,17 @@ def make_page(*, title: str, entries: Iterable[Wire] | None = None) -> str:
 def write_report(folder: Path, more: Iterable[Wire] = (), *, title: str) -> None:
     """Write ``report.html`` into a run's folder: what the folder tells, and ``more`` that its other recordings tell.
 
+    The latter stays in the folder, so that the live page says of a run that is over what the report says, to the last digit.
+
     Raises:
         OSError: it can't be written.
     """
-    entries = few_pictures([*RunFollower(folder).poll(), *more])
+    told = "".join(f"{written(entry)}\n" for entry in more)
+    if told:
+        write_text(folder / RECORDINGS_FILE, told)
+    else:
+        (folder / RECORDINGS_FILE).unlink(missing_ok=True)
+    entries = few_pictures(RunFollower(folder).poll())
     write_text(folder / REPORT, make_page(title=title, entries=sorted(entries, key=lambda entry: (entry[1] is not None, entry[1] or 0.0))))
 
 

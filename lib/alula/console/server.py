@@ -10,6 +10,7 @@ import contextlib
 import json
 import secrets
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import Path
@@ -21,11 +22,12 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from alula.common.runs import NoRunError, runs_folder
+from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
 from alula.console import acts, commands, journal
 from alula.console.admission import Admission
 from alula.console.feed import Feed, place_of
+from alula.console.link import ActError, Link
 from alula.console.page import REPORT, make_page
 
 FEED = "/feed"
@@ -39,6 +41,8 @@ MAX_MESSAGE_BYTES = 1 << 14
 MAX_COMMANDS_PER_S = 10
 LOOK_S = 0.5
 SHOWN_RUNS = 20
+WAITING = 16
+"""So many acts may wait for their answers at once; those by hand have threads of their own, so that none keeps a vehicle from landing."""
 
 
 @dataclass(eq=False)
@@ -49,15 +53,17 @@ class Viewer:
     key: str
     name: str
     run: str = ""
+    may: bool = True
+    """Whether it may do more than watch."""
     hands: bool = False
     """Whether skills by hand are looked at."""
     commands: list[float] = field(default_factory=list)
 
 
 class Console:
-    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest."""
+    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest. ``link`` reaches the robots."""
 
-    def __init__(self, admission: Admission, *, fixed: Path | None = None) -> None:
+    def __init__(self, admission: Admission, link: Link, *, fixed: Path | None = None) -> None:
         self._admission = admission
         self._fixed = fixed
         self._offers = {"scenarios": scenario_names(), "worlds": acts.world_names(), "vehicles": acts.VEHICLES}
@@ -68,19 +74,24 @@ class Console:
         self._runs: list[Path] = []
         self._live: set[Path] = set()
         self._starting = asyncio.Lock()
-        self._commands = commands.Commands()
+        self._commands = commands.Commands(link)
+        self._threads = {by_hand: ThreadPoolExecutor(WAITING, "by_hand" if by_hand else "acts") for by_hand in (False, True)}
+        self._under_way: dict[tuple[object, ...], asyncio.Task[commands.Done]] = {}
         self._by_hand: dict[Path, str] = {}
         self._answering: set[asyncio.Task[None]] = set()
+        self._problem = ""
+        """Why a robot whose run is under way can't be reached."""
 
     @contextlib.asynccontextmanager
     async def open(self) -> Any:
         """Serve as long as the context lasts."""
         server: Server
-        looking = [asyncio.create_task(job) for job in (self._look_for_runs(), self._look_at_skills())]
+        looking = [asyncio.create_task(job) for job in (self._look_for_runs(), self._look_at_skills(), self._stay_connected())]
         async with serve(
             self._serve_viewer,
             self._admission.host,
             self._admission.port,
+            ssl=self._admission.tls,
             process_request=self._answer,
             max_size=MAX_MESSAGE_BYTES,
             write_limit=1 << 18,
@@ -94,7 +105,9 @@ class Console:
             finally:
                 for task in [*looking, *(task for _, task in self._feeds.values())]:
                     task.cancel()
-                await asyncio.to_thread(self._commands.hands_off, set())
+                await asyncio.to_thread(self._commands.keep, set(), set())
+                for threads in self._threads.values():
+                    threads.shutdown(wait=False, cancel_futures=True)
 
     # --- pages ---------------------------------------------------------------------------------------------------------
 
@@ -103,12 +116,20 @@ class Console:
         path = unquote(urlsplit(request.path).path)
         headers = request.headers
         socket = path == FEED
-        refusal = self._admission.refusal(target=request.path, host=headers.get("Host"), origin=headers.get("Origin"), socket=socket)
+        refusal = self._admission.refusal(
+            target=request.path,
+            host=headers.get("Host"),
+            origin=headers.get("Origin"),
+            cookie="; ".join(headers.get_all("Cookie")),
+            opens_socket=socket,
+        )
         if refusal:
             return self._page_of(HTTPStatus.FORBIDDEN, f"{refusal}\n".encode(), "text/plain; charset=utf-8")
         if socket:
             full = len(self._viewers) >= MAX_VIEWERS
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many viewers\n") if full else None
+        if self._admission.brings_token(request.path):  # the token leaves the address, and with it the browser's history
+            return self._page_of(HTTPStatus.SEE_OTHER, b"", "text/plain", more={"Location": "/", "Set-Cookie": self._admission.cookie})
         if path == "/":
             return self._page_of(HTTPStatus.OK, self._page, "text/html; charset=utf-8")
         return self._report(path)
@@ -120,9 +141,12 @@ class Console:
         # In a sandbox, a page of a run has an origin of its own: nothing in it can command.
         return self._page_of(HTTPStatus.OK, (run / REPORT).read_bytes(), "text/html; charset=utf-8", policy="sandbox allow-scripts")
 
-    def _page_of(self, status: HTTPStatus, body: bytes, kind: str, *, policy: str = "frame-ancestors 'none'") -> Response:
+    def _page_of(
+        self, status: HTTPStatus, body: bytes, kind: str, *, policy: str = "frame-ancestors 'none'", more: Mapping[str, str] | None = None
+    ) -> Response:
         headers = Headers(
             {
+                **(more or {}),
                 "Content-Type": kind,
                 "Content-Length": str(len(body)),
                 "Content-Security-Policy": policy,
@@ -143,12 +167,26 @@ class Console:
             await asyncio.sleep(LOOK_S)
 
     async def _look_at_skills(self) -> None:
-        """Keep an eye on the skillsets of the runs whose viewers look at them, and on no others: listening costs."""
+        """Keep an eye on the skillsets of the runs whose viewers look at them."""
         while True:
-            watched = {run for viewer in self._viewers if viewer.hands and (run := self._run_of(viewer)) in self._live}
+            watched = self._watched(by_hand=True)
             self._by_hand = {run: await asyncio.to_thread(self._seen_by_hand, run) for run in watched}
-            await asyncio.to_thread(self._commands.hands_off, watched)
             await asyncio.sleep(STATUS_S)
+
+    async def _stay_connected(self) -> None:
+        """Be connected to what viewers watch before they command it."""
+        while True:
+            try:
+                await asyncio.to_thread(self._commands.keep, self._watched(), self._watched(by_hand=True))
+                self._problem = ""
+            except Exception as error:  # noqa: BLE001 - whatever ROS says, the next try may be better
+                self._problem = str(error)
+            await asyncio.sleep(STATUS_S)
+
+    def _watched(self, *, by_hand: bool = False) -> set[Path]:
+        """Return the runs under way that are watched or, as the one that is shown first, soon will be; or those that are driven by hand."""
+        shown = [self._run_of(viewer) for viewer in self._viewers if viewer.hands or not by_hand]
+        return {run for run in [*shown, *([] if by_hand else [self._shown_first()])] if run in self._live}
 
     def _seen_by_hand(self, run: Path) -> str:
         try:
@@ -160,7 +198,10 @@ class Console:
     def _run_of(self, viewer: Viewer) -> Path | None:
         """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
         chosen = next((folder for folder in self._runs if folder.name == viewer.run), None)
-        return chosen or self._fixed or (self._runs[0] if self._runs else None)
+        return chosen or self._shown_first()
+
+    def _shown_first(self) -> Path | None:
+        return self._fixed or (self._runs[0] if self._runs else None)
 
     def _feed(self, folder: Path) -> Feed:
         if folder not in self._feeds:
@@ -171,12 +212,14 @@ class Console:
     # --- viewers -------------------------------------------------------------------------------------------------------
 
     async def _serve_viewer(self, connection: ServerConnection) -> None:
-        with contextlib.suppress(ConnectionClosed, TimeoutError, ValueError):
+        with contextlib.suppress(ConnectionClosed, TimeoutError, ValueError, ActError):
             hello = _object(await asyncio.wait_for(connection.recv(), HELLO_S))
+            _check_text(hello)
             viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "a viewer")[:40])
             viewer.run, viewer.hands = str(hello.get("run") or ""), hello.get("hands") is True
+            viewer.may = self._admission.may_command(str(connection.remote_address[0]))
             self._viewers.add(viewer)
-            self._commander = self._commander or viewer.key
+            self._commander = self._commander or (viewer.key if viewer.may else "")
             sending = asyncio.create_task(self._send(viewer, hello))
             try:
                 async for message in connection:
@@ -218,10 +261,11 @@ class Console:
             "report": run is not None and (run / REPORT).is_file(),
             "runs": [folder.name for folder in self._runs[:SHOWN_RUNS]],
             **self._offers,
-            "commands": viewer.key == self._commander,
+            "commands": viewer.may and viewer.key == self._commander,
+            "may": viewer.may,
             "commander": commander,
             "viewers": len(self._viewers),
-            "problems": [] if feed is None else feed.problems,
+            "problems": [*([] if feed is None else feed.problems), *([self._problem] if self._problem else [])],
         }
 
     # --- commands ------------------------------------------------------------------------------------------------------
@@ -243,8 +287,9 @@ class Console:
 
     async def _answer_command(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> None:
         try:
+            _check_text(asked)
             answer = await self._do(viewer, command, asked)
-        except (acts.ActError, NoRunError, OSError, KeyError) as error:
+        except Exception as error:  # noqa: BLE001 - whatever goes wrong, the viewer is told
             answer = f"refused: {error}"
         started = viewer.run if command == "start" else ""
         with contextlib.suppress(ConnectionClosed):
@@ -252,19 +297,38 @@ class Console:
 
     async def _do(self, viewer: Viewer, command: str, asked: Mapping[str, Any]) -> str:
         run = self._run_of(viewer)
+        if not viewer.may:
+            raise ActError("without TLS, other machines may only watch; start the console without --plain")
         if command == "take":
             self._commander = viewer.key
             self._note(run, viewer, command, "commands now")
             return "you command now"
         if viewer.key != self._commander:
-            raise acts.ActError("you watch; take over first")
-        async with self._starting if command == "start" else contextlib.nullcontext():
-            done = await asyncio.to_thread(self._commands.do, command, asked, run)
+            raise ActError("you watch; take over first")
         if command == "start":
+            async with self._starting:
+                done = await self._act(viewer, command, asked, run)
             viewer.run = done.run.name
+        elif command in commands.ON_THE_FLIGHT:
+            done = await asyncio.shield(self._joined(viewer, command, asked, run))
+        else:
+            done = await self._act(viewer, command, asked, run)
+        return done.answer
+
+    def _joined(self, viewer: Viewer, command: str, asked: Mapping[str, Any], run: Path | None) -> asyncio.Task[commands.Done]:
+        """Begin an act, or return the one of the same meaning that is under way: pressing again asks for nothing new."""
+        key = (command, run, str(asked.get("run")))
+        if key not in self._under_way:
+            self._under_way[key] = asyncio.create_task(self._act(viewer, command, asked, run))
+            self._under_way[key].add_done_callback(lambda _: self._under_way.pop(key))
+        return self._under_way[key]
+
+    async def _act(self, viewer: Viewer, command: str, asked: Mapping[str, Any], run: Path | None) -> commands.Done:
+        threads = self._threads[command == "skill"]
+        done = await asyncio.get_running_loop().run_in_executor(threads, self._commands.do, command, asked, run)
         if done.noted:
             self._note(done.run, viewer, done.what, done.answer)
-        return done.answer
+        return done
 
     def _note(self, run: Path | None, viewer: Viewer, command: str, answer: str) -> None:
         if run is None or not run.is_dir():
@@ -280,3 +344,11 @@ def _object(message: str | bytes) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError("a message is a JSON object")  # noqa: TRY004 - as for what is no JSON at all
     return value
+
+
+def _check_text(asked: Mapping[str, Any]) -> None:
+    """Refuse halves of characters, which JSON can write and no file, process or log can take; raise ActError."""
+    try:
+        json.dumps(asked, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        raise ActError(f"the text holds {error.object[error.start]!r}, half of a character (a lone surrogate)") from error

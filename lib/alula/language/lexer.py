@@ -133,8 +133,13 @@ def tokenize(source: Source) -> list[Token]:
                 break
         else:
             tokens.append(_shortened(source, Token(Kind[str(group)], match.group(), line, column)))
-    tokens.append(Token(Kind.END, "", line, len(text) - line_start + 1))
+    tokens.append(_end(text))
     return tokens
+
+
+def _end(text: str) -> Token:
+    """Return the token behind the last character, also where reading has stopped before."""
+    return Token(Kind.END, "", text.count("\n") + 1, len(text) - text.rfind("\n"))
 
 
 def _shortened(source: Source, token: Token) -> Token:

@@ -1,22 +1,24 @@
 """`./alula bench prove [--json FILE] [--sizes 10,20,50,100,200] [--timeout 30]`: how far the proofs scale.
 
-Grows two kinds of skillsets by skills and resources alike, and proves them one situation at a time and as sets, each
-in a process of its own: seconds of the clock and of the processor, peak memory, and where it stops. A line is printed as soon
-as it is measured.
+Grows three kinds of skillsets by skills, two of them by resources alike, and proves them one situation at a time and as sets,
+each in a process of its own: seconds of the clock and of the processor, peak memory, and where it stops. A line is printed as
+soon as it is measured.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import random
 import resource
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from alula.model.expressions import And, ResourceIs, SkillRuns
+from alula.model.expressions import And, Not, ResourceIs, SkillRuns
 from alula.model.model import (
     Assignment,
     Effect,
@@ -34,6 +36,7 @@ from alula.model.model import (
 from alula.prove.prover import prove
 
 ALL_ONE_BY_ONE = 10**9
+SPARSE_RESOURCES = 60
 
 
 def tools(count: int) -> Skillset:
@@ -56,7 +59,28 @@ def neighbours(count: int) -> Skillset:
     return Skillset("neighbours", resources=tuple(_free_or_used(f"part{i}") for i in range(count)), skills=skills, properties=(both,))
 
 
-FAMILIES = {"tools": tools, "neighbours": neighbours}
+def sparse(count: int) -> Skillset:
+    """Return skills that each use three of sixty resources at random: one is taken, the others must be free and stay so."""
+    chance = random.Random(count)  # noqa: S311 - nothing here is secret
+    names = [f"part{i}" for i in range(SPARSE_RESOURCES)]
+    skills = tuple(_taking(f"use{i}", *chance.sample(names, 3)) for i in range(count))
+    alone = Property("alone", PropertyKind.NEVER, And((SkillRuns("use0"), Not(ResourceIs(_taken(skills[0]), "Used")))))
+    ends = Property("ends", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs(_taken(skills[0]), "Free"), fair=True)
+    return Skillset("sparse", resources=tuple(map(_free_or_used, names)), skills=skills, properties=(alone, ends))
+
+
+def _taken(skill: Skill) -> str:
+    return skill.start.assignments[0].resource
+
+
+def _taking(name: str, mine: str, *others: str) -> Skill:
+    free = tuple(Precondition(f"{one}_is_free", ResourceIs(one, "Free")) for one in others)
+    skill = _using(name, [mine])
+    stay = Invariant("stay_free", And(tuple(ResourceIs(one, "Free") for one in others)), skill.interrupt.effect)
+    return replace(skill, preconditions=(*free, *skill.preconditions), invariants=(stay, *skill.invariants))
+
+
+FAMILIES = {"tools": tools, "neighbours": neighbours, "sparse": sparse}
 METHODS = {"one by one": ALL_ONE_BY_ONE, "sets": 0}
 
 
@@ -118,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="alula bench prove", description="Measure how far the proofs of skillsets scale.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured to this file, too")
-    parser.add_argument("--sizes", type=_sizes, default=_sizes("10,20,50,100,200"), help="numbers of skills, and as many resources")
+    parser.add_argument("--sizes", type=_sizes, default=_sizes("10,20,50,100,200"), help="numbers of skills")
     parser.add_argument("--timeout", type=float, default=30.0, metavar="SECONDS", help="for each proof (30)")
     parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure this one only, in this process")
     return parser

@@ -35,13 +35,12 @@ class Update:
 
 
 @dataclass(frozen=True)
-class Cluster:
-    """Skills whose violations touch what another of them needs; those of different clusters take effect in any order alike."""
+class Within:
+    """Situations within a step, in which the variable ``broken`` is true; ``about`` are the resources that decide."""
 
-    skills: tuple[str, ...]
-    broken: tuple[str, ...]
-    idle: Any
-    """None of its executions is found broken."""
+    broken: str
+    situations: Any
+    about: tuple[str, ...]
 
 
 @dataclass
@@ -60,12 +59,9 @@ class Encoded:
     """For each resource the skills with an invariant about it."""
     faults: dict[tuple[str, ...], Any] = field(default_factory=dict)
     """Situations that show a fault before the step; those of ``inner`` show it within one."""
-    inner: dict[tuple[str, ...], Any] = field(default_factory=dict)
+    inner: dict[tuple[str, ...], Within] = field(default_factory=dict)
     startable: dict[str, Any] = field(default_factory=dict)
     crowded: dict[str, Any] = field(default_factory=dict)
-    clusters: list[Cluster] = field(default_factory=list)
-    idle: Any = None
-    """No execution is found broken: the step is over."""
 
     # --- terms ----------------------------------------------------------------------------------------------------
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 from dd import cudd
@@ -17,7 +16,7 @@ from dd import cudd
 from alula.model.expressions import Expression, ResourceIs, atoms
 from alula.model.model import Effect, Event, Resource, Skill, Skillset
 from alula.prove.abstract import Abstraction, Breaker
-from alula.prove.diagrams import ENDED, Cluster, Encoded, Update, bits, broken_name, runs_name
+from alula.prove.diagrams import ENDED, Encoded, Update, Within, bits, broken_name, runs_name
 from alula.prove.limits import Deadline
 
 
@@ -41,8 +40,6 @@ def encode(abstraction: Abstraction, copies: int, deadline: Deadline) -> Encoded
     for birth in abstraction.births:
         model.faults["after start", birth.skill, birth.invariant] |= model.startable[birth.skill] & model.term(birth.when)
     model.steps = _distinct(model)
-    model.clusters = [_cluster(model, skills) for skills in _entangled(model.skillset)]
-    model.idle = model.all_of(cluster.idle for cluster in model.clusters)
     return model
 
 
@@ -72,33 +69,8 @@ def _distinct(model: Encoded) -> list[Update]:
     return list(steps.values())
 
 
-def _cluster(model: Encoded, skills: Sequence[Skill]) -> Cluster:
-    broken = tuple(broken_name(skill.name, invariant.name) for skill in skills for invariant in skill.invariants)
-    idle = model.all_of(~model.bdd.var(name) for name in broken)
-    return Cluster(tuple(skill.name for skill in skills), broken, idle)
-
-
-def _entangled(skillset: Skillset) -> list[list[Skill]]:
-    """Return groups of skills with invariants: two are together when what one's violations write concerns the other."""
-    groups: list[tuple[list[Skill], set[str], set[str]]] = []
-    for skill in skillset.skills:
-        if not skill.invariants:
-            continue
-        writes = {change.resource for invariant in skill.invariants for change in invariant.effect.assignments}
-        asked = [atom for invariant in skill.invariants for atom in atoms(invariant.condition)]
-        concerns = writes | {atom.resource for atom in asked if isinstance(atom, ResourceIs)}
-        joined, apart = [skill], []
-        for others, written, concerned in groups:
-            if writes & concerned or written & concerns:
-                joined, writes, concerns = [*others, *joined], writes | written, concerns | concerned
-            else:
-                apart.append((others, written, concerned))
-        groups = [*apart, (joined, writes, concerns)]
-    return [group for group, _, _ in groups]
-
-
 def _declared(skillset: Skillset, copies: int) -> Encoded:
-    """Declare the variables: a skill's beside the resource that the fewest others are about, for small diagrams."""
+    """Declare the variables: a skill's beside the resource that it takes, for small diagrams; the one that the fewest others are about."""
     model = Encoded(skillset, cudd.BDD())
     model.bdd.configure(reordering=False)
     about = {skill.name: _about(skill) for skill in skillset.skills}
@@ -121,8 +93,8 @@ def _declare_skill(model: Encoded, skill: Skill, copies: int) -> None:
 
 def _about(skill: Skill) -> set[str]:
     conditions = [*(p.condition for p in skill.preconditions), *(i.condition for i in skill.invariants)]
-    names = {atom.resource for condition in conditions for atom in atoms(condition) if isinstance(atom, ResourceIs)}
-    return names | {change.resource for change in skill.start.assignments}
+    taken = {change.resource for change in skill.start.assignments}
+    return taken or {atom.resource for condition in conditions for atom in atoms(condition) if isinstance(atom, ResourceIs)}
 
 
 def _alone(model: Encoded, skill: Skill) -> bool:
@@ -139,7 +111,8 @@ def _marks(model: Encoded, skill: Skill) -> None:
         true_before &= holds
         applies = model.applies(invariant.effect)
         if invariant.effect.assignments:
-            model.inner["effect", "invariant", skill.name, invariant.name] = model.bdd.var(name) & running & ~applies
+            fault = Within(name, model.bdd.var(name) & running & ~applies, _changed(invariant.effect))
+            model.inner["effect", "invariant", skill.name, invariant.name] = fault
         model.violations[name] = [
             Update(update.guard, {**update.values, **({name: False} if last else {})}, update.changed, skill.name)
             for update, last in _ending(model, skill, model.bdd.var(name), invariant.effect, applies)

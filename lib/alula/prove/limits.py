@@ -3,27 +3,42 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 DEFAULT_TIME_S = 30.0
 """How long the proofs of a file may take."""
+
+
+EVERY_S = 5.0
+"""How often a long search says how far it is."""
 
 
 class OutOfTimeError(Exception):
     """The time given is over."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Deadline:
-    """A moment on the monotonic clock, seconds; ``given_s`` is what the user allowed."""
+    """A moment on the monotonic clock, seconds; ``given_s`` is what the user allowed.
+
+    ``tell`` is called with what is being done and for how long, every few seconds of a long search.
+    """
 
     at_s: float
     given_s: float
+    tell: Callable[[str], None] | None = None
+    doing: str = ""
+    _told_s: float = field(default_factory=time.monotonic)
 
     @classmethod
-    def after(cls, given_s: float) -> Deadline:
+    def after(cls, given_s: float, tell: Callable[[str], None] | None = None) -> Deadline:
         """Return the moment so many seconds from now."""
-        return cls(time.monotonic() + given_s, given_s)
+        return cls(time.monotonic() + given_s, given_s, tell)
+
+    def half(self) -> Deadline:
+        """Return the moment in the middle of what is left."""
+        return replace(self, at_s=self.at_s - self.left_s() / 2)
 
     def left_s(self) -> float:
         """Return the seconds that are left, never below zero."""
@@ -31,5 +46,9 @@ class Deadline:
 
     def check(self) -> None:
         """Raise OutOfTimeError when the moment has passed."""
-        if time.monotonic() > self.at_s:
+        now_s = time.monotonic()
+        if now_s > self.at_s:
             raise OutOfTimeError
+        if self.tell is not None and now_s - self._told_s >= EVERY_S:
+            self._told_s = now_s
+            self.tell(f"{self.doing}; {self.given_s - self.left_s():.0f} s of {self.given_s:.3g} s")

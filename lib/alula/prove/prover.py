@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from alula.language.errors import Diagnostic, Severity
@@ -26,18 +27,20 @@ def prove(
     timeout_s: float = 30.0,
     most: int = MOST_SITUATIONS,
     copies: int = COPIES,
+    tell: Callable[[str], None] | None = None,
 ) -> list[Diagnostic]:
     """Return what is wrong with a skillset that the checker finds no error in, in the order of the source.
 
     An arrow that nothing in the model takes may be taken from outside (see ``outside``), unless ``closed_world``. What could not
     be decided within ``timeout_s`` seconds is a finding as well (ALU540). The skillset must be free of errors of
     ``alula.language.check``: every name in it leads somewhere. ``most`` is how many situations are looked at one by one before they
-    are taken as sets, ``copies`` how many executions of one skill at once.
+    are taken as sets, ``copies`` how many executions of one skill at once. ``tell`` hears now and then what takes long.
     """
-    deadline = Deadline.after(timeout_s)
+    deadline = Deadline.after(timeout_s, tell)
     findings: list[Diagnostic] = []
     suspects: list[Suspect] = []
     try:
+        deadline.doing = "each block alone"
         findings, suspects = local_checks(skillset, deadline)
         search = _Search(skillset, suspects, deadline, most, copies)
         findings += search.findings() if closed_world else search.open_findings()
@@ -63,8 +66,10 @@ class _Search:
         """Return all global findings, where these arrows are taken from outside as well."""
         skillset = opened(self.skillset, outside) if outside else self.skillset
         abstraction = without_data(skillset, self.deadline, outside)
+        self.deadline.doing = "situations one by one"
         found = explicit.search(skillset, abstraction, self.suspects, self.deadline, most=self.most, copies=self.copies)
         if found is None:
+            self.deadline.doing = "situations as sets"
             found = symbolic.search(skillset, abstraction, self.suspects, self.deadline, copies=self.copies)
         return found
 

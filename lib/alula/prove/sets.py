@@ -2,28 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import heapq
+from collections.abc import Iterable, Iterator
 from typing import Any
 
-from alula.prove.diagrams import ENDED, Cluster, Encoded, Update
+from alula.prove.aftermath import Aftermath, Group, Step
+from alula.prove.bound import Bound
+from alula.prove.diagrams import ENDED, Encoded, Update, Within, runs_name
 from alula.prove.limits import Deadline
 from alula.prove.steps import State
 
 MANY_NODES = 200_000
 """From here on CUDD may look for a better order of the variables; below, its looking costs more than it gains (see ``bench``)."""
 
+MOST_NODES = 1_000
+"""A larger set of all that can be reached is given up for the bound: it would go on growing (see ``bench``)."""
+
 
 class Sets:
-    """The reachable situations of a skillset as one diagram, ``reached``."""
+    """The reachable situations of a skillset as one diagram, ``reached``.
+
+    Where that diagram becomes too large, and ``exact`` is false, it is one of more situations (see ``bound``). Whatever is
+    found backwards within it is true of those that can be reached: what follows one of these can be reached, too.
+    """
 
     def __init__(self, model: Encoded, deadline: Deadline) -> None:
         self.model = model
         self.bdd = model.bdd
         self.deadline = deadline
-        self.inside = self.bdd.false
-        """All that is ever found broken within a step, to keep the way back narrow."""
+        self.bound = Bound(model, deadline)
+        self.aftermath = Aftermath(model, self.bound)
         self.initial = self._initial()
-        self.reached = self._reach()
+        self.steps = self._steps()
+        self.exact = True
+        self.reached = self._reach(MOST_NODES)
+        if not self.exact:
+            self.reached = self._outer()
+
+    def _steps(self) -> list[Step]:
+        """Return the steps in the order of the variables, so that what touches the same stands together."""
+        level = self.bdd.var_levels
+        steps: list[Step] = []
+        for update in sorted(self.model.steps, key=lambda one: max(level[name] for name in one.values)):
+            self.deadline.check()
+            steps.append(self.aftermath.step(update))
+        return steps
+
+    def complete(self) -> None:
+        """Have ``reached`` be exactly what can be reached, however large that is."""
+        self.exact = True
+        self.reached = self._reach(None)
 
     # --- forwards -------------------------------------------------------------------------------------------------
 
@@ -31,29 +59,69 @@ class Sets:
         values: dict[str, bool] = {}
         for resource in self.model.skillset.resources:
             values |= self.model.values_of(resource.name, resource.initial)
-        others = {name: False for name in self.bdd.vars if name not in values and name != ENDED}
-        return self.bdd.cube(values | others)
+        runs = {runs_name(skill, number): False for skill, most in self.model.copies.items() for number in range(1, most + 1)}
+        return self.bdd.cube(values | runs)
 
-    def _reach(self) -> Any:
-        """Take each step again and again until it adds nothing, then the next, until none adds anything."""
-        reached, before = self.initial, self.bdd.false
-        while reached != before:
-            before = reached
+    def _reach(self, most: int | None) -> Any:
+        """Take each step again and again until it adds nothing; after one that adds, all again that have to do with it.
+
+        The first step of those goes first (saturation, after Ciardo): sets of few parts are closed before more parts move.
+        With ``most`` nodes it is given up, and not ``exact``.
+        """
+        related = self._related()
+        waiting = list(range(len(self.steps)))
+        queued = set(waiting)
+        reached = self.initial
+        while waiting:
+            number = heapq.heappop(waiting)
+            queued.discard(number)
+            before = fresh = reached
+            while fresh != self.bdd.false:
+                self.deadline.check()
+                fresh = self.after(fresh, self.steps[number]) & ~reached
+                reached |= fresh
+            if reached == before:
+                continue
+            if most is not None and len(reached) > most:
+                self.exact = False
+                return reached
             if len(self.bdd) > MANY_NODES:
                 self.bdd.configure(reordering=True)
-            for update in self.model.steps:
-                fresh = reached
-                while fresh != self.bdd.false:
-                    self.deadline.check()
-                    fresh = self.after(fresh, update) & ~reached
-                    reached |= fresh
+            for other in related[number] - queued:
+                heapq.heappush(waiting, other)
+                queued.add(other)
         return reached
 
-    def after(self, situations: Any, update: Update) -> Any:
+    def _related(self) -> list[set[int]]:
+        """Return for each step the others that it may enable or come before in another way: one sets what the other is about."""
+        setting: dict[str, set[int]] = {}
+        asking: dict[str, set[int]] = {}
+        for number, step in enumerate(self.steps):
+            for name in step.sets:
+                setting.setdefault(name, set()).add(number)
+            for name in step.about:
+                asking.setdefault(name, set()).add(number)
+        return [
+            set().union(*(asking.get(name, set()) for name in step.sets), *(setting.get(name, set()) for name in step.about)) - {number}
+            for number, step in enumerate(self.steps)
+        ]
+
+    def _outer(self) -> Any:
+        """Return all that the bound allows, as far as that stays small."""
+        outer = self.bdd.true
+        for block in self.bound.blocks.values():
+            self.deadline.check()
+            both = outer & block.settled
+            if len(both) <= MOST_NODES:
+                outer = both
+        return outer
+
+    def after(self, situations: Any, step: Step) -> Any:
         """Return what a step makes of situations."""
-        changed = self._updated(situations, update)
-        watching = {skill for resource in update.changed for skill in self.model.watchers.get(resource, ())}
-        return self._settled(changed, {*watching, *([update.touches] if update.touches else [])})
+        changed = self._updated(situations, step.update)
+        for group in step.groups if changed != self.bdd.false else ():
+            changed = self._settled(group, changed)
+        return changed
 
     def _updated(self, situations: Any, update: Update) -> Any:
         taken = situations & update.guard
@@ -65,7 +133,7 @@ class Sets:
         """Mark executions whose invariant is false, by its first false one, unless they are marked already."""
         if situations == self.bdd.false:
             return situations
-        for skill in sorted(skills):
+        for skill in skills:
             marks = self.model.marks.get(skill, [])
             unmarked = situations & self.model.all_of(~self.bdd.var(name) for name, _ in marks)
             for name, first_false in marks:
@@ -74,76 +142,78 @@ class Sets:
                     situations = (situations & ~found) | (self.bdd.exist([name], found) & self.bdd.var(name))
         return situations
 
-    def _settled(self, situations: Any, concerned: set[str]) -> Any:
-        """Mark and end all broken executions; those of one cluster know nothing of the others', so that one follows the other."""
-        for cluster in (one for one in self.model.clusters if concerned.intersection(one.skills)):
-            self.deadline.check()
-            situations = self._marked(situations, concerned.intersection(cluster.skills))
-            if situations & ~cluster.idle != self.bdd.false:
-                situations = self._settled_in(cluster, situations)
-        return situations
-
-    def _settled_in(self, cluster: Cluster, situations: Any) -> Any:
+    def _settled(self, group: Group, situations: Any) -> Any:
+        """Mark and end all broken executions of a group; those of another know nothing of them, so that one follows the other."""
+        situations = self._marked(situations & group.idle, group.first)
         done = self.bdd.false
         while situations != self.bdd.false:
             self.deadline.check()
-            done |= situations & cluster.idle
-            situations &= ~cluster.idle
-            self.inside |= situations
+            done |= situations & group.idle
+            situations &= ~group.idle
             following = self.bdd.false
-            for name in cluster.broken:
+            for name in group.broken:
                 broken = situations & self.bdd.var(name)
                 for update in self.model.violations[name] if broken != self.bdd.false else ():
-                    watching = {skill for resource in update.changed for skill in self.model.watchers.get(resource, ())}
-                    following |= self._marked(self._updated(broken, update), watching)
+                    following |= self._marked(self._updated(broken, update), self.aftermath.watching(name, update))
             situations = following
-        return done
+        return self.bdd.exist(list(group.broken), done)
 
     # --- backwards ------------------------------------------------------------------------------------------------
 
-    def before(self, situations: Any, *, within: Any = None, ending: str = "") -> Any:
-        """Return the reachable situations with a step to one of these, or (``within``) with a step in which it comes to that.
+    def before(self, situations: Any, *, within: Within | None = None, ending: str = "") -> Any:
+        """Return the situations with a step to one of these, as far as they may be reached.
 
-        With ``ending`` only steps that end an execution of this skill count.
+        Those with a step in which it comes to ``within`` are meant, too. With ``ending`` only steps that end an execution of
+        this skill count.
         """
-        goal = situations & self.model.idle
-        if ending:
-            goal &= self.bdd.var(ENDED)
-        unsettled = self._before_settling(goal, self.bdd.false if within is None else within, ending)
+        goal = situations & self.bdd.var(ENDED) if ending else situations
         result = self.bdd.false
-        for update in self.model.steps:
+        for step in self.steps:
             self.deadline.check()
-            result |= self._undone(unsettled, update, ending) & self.reached
+            result |= self._one_before(step, goal, within, ending)
         if ending:
             result = self.bdd.let({ENDED: False}, result)
-        return result & self.reached
+        return result & self.reached if self.exact else result & self.bound.near(result)
 
-    def _undone(self, situations: Any, update: Update, ending: str) -> Any:
-        values: Mapping[str, bool] = update.values
-        if ending and update.ends == ending:
-            values = {**values, ENDED: True}
-        return update.guard & self.bdd.let(dict(values), situations)
+    def nearer(self, situations: Any) -> Iterator[Any]:
+        """Yield, a step after another, ``before`` without situations that are left as they are in what these are about."""
+        about = set(self.bdd.support(situations))
+        for step in self.steps:
+            if not about.isdisjoint(step.sets):
+                self.deadline.check()
+                yield self.narrowed(self._one_before(step, situations))
 
-    def _before_settling(self, goal: Any, within: Any, ending: str) -> Any:
-        """Return the situations, right after an update, that settle to the goal or come to be within on the way."""
-        for cluster in reversed(self.model.clusters):
-            seeds = within & self.inside & ~cluster.idle
-            goal = self._before_marking(self._before_settling_in(cluster, goal | seeds, ending), cluster.skills)
-        return goal
+    def narrowed(self, situations: Any) -> Any:
+        """Return a set without what can't be reached, as far as that is known."""
+        return situations & (self.reached if self.exact else self.bound.near(situations))
 
-    def _before_settling_in(self, cluster: Cluster, goal: Any, ending: str) -> Any:
-        fresh = goal
+    def _one_before(self, step: Step, situations: Any, within: Within | None = None, ending: str = "") -> Any:
+        """Return the situations that one step takes to these."""
+        for group in reversed(step.groups):
+            seeds = within.situations if within is not None and within.broken in group.broken else self.bdd.false
+            if seeds == self.bdd.false and not ending and group.sets.isdisjoint(self.bdd.support(situations)):
+                continue  # whatever it ends, it leaves these situations as they are
+            situations = self._before_settling(group, situations, seeds, ending)
+        return self._undone(situations, step.update, ending)
+
+    def _undone(self, situations: Any, update: Update, ending: str = "") -> Any:
+        values = {**update.values, ENDED: True} if ending and update.ends == ending else dict(update.values)
+        return update.guard & self.bdd.let(values, situations)
+
+    def _before_settling(self, group: Group, situations: Any, seeds: Any, ending: str) -> Any:
+        """Return the situations, right after an update, that settle to these or come to be among the seeds on the way."""
+        found = fresh = (situations & group.idle) | seeds
         while fresh != self.bdd.false:
             self.deadline.check()
-            unmarked = self._before_marking(fresh, cluster.skills)
             earlier = self.bdd.false
-            for name in cluster.broken:
-                here = self.inside & self.bdd.var(name)
+            for name in group.broken:
                 for update in self.model.violations[name]:
-                    earlier |= self._undone(unmarked, update, ending) & here
-            fresh = earlier & ~goal
-            goal |= fresh
-        return goal
+                    unmarked = self._before_marking(fresh, self.aftermath.watching(name, update))
+                    earlier |= self._undone(unmarked, update, ending) & self.bdd.var(name) & self.bound.unmarked(update.changed)
+            fresh = earlier & ~found
+            found |= fresh
+        found = self._before_marking(found, group.first)
+        return self.bdd.let(dict.fromkeys(group.broken, False), found)
 
     def _before_marking(self, situations: Any, skills: Iterable[str]) -> Any:
         for skill in skills:
@@ -160,18 +230,17 @@ class Sets:
     def can_come_to(self, goal: Any, *, avoiding: Any = None) -> Any:
         """Return the reachable situations from which some run comes to the goal, all before it being none of ``avoiding``."""
         allowed = self.reached if avoiding is None else self.reached & ~avoiding
-        found = goal & self.reached
-        fresh = found
-        while fresh != self.bdd.false:
-            # What is found goes on being used in the same round: right after an update, a situation of ``found`` is settled.
-            ways = self._before_settling(fresh & self.model.idle, self.bdd.false, "")
-            before = found
-            for update in self.model.steps:
-                self.deadline.check()
-                earlier = self._undone(ways, update, "") & allowed & ~found
-                found |= earlier
-                ways |= earlier
-            fresh = found & ~before
+        found, before = goal & self.reached, self.bdd.false
+        # What ends executions leads back: steps of this kind may be all that is needed.
+        for steps in ([step for step in self.steps if step.update.ends], self.steps):
+            while found != before:
+                before = found
+                for step in steps:
+                    self.deadline.check()
+                    if allowed & ~found == self.bdd.false:
+                        return found
+                    found |= self._one_before(step, found) & allowed
+            before = self.bdd.false
         return found
 
     # --- single situations ----------------------------------------------------------------------------------------
@@ -198,4 +267,4 @@ class Sets:
 
     def count(self) -> int:
         """Return how many situations are reachable, ages of executions aside."""
-        return int(self.bdd.count(self.reached, nvars=len(self.bdd.vars) - 1))
+        return int(self.bdd.count(self.reached, nvars=len(self.initial.support)))

@@ -14,7 +14,7 @@ from alula.prove import reachable, story
 from alula.prove.abstract import Abstraction
 from alula.prove.diagrams import Encoded
 from alula.prove.encoding import encode
-from alula.prove.limits import Deadline
+from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.local import Suspect
 from alula.prove.properties import failed, lasso, true_in
 from alula.prove.sets import Sets
@@ -25,8 +25,20 @@ from alula.prove.walk import MOST_IN_A_LOOP, Walker
 def search(
     skillset: Skillset, abstraction: Abstraction, suspects: Iterable[Suspect], deadline: Deadline, *, copies: int
 ) -> list[Diagnostic]:
-    """Return all global findings; raise OutOfTimeError."""
-    return _Search(skillset, abstraction, deadline, copies).findings(list(suspects))
+    """Return all global findings; raise OutOfTimeError.
+
+    Where not even half of the time is enough with a bound of what can be reached, the rest goes into finding exactly that.
+    """
+    found = _Search(skillset, abstraction, deadline, copies)
+    if not found.sets.exact:
+        found.sets.deadline = deadline.half()
+        found.sets.deadline.doing = "situations as sets, within a bound of what can be reached"
+        try:
+            return found.findings(list(suspects))
+        except OutOfTimeError:
+            found.sets.deadline = deadline
+            found.sets.complete()
+    return found.findings(list(suspects))
 
 
 class _Search:
@@ -67,16 +79,19 @@ class _Search:
     def _shown(self) -> Iterator[tuple[Key, Any]]:
         """Yield each fault that is reached with the situations before its step."""
         for fault, where in self.model.faults.items():
-            if where & self.sets.reached != self.sets.bdd.false:
-                yield fault, where & self.sets.reached
-        for fault, where in self.model.inner.items():
-            if where & self.sets.inside != self.sets.bdd.false:
-                yield fault, self.sets.before(self.sets.bdd.false, within=where)
+            if self._reaches(where):
+                yield fault, where
+        for fault, within in self.model.inner.items():
+            if within.situations & self.sets.bound.within(within.about) == self.sets.bdd.false:
+                continue
+            before = self.sets.before(self.sets.bdd.false, within=within)
+            if self._reaches(before):
+                yield fault, before
 
     # --- what can be reached --------------------------------------------------------------------------------------
 
     def _reaches(self, goal: Any) -> bool:
-        return bool(self.sets.reached & goal != self.sets.bdd.false)
+        return self.walker.reaches(goal)
 
     def _seen(self, resource: str) -> Iterator[str]:
         return (state for state in self.skillset.resource(resource).states if self._reaches(self.model.is_state(resource, state)))
@@ -96,10 +111,10 @@ class _Search:
             for resource, state in reachable.takes(skill).items():
                 taken.setdefault((resource, state), []).append(skill.name)
         for (resource, state), names in taken.items():
-            here = self.sets.reached & self.model.is_state(resource, state)
+            here = self.model.is_state(resource, state)
             for first, second in itertools.combinations_with_replacement(names, 2):
                 both = here & (self.model.runs(first, 2) if first == second else self.model.runs(first) & self.model.runs(second))
-                moves = self.walker.to(both) if both != self.sets.bdd.false else None
+                moves = self.walker.to(both)
                 if moves is not None:
                     run = story.walked(self.world, self.world.initial(), moves)
                     findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), run))
@@ -107,15 +122,14 @@ class _Search:
 
     def _lost(self) -> list[Diagnostic]:
         """Return skills that can be lost; where all can go back to the beginning, what starts at all can start again."""
-        if self.sets.can_come_to(self.sets.initial) == self.sets.reached:
+        if self.sets.narrowed(self.sets.reached & ~self.sets.can_come_to(self.sets.initial)) == self.sets.bdd.false:
             return []
         groups: dict[Story, list[str]] = {}
         for skill in self.skillset.skills:
-            starts = self.model.startable[skill.name] & self.sets.reached
-            hopeless = self.sets.reached & ~self.sets.can_come_to(starts)
-            if self.sets.bdd.false in {starts, hopeless}:
+            starts = self.model.startable[skill.name]
+            if not self._reaches(starts):
                 continue
-            moves = self.walker.to(hopeless)
+            moves = self.walker.to(self.sets.reached & ~self.sets.can_come_to(starts))
             if moves is not None:
                 groups.setdefault(story.walked(self.world, self.world.initial(), moves), []).append(skill.name)
         return [reachable.lost(self.skillset, names, run) for run, names in groups.items()]
@@ -149,8 +163,8 @@ class _Search:
         if not self._reaches(begins & avoiding):
             return None
         condition = wanted.condition if wanted.kind is PropertyKind.EVENTUALLY else wanted.consequence or Constant(value=False)
-        suspected = begins & avoiding & self.sets.reached
-        while suspected != self.sets.bdd.false:
+        suspected = begins & avoiding
+        while self._reaches(suspected):
             moves = self.walker.to(suspected)
             if moves is None:
                 return _unsure(wanted)

@@ -23,6 +23,10 @@ class Walker:
         self.world = world
         self.sets = sets
 
+    def reaches(self, goal: Any) -> bool:
+        """Tell whether some run comes to the goal."""
+        return bool(self.sets.narrowed(goal) != self.sets.bdd.false and (self.sets.exact or self._rings(goal)))
+
     def to(self, goal: Any) -> list[Move] | None:
         """Return the steps of a short run to the goal, or None when there is no such set or none was found to walk."""
         rings = self._rings(goal)
@@ -53,14 +57,19 @@ class Walker:
 
     def _rings(self, goal: Any) -> list[Any]:
         """Return the goal, what is one step before it, and so on up to the initial situation; nothing when it is out of reach."""
-        rings = [goal & self.sets.reached]
+        rings = [self.sets.narrowed(goal)]
         seen = rings[0]
-        while rings[-1] & self.sets.initial == self.sets.bdd.false:
-            rings.append(self.sets.before(rings[-1]) & ~seen)
-            if rings[-1] == self.sets.bdd.false:
-                return []
+        while rings[-1] != self.sets.bdd.false:
+            if rings[-1] & self.sets.initial != self.sets.bdd.false:
+                return rings
+            parts: list[Any] = []
+            for part in self.sets.nearer(rings[-1]):
+                if part & self.sets.initial != self.sets.bdd.false:
+                    return [*rings, part]
+                parts.append(part & ~seen)
+            rings.append(self.sets.model.any_of(parts))
             seen |= rings[-1]
-        return rings
+        return []
 
     def graph(self, moves: list[Move], inside: Any) -> tuple[Graph, set[int]]:
         """Return the graph of a run and of what follows inside a set, as far as is looked at; and which situations were looked at.

@@ -79,5 +79,6 @@ def test_the_first_request_to_end_is_not_the_second():
 
 def test_hints_ignore_case_and_list_the_few():
     assert nearest("available", ["AVAILABLE", "USED"]) == "did you mean `AVAILABLE`?"
+    assert nearest("flie", ["fly", "replay", "bridge", "interrupt"]) == "did you mean `fly`?"
     assert nearest("xyz", ["mapping"]) == "there is `mapping`"
     assert nearest("xyz", []) == ""

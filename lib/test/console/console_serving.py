@@ -16,9 +16,35 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from alula.common.network import free_port
 from alula.console.admission import Admission
+from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
 
 WAIT_S = 60.0
+
+
+class Robot:
+    """A link whose one mission does what it is given, and notes when it is connected and closed."""
+
+    def __init__(self, *, abort: Callable[[], str] = str, pause: Callable[[], str] = str, resume: Callable[[], str] = str) -> None:
+        self._abort, self._pause, self._resume = abort, pause, resume
+        self.domains: list[int] = []
+        self.closed = 0
+
+    def connect(self, domain: int) -> Robot:
+        self.domains.append(domain)
+        return self
+
+    def listen(self, domain: int) -> Skillsets:
+        raise ActError(f"nothing is heard in domain {domain}")
+
+    def close(self) -> None:
+        self.closed += 1
+
+    def abort(self) -> str:
+        return self._abort()
+
+    def set_paused(self, *, paused: bool) -> str:
+        return self._pause() if paused else self._resume()
 
 
 class Bench:
@@ -29,9 +55,18 @@ class Bench:
         self.token = token
 
     async def viewer(self, key: str, **hello: object) -> ClientConnection:
-        connection = await connect(f"ws://{self.base}{FEED}?token={self.token}", origin=f"http://{self.base}", max_size=None)  # type: ignore[arg-type]
+        connection = await connect(
+            f"ws://{self.base}{FEED}",
+            origin=f"http://{self.base}",  # type: ignore[arg-type]
+            additional_headers={"Cookie": self.cookie},
+            max_size=None,
+        )
         await connection.send(json.dumps({"key": key, "name": key, **hello}))
         return connection
+
+    @property
+    def cookie(self) -> str:
+        return f"alula_console_{self.base.rpartition(':')[2]}={self.token}"
 
     async def get(self, path: str, **headers: str) -> tuple[int, str]:
         return await asyncio.to_thread(self._get, path, headers)
@@ -44,12 +79,12 @@ class Bench:
             return error.code, error.read().decode()
 
 
-def serve(play: Callable[[Bench], Awaitable[None]], *, token: str = "", fixed: Path | None = None) -> None:
+def serve(play: Callable[[Bench], Awaitable[None]], *, token: str = "", fixed: Path | None = None, link: Link | None = None) -> None:
     """Serve a console, and play a story against it."""
 
     async def story() -> None:
         bench = Bench(free_port(), token)
-        async with Console(Admission("127.0.0.1", int(bench.base.rpartition(":")[2]), token), fixed=fixed).open():
+        async with Console(Admission("127.0.0.1", int(bench.base.rpartition(":")[2]), token), link or Robot(), fixed=fixed).open():
             await asyncio.wait_for(play(bench), 3 * WAIT_S)
 
     asyncio.run(story())
@@ -72,8 +107,8 @@ async def answer_to(viewer: ClientConnection, **asked: object) -> str:
 class Served:
     """A console in a thread of its own, which can be stopped and started."""
 
-    def __init__(self, fixed: Path) -> None:
-        self._fixed, self.port = fixed, free_port()
+    def __init__(self, fixed: Path, link: Link) -> None:
+        self._fixed, self._link, self.port = fixed, link, free_port()
         self._stop: Callable[[], None] = lambda: None
 
     def start(self) -> None:
@@ -83,7 +118,7 @@ class Served:
             over = asyncio.Event()
             loop = asyncio.get_running_loop()
             self._stop = lambda: loop.call_soon_threadsafe(over.set)
-            async with Console(Admission("127.0.0.1", self.port, ""), fixed=self._fixed).open():
+            async with Console(Admission("127.0.0.1", self.port, ""), self._link, fixed=self._fixed).open():
                 up.set()
                 await over.wait()
 
@@ -101,8 +136,8 @@ class Served:
 
 
 @contextlib.contextmanager
-def served(fixed: Path) -> Iterator[Served]:
-    console = Served(fixed)
+def served(fixed: Path, link: Link | None = None) -> Iterator[Served]:
+    console = Served(fixed, link or Robot())
     console.start()
     try:
         yield console

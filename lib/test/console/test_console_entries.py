@@ -64,7 +64,7 @@ def test_samples_of_each_data_come_five_times_a_second_at_most() -> None:
         t
         for t in range(100)
         for name in ("a", "b")
-        for _ in converter.convert(entry(DATA, t / 20, {"skillset": "s", "data": name, "value": {}}))
+        for _ in converter.convert(entry(DATA, 1 + t / 20, {"skillset": "s", "data": name, "value": {}}))
     ]
     assert sent == [t for t in range(0, 100, 4) for _ in range(2)]
 
@@ -204,14 +204,16 @@ def add_pictures(folder: Path, count: int, cameras: tuple[str, ...] = ("depth", 
     with (folder / PICTURES_FILE).open("a", encoding="ascii") as file:
         for number in range(count):
             for camera in cameras:
-                file.write(json.dumps({"stamp_s": number, "camera": camera, "jpeg": base64.b64encode(os.urandom(6000)).decode()}) + "\n")
+                file.write(
+                    json.dumps({"stamp_s": number + 1, "camera": camera, "jpeg": base64.b64encode(os.urandom(6000)).decode()}) + "\n"
+                )
 
 
 def test_pictures_are_followed_while_they_come(tmp_path: Path) -> None:
     follower = RunFollower(tmp_path)
     add_pictures(tmp_path, 2)
     (tmp_path / PICTURES_FILE).open("a").write('{"stamp_s": 3, "cam')
-    assert [(wire[0], wire[1]) for wire in follower.poll()] == [(PICTURE, 0.0)] * 2 + [(PICTURE, 1.0)] * 2
+    assert [(wire[0], wire[1]) for wire in follower.poll()] == [(PICTURE, 1.0)] * 2 + [(PICTURE, 2.0)] * 2
     assert follower.poll() == []
 
 

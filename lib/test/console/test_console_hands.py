@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("skill_panel", reason="needs ROS 2")
+
 pytest.importorskip("rclpy")
 pytest.importorskip("navigation_interfaces.action")
 
@@ -21,6 +23,7 @@ from alula.console import commands
 from alula.console import hands as hands_module
 from alula.console.acts import ActError
 from alula.console.hands import Hands
+from skill_panel.ros_link import RosLink
 from skill_panel.watcher import wait_for
 
 HOSTILE = "<script>document.title='owned'</script>"
@@ -93,7 +96,7 @@ def test_skills_are_shown_started_paused_interrupted_and_the_record_says_so(run_
         assert skill_of(ended, "takeoff")["last"]["inputs"] == {"height": 3.0, "speed": 1.5}
         assert await ask("interrupt") == "nothing runs of it"
 
-    serve(play, fixed=run_of)
+    serve(play, fixed=run_of, link=RosLink())
     acts = [json.loads(line) for line in (run_of / "operator.jsonl").read_text(encoding="utf-8").splitlines()]
     done = [(act["command"], act["answer"]) for act in acts if "takeoff" in act["command"]]
     assert ("start navigation.takeoff, height 3.0, speed 1.5", "takeoff is RUNNING") in done
@@ -112,7 +115,7 @@ def test_a_viewer_without_hands_drives_nothing_and_one_that_does_not_look_is_sen
         for _ in range(3):
             assert "hands" not in await heard(second, lambda message: "status" in message or "hands" in message)
 
-    serve(play, fixed=run_of)
+    serve(play, fixed=run_of, link=RosLink())
 
 
 def test_listening_ends_with_the_last_viewer_that_looks(run_of: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +132,7 @@ def test_listening_ends_with_the_last_viewer_that_looks(run_of: Path, monkeypatc
             while not closed:
                 await heard(viewer, lambda message: "status" in message)
 
-    serve(play, fixed=run_of)
+    serve(play, fixed=run_of, link=RosLink())
 
 
 @pytest.mark.parametrize(
@@ -163,7 +166,7 @@ def test_progress_is_shown_of_an_execution_that_another_client_started(hands: Ha
     def takeoff() -> dict[str, Any]:
         return skill_of({"hands": hands.describe()}, "takeoff")
 
-    mission = Hands(skillset)
+    mission = Hands(RosLink().listen(skillset))
     try:
         assert wait_for(lambda: bool(mission.describe()["skillsets"]), WAIT_S)
         for resource, to in (("SDK_authority", "AVAILABLE"), ("homepoint_status", "VALID")):
@@ -180,7 +183,7 @@ def test_progress_is_shown_of_an_execution_that_another_client_started(hands: Ha
 
 @pytest.fixture(scope="module")
 def hands(skillset: int) -> Iterator[Hands]:
-    made = Hands(skillset)
+    made = Hands(RosLink().listen(skillset))
     assert wait_for(lambda: bool(made.describe()["skillsets"]), WAIT_S)
     yield made
     made.close()

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import json
+import re
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from console_page import SIZES, UNNAMED, Page
-from console_records import HOSTILE, LIFT_OFF_S, failing_story, write_record
+from console_page import DRAWN, SIZES, UNNAMED, Page
+from console_records import HOSTILE, LIFT_OFF_S, failing_story, transition, write_record
 from console_reports import SUMMARY
-from console_serving import WAIT_S, served
+from console_serving import WAIT_S, Robot, served
 
 from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
 from alula.console.acts import ActError, Flight
+from alula.console.entries import FAULT, HEALTH, PATH
+from alula.console.page import write_report
 
 
 def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(
@@ -79,14 +83,15 @@ def test_a_run_that_ends_without_a_verdict_is_not_said_to_be_under_way(
 def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
     browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from selenium.webdriver.common.keys import Keys
     from selenium.webdriver.support.ui import Select
 
     first, asked = make_run("first"), []
 
     def start(flight: Flight) -> Path:
         asked.append(flight)
-        if flight.world:
-            raise ActError(f"there is no world {flight.world}")
+        if flight.seed == 8:
+            raise ActError("all DDS domains are taken")
         return make_run("second", story=[])
 
     monkeypatch.setattr("alula.console.acts.start", start)
@@ -107,9 +112,15 @@ def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
         button.click()
         assert asked == []
         button.click()
-        page.wait("document.querySelector('#flight output').textContent.includes('refused: there is no world')")
+        page.wait("document.querySelector('#flight output').textContent.startsWith('start: refused: <img src=x')")
         assert page.run("document.querySelector('#operator details').open") is True
         world.clear()
+        seed.send_keys("8")
+        seed.send_keys(Keys.HOME, Keys.DELETE)
+        button.click()
+        button.click()
+        page.wait("document.querySelector('#flight output').textContent === 'start: refused: all DDS domains are taken'")
+        seed.send_keys(Keys.HOME, Keys.DELETE, "7")
         button.click()
         button.click()
         page.wait("alula.live.link.status.run === 'second'")
@@ -123,12 +134,11 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
 ) -> None:
     folder, done = make_run("live"), []
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
-    for act in ("abort", "everything_off"):
-        monkeypatch.setattr(f"alula.console.acts.{act}", lambda run, act=act: done.append((act, run.name)) or f"{act} is done")
-    with served(folder) as console:
+    monkeypatch.setattr("alula.console.acts.everything_off", lambda run: done.append(run.name) or "everything_off is done")
+    with served(folder, Robot(abort=lambda: done.append("abort") or "abort is done")) as console:
         page = Page(browser, console.address)
-        abort, off = (f"[...document.querySelectorAll('#flight .danger')][{index}]" for index in (1, 2))
-        page.wait(f"{abort} !== undefined && !{abort}.disabled")
+        abort, off = (f"document.querySelector('#flight {kind}')" for kind in (".stop", ".danger"))
+        page.wait(f"{abort} !== null && !{abort}.disabled")
         page.run(f"{abort}.click()")
         assert page.run(f"{abort}.textContent") == "press again: stop and land"
         assert done == []
@@ -140,7 +150,7 @@ def test_an_act_needs_two_presses_and_everything_off_a_word(
         page.wait("document.querySelector('#flight output').textContent.includes('everything_off is done')")
         page.wait("document.querySelector('#lines').textContent.includes('The operator switched everything off')")
         assert page.complaints() == []
-    assert done == [("abort", "live"), ("everything_off", "live")]
+    assert done == ["abort", "live"]
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -149,11 +159,12 @@ def test_the_acts_on_a_flight_stay_in_sight_and_an_answer_moves_nothing(
 ) -> None:
     folder = make_run("live")
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
-    monkeypatch.setattr("alula.console.acts.pause", lambda _run: "held: " + "a skill that goes on, " * 40)
+    link = Robot(pause=lambda: "held: " + "a skill that goes on, " * 40)
     pause = "[...document.querySelectorAll('#flight button')][0]"
-    with served(folder) as console:
+    with served(folder, link) as console:
         page = Page(browser, console.address, size)
         page.wait(f"{pause} !== undefined && !{pause}.disabled && document.querySelector('.row') !== null")
+        page.wait("![...document.querySelectorAll('#operator details')].at(-1).open")  # folded up at lift-off
         page.run("scrollTo(0, document.documentElement.scrollHeight / 2)")
         page.wait("document.querySelector('#flight').getBoundingClientRect().top === 0")
         buttons = "[...document.querySelectorAll('#flight button:not([hidden])')]"
@@ -189,10 +200,9 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
     folder = make_run("live", story=[])
     writer = write_record(folder, [entry for entry in failing_story() if entry[0] < LIFT_OFF_S + 20], over=False)
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
-    for act in ("pause", "resume"):
-        monkeypatch.setattr(f"alula.console.acts.{act}", lambda run, act=act: done.append(f"{act} {run.name}") or act)
+    link = Robot(pause=lambda: done.append("pause") or "pause", resume=lambda: done.append("resume") or "resume")
     button = "[...document.querySelectorAll('#flight button')].find((one) => one.textContent === '{}' && !one.hidden && !one.disabled)"
-    with served(folder) as console:
+    with served(folder, link) as console:
         page = Page(browser, console.address)
         page.wait(f"{button.format('pause')} !== undefined")
         assert page.run(f"{button.format('go on')} === undefined")
@@ -206,10 +216,166 @@ def test_a_pause_is_shown_until_the_mission_goes_on(browser: Any, make_run: Call
         page.run(f"{button.format('go on')}.click(), {button.format('press again: go on')}.click()")
         writer.write(OPERATOR, round(40e9), {"command": "resume", "by": "mission", "reason": ""})
         page.wait("document.querySelector('.held').textContent === ''")
-        page.wait("document.querySelector('#lines').textContent.includes('The mission goes on.')")
+        page.wait("document.querySelector('#lines').textContent.includes('The mission goes on, after ')")
         assert page.complaints() == []
     writer.close()
-    assert done == ["pause live", "resume live"]
+    assert done == ["pause", "resume"]
+
+
+def test_what_was_sent_is_said_until_the_answer_comes_or_the_connection_breaks(
+    browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, go = make_run("live"), threading.Event()
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
+    link = Robot(abort=lambda: "landing" if go.wait(WAIT_S) else "nothing came", pause=lambda: "paused")
+    said, abort, pause = (
+        "document.querySelector('#flight output').textContent",
+        "document.querySelector('#flight .stop')",
+        "document.querySelector('#flight .hold')",
+    )
+    with served(folder, link) as console:
+        page = Page(browser, console.address)
+        page.wait(f"{abort} !== null && !{abort}.disabled")
+        page.run(f"{abort}.click(), {abort}.click()")
+        page.wait(f"{said} === 'stop and land: sent …'")
+        page.run(f"{pause}.click(), {pause}.click()")
+        page.wait(f"{said}.startsWith('stop and land: sent')")  # an answer to another act hides no act that waits
+        page.wait(f"{said}.startsWith('stop and land: sent, no answer for 3 s')")
+        go.set()
+        page.wait(f"{said} === 'stop and land: landing'")
+        go.clear()
+        page.run(f"{abort}.click(), {abort}.click()")
+        page.wait(f"{said} === 'stop and land: sent …'")
+        console.stop()
+        page.wait(f"{said}.startsWith('stop and land: the connection broke before an answer came')")
+        go.set()
+        console.start()
+
+
+NO_TIME = "\N{EN DASH}"
+FIRST_SCREEN = (
+    "#headline",
+    "#readings",
+    "#active",
+    "#wrong",
+    "#map",
+    "#pictures img",
+    "#recent",
+    "#link",
+    "#flight .hold",
+    "#flight .stop",
+)
+
+
+def test_the_first_screen_shows_what_matters(browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
+    folder, start = make_run("live", story=[]), LIFT_OFF_S
+    place, speed = {"x": 2.0, "y": -1.0, "z": 3.0}, {"x": 0.6, "y": 0.8, "z": 0.0}
+    value = {"position_enu_m": place, "velocity_enu_m_s": speed, "mode": "GUIDED", "link": True, "battery_percent": 31.0}
+    sample = {"skillset": "navigation", "data": "guidance_state", "value": value, "stamp_s": start + 31}
+    ticks = {"unmet": [], "conditions": [["the LiDAR works", ""]]}
+    story = [entry for entry in failing_story() if entry[0] < start + 31 and entry[1] != "/data"]
+    (folder / "pictures.jsonl").write_text(
+        json.dumps({"stamp_s": start + 30.5, "camera": "depth", "jpeg": "AAAA"}) + "\n", encoding="utf-8"
+    )
+    writer = write_record(folder, [(start - 4, TICKS, ticks)], over=False)
+    with served(folder) as console:
+        page = Page(browser, console.address, (1440, 900))
+        before = "[...document.querySelectorAll('#operator details')].at(-1).open"
+        page.wait(f"{before} && document.querySelector('#operator .checks li') !== null")
+        for t_s, topic, entry in [*story, (start + 31, "/data", sample)]:
+            writer.write(topic, round(t_s * 1e9), {**entry, "stamp_s": t_s} if topic == EVENTS else entry)
+        page.wait("document.querySelector('.chain') !== null && document.querySelector('#pictures img') !== null")
+        page.wait(f"!{before}")
+        bottom = page.run("document.querySelector('#scrub').getBoundingClientRect().top")
+        boxes = {name: page.run(f"document.querySelector({json.dumps(name)}).getBoundingClientRect().toJSON()") for name in FIRST_SCREEN}
+        assert {name: box for name, box in boxes.items() if box["height"] < 10 or box["top"] < 0 or box["bottom"] > bottom} == {}
+        told = dict(
+            page.run("[...document.querySelectorAll('#readings div')].map((one) => [...one.children].map((part) => part.textContent))")
+        )
+        assert told == {
+            "height": "3.0 m", "speed": "1.0 m/s", "battery": "31 %", "link": "autopilot up", "east, north of home": "2.0 m, -1.0 m",
+            "in the air": "31.0 s", "waypoints": "0 of 5", "autopilot's mode": "GUIDED",
+        }  # fmt: skip
+        assert page.text("#active li") == "lidar_depthmapsince 30.5 s"
+        assert page.text("#wrong li") == "zed_depthmap: invariant zed_ok violated since 30.0 s | zed_status is BROKEN since 30.0 s"
+        assert page.text("#recent li").startswith("30.50 sperception.lidar_depthmap runs")
+        hold, stop = (
+            page.run(f"getComputedStyle(document.querySelector('#flight {kind}')).backgroundColor") for kind in (".hold", ".stop")
+        )
+        assert hold != stop
+        assert min(boxes[name]["height"] for name in ("#flight .hold", "#flight .stop")) >= 44
+        page.choose(10.0)
+        assert page.text("#active li") == "zed_depthmapsince 1.0 s"
+        assert page.text("#wrong li") == "Nothing is known to be wrong."
+        assert page.complaints() == []
+    writer.close()
+
+
+@pytest.mark.parametrize("begin_s", [0.0, 1_795_438_396.0])
+def test_what_came_before_the_mission_clock_has_no_time(browser: Any, make_run: Callable[..., Path], begin_s: float) -> None:
+    story = [(begin_s + t_s, topic, value) for t_s, topic, value in failing_story()]
+    story[-1][2]["end_s"] += begin_s
+    early = {"scenario": "mapping", "outcome": "running", "reason": "", "waypoints": 5, "waypoints_reached": 0}
+    folder = make_run("live", story=[(0.0, MISSION, early), (0.0, TREE, story[1][2]), *story])
+    (folder / "operator.jsonl").write_text(
+        '{"stamp_s": 0.0, "command": "take", "by": "me"}\n{"command": "start", "by": "me"}\n', encoding="utf-8"
+    )
+    with served(folder) as console:
+        page = Page(browser, console.address)
+        page.wait("document.querySelectorAll('.chain').length === 1")
+        assert page.run("[alula.run.begin, alula.run.end]") == pytest.approx([begin_s + LIFT_OFF_S - 3, begin_s + LIFT_OFF_S + 61])
+        assert page.text("#lines li").startswith(
+            f"{NO_TIME}The operator took command. | {NO_TIME}The operator started the mission. | 0.00 sLift-off."
+        )
+        assert page.text("#moments tbody tr").startswith(NO_TIME)
+        times = page.run(
+            "[...document.querySelectorAll('#timeline text, #lines button, #moments td:first-child')].map((one) => one.textContent)"
+        )
+        assert [text for text in times if re.search(r"\d{4}|NaN|Infinity", text)] == []
+        page.run("document.querySelector('#lines button').click()")
+        assert page.run("alula.moment()") == pytest.approx(begin_s + LIFT_OFF_S - 3)
+        assert page.complaints() == []
+
+
+def test_page_and_report_agree_to_the_last_digit(browser: Any, make_run: Callable[..., Path]) -> None:
+    start = LIFT_OFF_S
+    folder = make_run(
+        "over",
+        story=[
+            *failing_story()[:-1],
+            (start + 60, EVENTS, transition("navigation.flight_status", "IN_AIR", "ON_GROUND")),
+            failing_story()[-1],
+        ],
+    )
+    (folder / "summary.json").write_text(json.dumps({**SUMMARY, "lift_off": {"stamp_s": start - 0.3, "source": "simulator"}}))
+    path = [(PATH, start + number / 5, [number / 5.0123, 1.04, 3.0]) for number in range(-5, 305)]
+    health = (HEALTH, start + 29.93, {"sensor": "zed", "ok": False, "fault": "silent", "reason": "no image for 0.4 s"})
+    write_report(folder, [*path, (FAULT, start + 29.9, {"sensor": "zed", "mode": "dead"}), health], title="over")
+    parts = (
+        "#headline",
+        "#reason",
+        "#figures-row",
+        "#lines",
+        "#chains",
+        "#answers",
+        "#map-words",
+        "#readings",
+        "#wrong",
+        "#recent",
+        "#moments",
+        "#timeline",
+        "#tree",
+    )
+    with served(folder) as console:
+        seen = []
+        for address in (console.address, f"file://{folder / 'report.html'}"):
+            page = Page(browser, address)
+            page.wait(DRAWN)
+            page.wait("document.querySelector('#figures-row').textContent.includes('landed')")
+            seen.append({part: page.text(part) for part in parts})
+    assert "m east" in seen[0]["#figures-row"]
+    assert seen[0] == seen[1]
 
 
 BY_HAND = {
@@ -240,7 +406,7 @@ BY_HAND = {
 class Listened:
     """Stands for the skillsets of a run."""
 
-    def __init__(self, _domain: int) -> None:
+    def __init__(self, _skillsets: object) -> None:
         self.asked: list[dict[str, Any]] = []
         LISTENED.append(self)
 
@@ -266,7 +432,9 @@ def test_skills_are_driven_by_hand(
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
     monkeypatch.setattr("alula.console.commands.Hands", Listened)
     LISTENED.clear()
-    with served(folder) as console:
+    link = Robot()
+    monkeypatch.setattr(link, "listen", lambda _domain: None)
+    with served(folder, link) as console:
         page = Page(browser, console.address, size)
         page.wait("document.querySelector('#hands') !== null && !document.querySelector('#hands').hidden && alula.live.state === 'live'")
         assert LISTENED == []

@@ -137,9 +137,8 @@ def test_a_failure_in_a_pause_is_told_with_what_was_done_when_the_mission_went_o
     assert chain[-3:] == ["branch", "decision", "started"]
     assert page.text("#lines li").count("The mission is paused") == 1
     rows = [row.split(" | ") for row in page.run(ANSWERS)]
-    paused = ["no failure: the operator had the mission pause", "20.00 s until 89.90 s", "navigation.goto holds", "69.9 s paused"]
-    assert rows[0] == paused
-    assert rows[1][0] == "zed failed (dead, injected)"
+    assert [row[0] for row in rows] == ["zed failed (dead, injected)", "the whole mission"], "a pause is no failure"
+    assert "89.90 sThe mission goes on, after 69.9 s." in page.text("#lines li")
     assert "90.00 sReaction: the mission fell back from “ZED navigation” to “LiDAR navigation”" in page.text("#lines li")
     assert "paused 20.00 s" in page.text("#timeline text")
     assert "goes on 89.90 s" in page.text("#timeline text")
@@ -208,18 +207,24 @@ def test_an_abort_is_no_failure_and_says_what_followed(browser: Any, tmp_path: P
         (start + 20, OPERATOR, {"command": "abort", "by": "mission", "reason": "aborted by the operator"}),
         (start + 20.1, EVENTS, execution("navigation.goto", "INTERRUPTED", 2)),
         (start + 20.2, EVENTS, execution("navigation.hover", "RUNNING", 3)),
+        (start + 2, TREE, tree("RUNNING", "INVALID")),
         (start + 23, EVENTS, execution("navigation.land", "RUNNING", 4)),
+        (start + 29, TREE, {**tree("RUNNING", "INVALID"), "status": "SUCCESS"}),
         (start + 30, MISSION, {"outcome": "aborted", "reason": "aborted by the operator", "waypoints": 5, "waypoints_reached": 1}),
     ]
     page = Page(browser, make_story_report(tmp_path, story, {"outcome": "aborted", "reason": "aborted by the operator", "landed": True}))
     page.wait(DRAWN)
     assert (page.text("#headline"), page.text("#reason")) == ("Mission aborted", "aborted by the operator")
     assert page.run(ANSWERS) == [
-        "perception.lidar_depthmap: failed | 19.00 s | nothing followed | ",
-        "no failure: aborted by the operator | 20.00 s | started: hover, land | the rest of the mission",
+        "perception.lidar_depthmap failed: too dark | 19.00 s | nothing followed | ",
         "the whole mission |  | mission aborted; landed | 4 of 5 waypoints were not reached",
     ]
+    assert "20.00 sThe mission is told to stop: aborted by the operator; started hover, land." in page.text("#lines li")
     assert page.text(".chain b") == "skill"
+    assert page.text(".row:first-child .state") == "◦ stopped, as it was told to"
+    assert page.status("navigate") == "INTERRUPTED"
+    page.choose(10.0)
+    assert page.text(".row:first-child .state") == "… runs"
 
 
 def test_keys_go_from_event_to_event(browser: Any, tmp_path: Path) -> None:
@@ -323,7 +328,7 @@ def test_a_failure_is_credited_to_the_fault_that_the_summary_traces_it_to(browse
     assert [row[0] for row in rows[:3]] == [
         "lidar failed (dead, injected)",
         "zed failed (dead, injected)",
-        "navigation.goto: terminated BLOCKED",
+        "navigation.goto failed: no nearer to the target",
     ]
     assert rows[0][3].startswith("noticed after 0.30 s")
     assert rows[1][2] == "nothing: it was not detected"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import subprocess
+import sys
 import threading
 import urllib.error
 import urllib.request
@@ -14,11 +16,11 @@ from typing import Any
 
 import pytest
 from console_records import failing_story, write_record
-from console_serving import WAIT_S, Bench, answer_to, heard, serve
+from console_serving import WAIT_S, Bench, Robot, answer_to, heard, serve
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from alula.common.record import EVENTS
+from alula.common.record import EVENTS, MISSION, OPERATOR
 from alula.console import acts, commands, server
 from alula.console.__main__ import main
 from alula.console.acts import ActError, Flight, read_flight
@@ -83,7 +85,7 @@ def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatc
     folder = make_run()
     done: list[str] = []
     monkeypatch.setattr(commands, "is_live", lambda _run: True)
-    monkeypatch.setattr(acts, "abort", lambda run: done.append(run.name) or "the robot stops where it is")
+    link = Robot(abort=lambda: done.append("abort") or "the robot stops where it is")
 
     async def play(bench: Bench) -> None:
         one, two = await bench.viewer("one"), None
@@ -97,10 +99,10 @@ def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatc
         assert "another one by now" in await answer_to(two, command="abort", run="an older one")
         assert "another one by now" in await answer_to(two, command="abort")
         assert await answer_to(two, command="abort", run="run") == "the robot stops where it is"
-        assert done == ["run"]
+        assert done == ["abort"]
         assert await answer_to(two, command="reboot") == "refused: there is no command reboot"
 
-    serve(play, fixed=folder)
+    serve(play, fixed=folder, link=link)
     acts_done = [json.loads(line) for line in (folder / "operator.jsonl").read_text().splitlines()]
     assert [(act["command"], act["by"]) for act in acts_done] == [("take", "two"), ("abort", "two")]
     assert acts_done[1]["stamp_s"] == pytest.approx(73.0)
@@ -109,8 +111,7 @@ def test_one_commands_the_others_watch(make_run: Callable[..., Path], monkeypatc
 def test_an_act_that_waits_keeps_no_other_from_being_done(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     folder, landed = make_run(), threading.Event()
     monkeypatch.setattr(commands, "is_live", lambda _run: True)
-    monkeypatch.setattr(acts, "pause", lambda _run: "paused" if landed.wait(WAIT_S) else "nothing came")
-    monkeypatch.setattr(acts, "abort", lambda _run: landed.set() or "landing")
+    link = Robot(pause=lambda: "paused" if landed.wait(WAIT_S) else "nothing came", abort=lambda: landed.set() or "landing")
 
     async def play(bench: Bench) -> None:
         viewer = await bench.viewer("me")
@@ -120,7 +121,73 @@ def test_an_act_that_waits_keeps_no_other_from_being_done(make_run: Callable[...
         answers = {(await heard(viewer, lambda message: "answer" in message))["answer"] for _ in range(2)}
         assert answers == {"paused", "landing"}
 
-    serve(play, fixed=folder)
+    serve(play, fixed=folder, link=link)
+
+
+def test_pressing_again_asks_for_nothing_new_and_every_press_is_answered(
+    make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, go, told = make_run(), threading.Event(), []
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+    link = Robot(abort=lambda: told.append("abort") or ("landing" if go.wait(WAIT_S) else "nothing came"))
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: message.get("status", {}).get("commands") is True)
+        for _ in range(3):
+            await viewer.send(json.dumps({"command": "abort", "run": "run"}))
+        await viewer.send(json.dumps({"command": "abort", "run": "an older one"}))
+        await heard(viewer, lambda message: "another one by now" in message.get("answer", ""))
+        go.set()
+        assert [(await heard(viewer, lambda message: "answer" in message))["answer"] for _ in range(3)] == ["landing"] * 3
+        assert told == ["abort"]
+        assert await answer_to(viewer, command="abort", run="run") == "landing"
+        assert told == ["abort", "abort"]
+
+    serve(play, fixed=folder, link=link)
+    assert len((folder / "operator.jsonl").read_text(encoding="utf-8").splitlines()) == 2
+
+
+def test_a_mission_is_connected_to_once_ahead_of_commands_and_left_when_its_run_is_over(
+    make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, link, live = make_run(), Robot(abort=lambda: "landing"), [True]
+    monkeypatch.setattr(commands, "is_live", lambda _run: live[0])
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        until = lambda condition: heard(viewer, lambda message: "status" in message and condition())  # noqa: E731
+        await until(lambda: link.domains == [101])
+        for _ in range(3):
+            assert await answer_to(viewer, command="abort", run="run") == "landing"
+        assert (link.domains, link.closed) == ([101], 0)
+        live[0] = False
+        await until(lambda: link.closed == 1)
+        known = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        (folder / "run.json").write_text(json.dumps({**known, "domain": 7, "run_id": "another"}), encoding="utf-8")
+        live[0] = True
+        await until(lambda: link.domains == [101, 7])
+
+    serve(play, fixed=folder, link=link)
+    assert link.closed == 2
+
+
+def test_a_robot_that_can_not_be_reached_is_told_and_nothing_else_is_held_up(
+    make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = make_run()
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+
+    class Nowhere(Robot):
+        def connect(self, domain: int) -> Robot:
+            raise ActError("there is no ROS 2 here")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: "there is no ROS 2 here" in message.get("status", {}).get("problems", []))
+        assert await answer_to(viewer, command="abort", run="run") == "refused: there is no ROS 2 here"
+
+    serve(play, fixed=folder, link=Nowhere())
 
 
 def test_a_run_that_is_over_is_not_commanded(make_run: Callable[..., Path]) -> None:
@@ -187,6 +254,84 @@ def test_a_flight_that_does_not_start_says_why(make_run: Callable[..., Path], tm
         acts.start(Flight("mapping", 0, vehicle="mocks"))
 
 
+def test_only_the_link_to_a_robot_needs_ros() -> None:
+    names = sorted(path.stem for path in Path(server.__file__).parent.glob("*.py") if path.stem not in {"ros_link", "__main__"})
+    script = f"import sys, {', '.join(f'alula.console.{name}' for name in [*names, '__main__'])}; print(*sys.modules)"
+    modules = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert [name for name in modules if name.split(".")[0] in {"rclpy", "std_srvs", "skillset_interfaces"}] == []
+
+
+@pytest.mark.parametrize("name", ["scenario", "world", "autopilot", "seed", "faults", "vehicle"])
+def test_half_a_character_is_refused_with_one_line_and_the_viewer_stays(
+    make_run: Callable[..., Path], capfd: pytest.CaptureFixture[str], name: str
+) -> None:
+    folder = make_run()
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: message.get("status", {}).get("commands") is True)
+        answer = await answer_to(viewer, command="start", **{"scenario": "mapping", name: ["\ud800x"] if name == "faults" else "\ud800x"})
+        assert answer == "refused: the text holds '\\ud800', half of a character (a lone surrogate)"
+        assert await answer_to(viewer, command="\ud800x") == answer
+        assert await answer_to(viewer, command="take") == "you command now"
+
+    serve(play, fixed=folder)
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_whatever_an_act_raises_is_told_to_its_viewer(
+    make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = make_run()
+    monkeypatch.setattr(commands, "is_live", lambda _run: True)
+
+    def broken() -> str:
+        raise RuntimeError("the middleware is broken")
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: message.get("status", {}).get("commands") is True)
+        assert await answer_to(viewer, command="abort", run="run") == "refused: the middleware is broken"
+
+    serve(play, fixed=folder, link=Robot(abort=broken))
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "content", ["root:x:0:0:secret\n", "secret: 1\n", "- secret\n", "{secret\n", "", "\x00secret", "secret: 1\nsecret: 2\n"]
+)
+def test_a_file_that_is_no_world_is_refused_and_nothing_of_it_is_shown(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "file"
+    file.write_text(content, encoding="utf-8")
+    for world in (file, tmp_path, tmp_path / "nowhere", Path("/dev/zero")):
+        with pytest.raises(ActError, match=r"is no world: give one of .*yard") as refused:
+            read_flight({"scenario": "mapping", "world": str(world)})
+        assert "secret" not in str(refused.value)
+
+
+def test_a_file_with_a_route_is_a_world(tmp_path: Path) -> None:
+    file = tmp_path / "meadow.yaml"
+    file.write_text("route: [[0, 0, 3], [5, 0, 3]]\n", encoding="utf-8")
+    assert read_flight({"scenario": "mapping", "world": str(file)}).world == str(file)
+
+
+# --- stamps ---------------------------------------------------------------------------------------------------------------
+
+
+def test_an_act_before_the_mission_clock_is_heard_carries_no_stamp(make_run: Callable[..., Path]) -> None:
+    folder = make_run(story=[(0.0, MISSION, {"scenario": "mapping", "outcome": "running"})])
+
+    async def play(bench: Bench) -> None:
+        viewer = await bench.viewer("me")
+        await heard(viewer, lambda message: any(topic == MISSION for topic, _, _ in message.get("entries", [])))
+        await answer_to(viewer, command="take")
+        told = await heard(viewer, lambda message: any(topic == OPERATOR for topic, _, _ in message.get("entries", [])))
+        assert [t_s for topic, t_s, _ in told["entries"] if topic == OPERATOR] == [None]
+
+    serve(play, fixed=folder)
+    assert [sorted(json.loads(line)) for line in (folder / "operator.jsonl").read_text().splitlines()] == [["answer", "by", "command"]]
+
+
 # --- admission --------------------------------------------------------------------------------------------------------------
 
 
@@ -224,8 +369,11 @@ def test_elsewhere_a_token_is_needed(make_run: Callable[..., Path]) -> None:
         assert (await bench.get("/"))[0] == 403
         assert (await bench.get("/?token=guess"))[0] == 403
         assert (await bench.get("/?token=%E2%82%AC"))[0] == 403
-        assert (await bench.get("/?token=secret"))[0] == 200
-        assert (await bench.get("/?token=secret", Host="robot.local:8440"))[0] == 200
+        for headers in ({}, {"Host": "robot.local:8440"}):
+            assert (await bench.get("/", Cookie=f"other=1; {bench.cookie}", **headers))[0] == 200
+        for cookie in ("alula_console_1=secret", bench.cookie + "x", ';=;"', bench.cookie.replace("secret", "")):
+            assert (await bench.get("/", Cookie=cookie))[0] == 403
+        assert (await bench.get("/runs/run/report.html?token=secret"))[0] == 403, "the token is taken from the page's address alone"
         with pytest.raises(InvalidStatus):
             await connect(f"ws://{bench.base}{FEED}", origin=f"http://{bench.base}")  # type: ignore[arg-type]
         await heard(await bench.viewer("me"), lambda message: "status" in message)

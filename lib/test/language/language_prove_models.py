@@ -131,6 +131,38 @@ def skillsets(draw, *, most_resources=3, most_skills=3, properties=False, events
 
 
 @st.composite
+def sparse_skillsets(draw):
+    """Four or five resources and skills that each use three of them: one is taken, the others are asked for; some slip."""
+    names = [f"r{i}" for i in range(draw(st.integers(4, 5)))]
+    both_ways = (Transition("A", "B"), Transition("B", "A"))
+    resources = tuple(
+        Resource(n, ("A", "B"), "A", (*both_ways, *draw(st.sampled_from([(), (Transition("B", "A", True),)])))) for n in names
+    )
+    skills = []
+    for number in range(draw(st.integers(2, 4))):
+        mine, *others = draw(st.permutations(names))[:3]
+        give = Effect("", (Assignment(mine, "A"),))
+        asked = [ResourceIs(name, draw(st.sampled_from("AAAB"))) for name in (mine, *others)]
+        invariants = [Invariant("keeps", And(tuple(asked[1:])), give), Invariant("holds", ResourceIs(mine, "B"))]
+        kept = draw(st.sampled_from([invariants, invariants, invariants[1:], invariants[:1]]))
+        skills.append(
+            Skill(
+                f"f{number}",
+                preconditions=tuple(Precondition(f"p{i}", one) for i, one in enumerate(asked[draw(st.sampled_from([0, 0, 0, 1])) :])),
+                start=Effect("", (Assignment(mine, "B"),)),
+                invariants=tuple(kept),
+                interrupt=Interrupt(effect=draw(st.sampled_from([give, give, NO_EFFECT]))),
+                results=(Result("OK", ResultKind.SUCCESS, give),),
+            )
+        )
+    wanted = (
+        Property("w0", PropertyKind.NEVER, And((SkillRuns("f0"), SkillRuns("f1")))),
+        Property("w1", PropertyKind.LEADS_TO, SkillRuns("f0"), ResourceIs(names[0], "A"), draw(st.booleans())),
+    )
+    return Skillset("sparse", resources=resources, skills=tuple(skills), properties=wanted)
+
+
+@st.composite
 def _with_properties(draw, skillset):
     def leaf(_draw):
         if draw(st.booleans()):

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from test_language_listings import LISTING_2, LISTING_3
 
 from alula.commands.check import main
+from alula.language import rl
 from alula.language.check import check
 from alula.language.errors import LanguageError
 from alula.language.lexer import MAX_CHARACTERS, MAX_ERRORS
@@ -41,20 +42,21 @@ skillset s {
 }
 """
 PIECES = [*"{}():=", "==", "->", "=>", "not", "and", "skill", "resource", "data", "initial", '"', "//", "0.5", "1e999", "é", "\0", "\n"]
+PIECES += ["/*", "*/"]
 
 
-def read(text: str) -> None:
-    """Read and check; a LanguageError must be sound: at least one finding, places inside of the text, text to show."""
+def read(text: str, notation=parse) -> None:
+    """Read and check; findings must be sound: places inside of the text, text to show, at least one where it is refused."""
     try:
-        check(parse(text, "x"))
-        findings = None
+        findings = check(notation(text, "x"))
     except LanguageError as error:
         findings = error.diagnostics
-    if findings is None:
-        return
-    assert 0 < len(findings) <= MAX_ERRORS + 1
+        assert 0 < len(findings) <= MAX_ERRORS + 1
+    lines = text.split("\n")
     for finding in findings:
-        assert finding.span.line <= text.count("\n") + 1
+        span = finding.span
+        assert 1 <= span.line <= len(lines)
+        assert 1 <= span.column < span.end_column <= len(lines[span.line - 1]) + 2  # the end of a line counts as a character
         assert finding.message
         assert finding.render()
 
@@ -75,6 +77,21 @@ def test_any_row_of_words(text):
 @given(st.integers(0, len(WHOLE)), st.integers(0, 30), st.sampled_from(["", *PIECES]))
 def test_a_model_with_something_cut_out_or_put_in(place, length, piece):
     read(WHOLE[:place] + piece + WHOLE[place + length :])
+
+
+@settings(max_examples=200)
+@given(st.lists(st.tuples(st.integers(0, len(ROBOT_LANGUAGE)), st.integers(0, 30), st.sampled_from(["", *PIECES])), max_size=3))
+def test_a_model_of_the_robot_language_with_something_cut_out_or_put_in(changes):
+    text = ROBOT_LANGUAGE
+    for place, length, piece in changes:
+        text = text[:place] + piece + text[place + length :]
+    read(text, rl.parse)
+
+
+@pytest.mark.parametrize("text", ["skillset s {\n  resource hatch/* {\n" + "    state { A B }\n" * 40, "skillset s { /*", "/*\n\n"])
+def test_a_comment_without_an_end_leaves_the_end_of_the_file_where_it_is(text):
+    read(text)
+    read(text, rl.parse)
 
 
 @settings(max_examples=150)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 import random
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from language_prove_models import VALUES, skillsets
+from language_prove_models import VALUES, skillsets, sparse_skillsets
 
 from alula.model import semantics
 from alula.model.conditions import holds
 from alula.model.expressions import TRUE
+from alula.prove import sets as sets_module
 from alula.prove.abstract import without_data
 from alula.prove.encoding import encode
 from alula.prove.explicit import search as one_by_one
@@ -68,6 +70,47 @@ def test_both_searches_find_the_same(skillset):
         undecided = {f[1].split("`")[1] for f in found(second) if f[0] == "ALU540"}
         refuted = {f[1].split("`")[1] for f in found(first) if f[0] == "ALU531"}
         assert refuted <= undecided | {f[1].split("`")[1] for f in found(second) if f[0] == "ALU531"}
+
+
+@settings(max_examples=80, **QUIET)
+@given(sparse_skillsets() | skillsets(properties=True, most_resources=2) | skillsets(properties=True, most_resources=2, timed=True))
+def test_a_bound_of_what_can_be_reached_finds_the_same_as_all_that_can_be(skillset):
+    """Where sets are too large: the same findings, with the same stories; and the bound has every situation."""
+    _certain, suspects = local_checks(skillset, ANY_TIME)
+    plain = without_data(skillset, ANY_TIME)
+    exactly = by_sets(skillset, plain, suspects, ANY_TIME, copies=2)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(sets_module, "MOST_NODES", 1)
+        sets = Sets(encode(plain, 2, ANY_TIME), ANY_TIME)
+        assert by_sets(skillset, plain, suspects, ANY_TIME, copies=2) == exactly
+    if not sets.exact:
+        for number, state in enumerate(explore(World(plain), ANY_TIME, most=MOST).states):
+            assert sets.contains(sets.reached & sets.bound.near(sets.initial), state), number
+
+
+@settings(max_examples=40, **QUIET)
+@given(sparse_skillsets())
+def test_sparse_models_are_found_alike_one_by_one_and_as_sets(skillset):
+    _certain, suspects = local_checks(skillset, ANY_TIME)
+    plain = without_data(skillset, ANY_TIME)
+    first = one_by_one(skillset, plain, suspects, ANY_TIME, most=3000, copies=2)
+    if first is None:
+        return
+    for most in (sets_module.MOST_NODES, 1):
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(sets_module, "MOST_NODES", most)
+            second = by_sets(skillset, plain, suspects, ANY_TIME, copies=2)
+        assert found(first) == found(second)
+        assert lengths(first) == lengths(second)
+
+
+def lengths(findings):
+    """Return how long each story is that has to be a shortest one."""
+    return {
+        (f.code, f.message.split(":")[0]): len(f.story.steps)
+        for f in findings
+        if f.code != "ALU524" and "never gets there" not in f.message
+    }
 
 
 def found(findings):

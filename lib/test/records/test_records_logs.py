@@ -127,6 +127,29 @@ def test_a_log_that_was_cut_off_is_read_up_to_there(tmp_path, flown, capsys):
     assert "its last line was cut off" in capsys.readouterr().out
 
 
+def test_where_a_complete_log_is_asked_for_a_hole_is_named_and_ends_with_1(tmp_path, flown, capsys):
+    lines(tmp_path / "whole.jsonl", flown)
+    assert main([str(tmp_path / "whole.jsonl"), "--complete"]) == 0
+    assert capsys.readouterr().err == ""
+    (tmp_path / "cut.jsonl").write_bytes((tmp_path / "whole.jsonl").read_bytes()[:-20])
+    assert main([str(tmp_path / "cut.jsonl"), "--complete", "--json"]) == 1
+    told = capsys.readouterr()
+    assert json.loads(told.out)["conforms"] is True
+    breaks_off = f"alula conform: {tmp_path / 'cut.jsonl'}: is not complete: it breaks off: its last line was cut off"
+    assert told.err.startswith(breaks_off)
+    record(tmp_path / FILE, flown)
+    whole = bytearray((tmp_path / FILE).read_bytes())
+    whole[len(whole) // 2 :] = b"\xff" * (len(whole) - len(whole) // 2)
+    (tmp_path / FILE).write_bytes(whole)
+    assert main([str(tmp_path), "--complete"]) == 1
+    assert "is not complete: it breaks off: damaged " in capsys.readouterr().err
+    within = next(number for number, event in enumerate(flown) if getattr(event, "resource", "") == "axes_authority")
+    lines(tmp_path / "within.jsonl", flown[: within + 1])
+    assert main([str(tmp_path / "within.jsonl")]) == 0
+    assert main([str(tmp_path / "within.jsonl"), "--complete"]) == 1
+    assert capsys.readouterr().err.endswith(" should follow\n")
+
+
 def foreign_mcap(path):
     writer = Writer(str(path))
     writer.start()

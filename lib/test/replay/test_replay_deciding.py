@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from alula.common.faults import parse_fault
-from alula.common.record import FILE, read_record
+from alula.common.record import DECISIONS, FILE, RecordWriter, read_record
 from alula.records.replay.comparison import alike
 from alula.records.replay.deciding import Conditions, bag_of, decide, read_mission
 from alula.records.replay.kept import same, trace_of, verdict, write_out
@@ -46,6 +46,20 @@ def test_the_account_has_each_begin_and_end_of_what_failed(recorded, tmp_path):
     assert account(recorded, tmp_path / "mocks", ["zed@5-6", "zed@8"], []) == [("zed", "mock", 5), ("zed", "ok", 6), ("zed", "mock", 8)]
     spoiled = account(recorded, tmp_path / "measurements", [], ["zed:dark@4-6", "lidar@5", "zed@900"])
     assert spoiled == [("zed", "dark", 4), ("lidar", "mock", 5), ("zed", "ok", 6)]
+
+
+def test_a_record_that_breaks_off_before_the_first_decision_is_not_replayed(recorded, tmp_path):
+    first = next(number for number, entry in enumerate(recorded.entries) if entry.topic == DECISIONS)
+    writer = RecordWriter(tmp_path / FILE)
+    for entry in recorded.entries[:first]:
+        writer.write(entry.topic, entry.stamp_ns, entry.value)
+    writer.close()
+    whole = load(tmp_path)
+    assert verdict(whole, decide(read_mission(whole), Conditions()))[0] == "0 decisions, all as they were"
+    written = (tmp_path / FILE).read_bytes()
+    (tmp_path / FILE).write_bytes(written[: len(written) // 2])
+    with pytest.raises(ReplayError, match=r"breaks off before the mission's first decision"):
+        read_mission(load(tmp_path))
 
 
 def test_a_folder_that_holds_something_is_not_written_to(recorded, tmp_path):

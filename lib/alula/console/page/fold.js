@@ -35,6 +35,12 @@ function valueAt(track, t) {
 
 const last = (list) => list[list.length - 1];
 
+/** The moment of what came before the mission clock was heard: earlier than any other, and shown without a time. */
+const BEFORE = -Infinity;
+
+/** Orders by time; what has none stays in the order in which it came. */
+const byTime = (one, other) => (one.t === other.t ? 0 : one.t - other.t);
+
 function newRun() {
   return {
     over: false, // whether the server says that nothing of the run is under way any more
@@ -121,13 +127,12 @@ const SAMPLES = new Set(["/data", "/path", "/picture"]);
 function fold(run, [topic, t, value]) {
   run.count += 1;
   if (!SAMPLES.has(topic)) run.news += 1;
-  if (t === null) {
-    run.facts[topic] = value;
-    return run;
-  }
-  run.begin = run.begin === null ? t : Math.min(run.begin, t);
-  run.end = run.end === null ? t : Math.max(run.end, t);
-  FOLDERS[topic]?.(run, t, value);
+  const folder = FOLDERS[topic];
+  if (t !== null) {
+    run.begin = run.begin === null ? t : Math.min(run.begin, t);
+    run.end = run.end === null ? t : Math.max(run.end, t);
+  } else if (!folder) run.facts[topic] = value;
+  if (t !== null || !SAMPLES.has(topic)) folder?.(run, t ?? BEFORE, value);
   return run;
 }
 
@@ -143,7 +148,7 @@ function foldTransition(run, t, value) {
   const name = `${value.skillset}.${value.resource}`;
   if (!run.resources.has(name)) run.resources.set(name, newTrack());
   const track = run.resources.get(name);
-  if (!track.t.length) push(track, run.begin, { state: value.from_state, from: "", cause: "" });
+  if (!track.t.length) push(track, run.begin ?? t, { state: value.from_state, from: "", cause: "" });
   push(track, t, { state: value.to_state, from: value.from_state, cause: value.cause });
   if (value.resource === "flight_status" && value.from_state === "ON_GROUND" && run.departure === null) run.departure = t;
   const bad = /BROKEN|LOST|FAILED|ERROR/.test(value.to_state);

@@ -24,8 +24,8 @@ class HandsView {
   }
 
   ask(act, asked) {
-    this.send({ command: "skill", act, root: this.root, run: this.run, ...asked });
-    setText(this.answer, `${act} …`);
+    const sent = this.send({ command: "skill", act, root: this.root, run: this.run, ...asked });
+    setText(this.answer, sent ? `${act}: sent …` : "not connected: nothing was asked for");
   }
 
   say(answer) {

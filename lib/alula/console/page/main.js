@@ -27,6 +27,7 @@ function draw() {
 function show() {
   const t = moment_();
   showStory();
+  showState(t);
   showScrub(t);
   if (run.begin !== null) for (const view of views) view.draw(run, t);
   showMoments(t);
@@ -39,7 +40,7 @@ function showStory() {
   const { text, tone, reason } = headline(run);
   setText(byId("headline"), text);
   setText(byId("reason"), reason);
-  byId("story").style.setProperty("--tone", `var(--${tone})`);
+  byId("state").style.setProperty("--tone", `var(--${tone})`);
   const asked = run.facts["/run"] ?? {};
   const parts = [asked.scenario, asked.world && `world ${asked.world}`, asked.seed != null && `seed ${asked.seed}`, asked.faults?.length && `failing ${asked.faults.join(", ")}`, asked.mock ? "over mocks" : asked.autopilot ? "a real autopilot" : "in the simulator"];
   setText(byId("title"), asked.name ? `Alula · ${asked.name}` : "Alula");
@@ -82,11 +83,11 @@ function showScrub(t) {
   byId("at").title = entry?.text ?? "";
 }
 
-const sameMoment = (one, other) => Math.abs(one.t - other.t) < 0.005; // they show the same time
+const sameMoment = (one, other) => one.t === other.t || Math.abs(one.t - other.t) < 0.005; // they show the same time
 
 /** Index of the event that is shown: the chosen one while its moment is, else the last that is not after t; -1 before the first. */
 function currentEvent(t) {
-  const index = picked && Math.abs(picked.t - t) <= 0.01 ? run.moments.indexOf(picked) : -1;
+  const index = picked && Math.abs(Math.max(picked.t, run.begin ?? t) - t) <= 0.01 ? run.moments.indexOf(picked) : -1;
   return index >= 0 ? index : momentsUpTo(t) - 1;
 }
 
@@ -219,20 +220,26 @@ class Link {
     this.hands = new HandsView((asked) => this.send(asked), (...words_) => this.bar.armed(...words_));
     byId("link").hidden = false;
     this.open();
+    this.judge();
     setInterval(() => this.judge(), 200);
   }
 
   open() {
-    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/feed${location.search}`);
+    this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/feed`);
     this.begun = performance.now();
     this.socket.addEventListener("open", () => this.send({ key: this.key, name: this.name, run: this.run, hands: this.hands.box.open, ...this.at }));
     this.socket.addEventListener("message", ({ data }) => this.hear(JSON.parse(data)));
-    this.socket.addEventListener("close", () => setTimeout(() => this.open(), AGAIN_MS));
+    this.socket.addEventListener("close", () => {
+      this.bar.lose();
+      setTimeout(() => this.open(), AGAIN_MS);
+    });
   }
 
+  /** Sends what is asked for; tells whether it could. */
   send(asked) {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(asked));
-    else this.bar.say("not connected: nothing was asked for");
+    const open = this.socket.readyState === WebSocket.OPEN;
+    if (open) this.socket.send(JSON.stringify(asked));
+    return open;
   }
 
   watch(name) {
@@ -249,7 +256,8 @@ class Link {
       take(said.entries);
     }
     if (said.answer !== undefined) {
-      (said.command === "skill" ? this.hands : this.bar).say(`${said.command}: ${said.answer}`);
+      if (said.command === "skill") this.hands.say(said.answer);
+      else this.bar.hear(said.command, said.answer);
       if (said.started) [this.run, this.bar.starting.open] = [said.started, false];
     }
     if (said.status) {
@@ -275,6 +283,7 @@ class Link {
     setText(byId("link"), stale ? since : { live: "live", over: this.status?.run ? "this run is over" : "no run yet", "catching up": "catching up" }[state] + (problems.length ? ` (${problems.join("; ")})` : ""));
     byId("link").dataset.state = live.state = state;
     this.bar.enable();
+    this.bar.showWaiting();
     this.hands.enable(Boolean(this.status?.commands && this.status.live) && !stale);
   }
 }

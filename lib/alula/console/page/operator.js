@@ -2,6 +2,9 @@
 // finger: two presses in turn, and for everything off a word that is typed. The acts on a flight under way stay in sight.
 
 const ARMED_MS = 4000;
+const CALLED = { abort: "stop and land", resume: "go on", off: "everything off", take: "take over" };
+const SIGNS = { pause: "M1 1h4v10h-4zM7 1h4v10h-4z", resume: "M2 1v10l9 -5z", abort: "M6 11l-5 -6h3v-4h4v4h3z" };
+const DOUBT_MS = 3000; // an answer takes some milliseconds; after so long the operator is told that it is late
 
 /** Fills a select or a datalist with names; what was chosen stays chosen. */
 function offer(node, names) {
@@ -17,18 +20,19 @@ class OperatorBar {
   constructor(send, watch) {
     [this.send, this.watch] = [send, watch];
     this.answer = el("output", { role: "status" });
+    this.waiting = new Map(); // what was sent and is not answered yet -> when
     this.role = el("span", {});
     this.runs = el("select", { "aria-label": "run that is shown", onchange: (event) => watch(event.target.value) });
-    this.take = el("button", { type: "button", onclick: () => send({ command: "take" }) }, "take over");
+    this.take = el("button", { type: "button", onclick: () => this.tell("take") }, "take over");
     this.report = el("a", { target: "_blank", rel: "noopener", hidden: true }, "open the report");
     this.checks = el("ul", { class: "checks", "aria-label": "What the mission needs to start" });
-    this.pause = this.armed("pause", "press again: pause", () => send({ command: "pause", run: this.status.run }));
-    this.resume = this.armed("go on", "press again: go on", () => send({ command: "resume", run: this.status.run }), "go");
+    this.pause = this.armed("pause", "press again: pause", () => this.tell("pause"), "hold", SIGNS.pause);
+    this.resume = this.armed("go on", "press again: go on", () => this.tell("resume"), "go", SIGNS.resume);
     this.held = el("p", { class: "held", role: "status" });
-    this.abort = this.armed("stop and land", "press again: stop and land", () => send({ command: "abort", run: this.status.run }));
+    this.abort = this.armed("stop and land", "press again: stop and land", () => this.tell("abort"), "stop", SIGNS.abort);
     this.word = el("input", { type: "text", size: 5, "aria-label": "type OFF to switch everything off", placeholder: "type OFF", oninput: () => this.enable() });
     this.off = this.armed("everything off", "press again: end all processes", () => {
-      send({ command: "off", run: this.status.run });
+      this.tell("off");
       this.word.value = "";
     });
     this.form = this.startForm();
@@ -42,7 +46,7 @@ class OperatorBar {
       this.before,
     );
     byId("flight").hidden = false;
-    byId("flight").append(el("div", { class: "acts" }, this.pause, this.resume, this.abort, el("span", { class: "off" }, this.word, this.off)), el("div", { class: "said" }, this.held, this.answer));
+    byId("flight").append(this.pause, this.resume, this.abort, el("div", { class: "said" }, this.held, this.answer), el("span", { class: "off" }, this.word, this.off));
   }
 
   startForm() {
@@ -58,22 +62,52 @@ class OperatorBar {
     this.begin = this.armed("start", "press again: start", () => {
       const faults = this.faults.value.split(/[\s,]+/).filter(Boolean);
       const autopilot = this.vehicle.value === "vehicle" ? this.autopilot.value.trim() : "";
-      this.send({ command: "start", scenario: this.scenario.value, seed: Number(this.seed.value), faults, world: this.world.value.trim(), vehicle: this.vehicle.value, autopilot });
-      this.say("starting …");
+      this.tell("start", { scenario: this.scenario.value, seed: Number(this.seed.value), faults, world: this.world.value.trim(), vehicle: this.vehicle.value, autopilot });
     }, "go");
     this.connection = field("at", this.autopilot);
     return el("form", { "aria-label": "Start a mission", onsubmit: (event) => event.preventDefault() }, field("scenario", this.scenario), field("route and world", this.world), this.worlds, field("vehicle", this.vehicle), this.connection, field("seed", this.seed), field("failures", this.faults), this.begin);
   }
 
+  /** Sends an act, and says so until its answer comes. */
+  tell(command, asked = {}) {
+    if (!this.send({ command, run: this.status?.run, ...asked })) return this.say("not connected: nothing was asked for");
+    this.waiting.set(command, performance.now());
+    return this.showWaiting();
+  }
+
+  /** An answer came. */
+  hear(command, answer) {
+    this.waiting.delete(command);
+    this.say(`${CALLED[command] ?? command}: ${answer}`);
+    if (this.waiting.size) this.showWaiting();
+  }
+
+  /** The connection broke: what was sent may have been done, its answer will not come. */
+  lose() {
+    if (this.waiting.size) this.say(`${this.names()}: the connection broke before an answer came; look whether it is done, or press again`);
+    this.waiting.clear();
+  }
+
+  names() {
+    return [...this.waiting.keys()].map((command) => CALLED[command] ?? command).join(", ");
+  }
+
+  showWaiting() {
+    if (!this.waiting.size) return;
+    const late = performance.now() - Math.min(...this.waiting.values());
+    this.say(`${this.names()}: sent${late > DOUBT_MS ? `, no answer for ${seconds(late / 1000, 0)}` : " …"}`);
+  }
+
   /** A button that acts on the second press within some seconds. */
-  armed(text, again, act, kind = "danger") {
-    const button = el("button", { type: "button", class: kind }, text);
+  armed(text, again, act, kind = "danger", sign = "") {
+    const words_ = el("span", {}, text);
+    const button = el("button", { type: "button", class: kind }, sign && svg("svg", { class: "sign", viewBox: "0 0 12 12", "aria-hidden": "true" }, svg("path", { d: sign })), words_);
     let timer = null;
     const disarm = () => {
       clearTimeout(timer);
       timer = null;
       button.classList.remove("armed");
-      setText(button, text);
+      setText(words_, text);
     };
     button.addEventListener("click", () => {
       if (timer !== null) {
@@ -82,7 +116,7 @@ class OperatorBar {
         return;
       }
       button.classList.add("armed");
-      setText(button, again);
+      setText(words_, again);
       timer = setTimeout(disarm, ARMED_MS);
     });
     return button;
@@ -94,7 +128,8 @@ class OperatorBar {
 
   /** How things are; `start`: what the mission needs to start, `held`: what a pause holds, null when there is none; `flew`: it took off. */
   show(status, start, held, flew) {
-    if (this.status?.run !== status.run) this.before.open = !flew; // once a run: what is opened later stays so
+    if (this.status?.run !== status.run || (flew && !this.flew)) this.before.open = !flew; // once a run and at lift-off: what is opened later stays so
+    this.flew = flew;
     [this.status, this.paused] = [status, held !== null];
     const met = (start ?? []).filter(([, otherwise]) => !otherwise).length;
     setText(this.met, start?.length ? `before the start: ${met} of ${start.length} conditions met` : "before the start");
@@ -104,10 +139,10 @@ class OperatorBar {
     offer(this.worlds, status.worlds);
     offer(this.vehicle, status.vehicles);
     this.report.hidden = !status.report;
-    if (status.report) this.report.href = `/runs/${encodeURIComponent(status.run)}/report.html${location.search}`;
+    if (status.report) this.report.href = `/runs/${encodeURIComponent(status.run)}/report.html`;
     const viewers = `${status.viewers} ${status.viewers === 1 ? "viewer" : "viewers"}`;
-    setText(this.role, `${status.commands ? "you command" : `${status.commander || "no viewer"} commands; you watch`} (${viewers})`);
-    this.take.hidden = status.commands;
+    setText(this.role, `${status.commands ? "you command" : `${status.commander || "no viewer"} commands; you ${status.may ? "watch" : "may only watch, as this page comes without TLS"}`} (${viewers})`);
+    this.take.hidden = status.commands || !status.may;
     rewrite(this.checks, start ?? [], ([needed, otherwise]) => el("li", { class: otherwise ? "" : "met" }, el("span", { class: "sr" }, otherwise ? "not met: " : "met: "), otherwise || needed));
     setText(this.held, held === null ? "" : `The mission is paused. ${held}`);
     this.enable();

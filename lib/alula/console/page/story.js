@@ -17,6 +17,7 @@ const REACTION_S = 3; // how long after a failure the tree's reaction is looked 
 function headline(run) {
   const mission = last(run.mission.v) ?? {};
   const summary = run.facts["/summary"];
+  if (run.begin === null && run.mission.v.length) return { text: "The mission waits for its clock", tone: "now", reason: "" };
   if (run.begin === null) return { text: run.facts["/run"] ? "The run has recorded nothing yet" : "No run yet", tone: "now", reason: "" };
   const outcome = summary?.outcome ?? mission.outcome ?? "running";
   if (outcome === "running" && (summary || run.over)) return { text: "The mission's process ended before the mission did", tone: "bad", reason: "" };
@@ -29,7 +30,7 @@ function headline(run) {
 
 /** What failed, for the outcomes that follow from failures; null: the mission's own reason says it. */
 function reasonTold(run, outcome) {
-  const causes = ["degraded", "given_up"].includes(outcome) ? answers(run).filter(({ why }) => why) : [];
+  const causes = ["degraded", "given_up"].includes(outcome) ? answers(run).filter(({ failed }) => failed) : [];
   return causes.map(({ what, t }) => `${what} at ${seconds(t - origin(run), 2)}`).join("; ") || null;
 }
 
@@ -61,13 +62,13 @@ function keyFigures(run) {
 function failures(run) {
   return [...run.executions.values()]
     .filter((execution) => ["violated", "failure"].includes(endingOf(execution)))
-    .sort((one, other) => one.end - other.end);
+    .sort((one, other) => byTime({ t: one.end }, { t: other.end }));
 }
 
 /** Every change of something that failed: [{sensor, mode, t, itself}], `ok` being the mode in which it works. */
 function faultsOf(run) {
   const made = madeToFail(run);
-  return [...made, ...failedItself(run, made)].sort((one, other) => one.t - other.t);
+  return [...made, ...failedItself(run, made)].sort(byTime);
 }
 
 /** What failed by itself: processes that died, and the radio that was lost. Only a summary knows of them. */
@@ -149,7 +150,7 @@ function makeChain(run, failure) {
   if (endingOf(failure) === "violated") add("invariant", failure.end, `${failure.result} of ${failure.skill}: ${inWords(why.replace(`${failure.result}: `, ""))}`);
   add("skill", failure.end, `${failure.skillset}.${failure.skill} ended: ${endingOf(failure) === "violated" ? "invariant violated" : `${words(failure.state)} ${failure.result}`.trim()}`);
   const effects = [...branchOf(run, failure), ...reactionOf(run, failure)].map((one) => ({ ...one, t: Math.max(one.t, failure.end) })); // and an effect early
-  return [...chain, ...effects].sort((one, other) => one.t - other.t);
+  return [...chain, ...effects].sort(byTime);
 }
 
 /** The last change, before a failure, of a resource that its message names. */
@@ -251,7 +252,7 @@ function reactionOf(run, failure) {
   const started = others.filter((execution) => near(execution.running) && execution.start >= failure.end - APART_S);
   if (stopped.length) chain.push({ step: "stopped", t: stopped[0].end, text: `interrupted: ${stopped.map(({ skill }) => skill).join(", ")}` });
   if (started.length) chain.push({ step: "started", t: started[0].running, text: `started: ${[...new Set(started.map((one) => `${one.skill}${one.skill === failure.skill && one.skillset === failure.skillset ? " again" : ""}`))].join(", ")}` });
-  return chain.sort((one, other) => one.t - other.t);
+  return chain.sort(byTime);
 }
 
 /** What the mission did about a failure: {t, text}, or null where nothing followed. */
@@ -294,7 +295,7 @@ function story(run) {
   else if (landed !== null) say(landed, `Landed${where && `, ${where}`}.`);
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
-  return lines.sort((one, other) => one.t - other.t);
+  return lines.sort(byTime);
 }
 
 /** Changes of resources that came before a skill failed of them, in the air: [{t, text}]. */
@@ -320,12 +321,17 @@ function operatorTold(run, say) {
     } else if (act.command === "paused" && !paused.has(pause)) {
       paused.add(pause); // later ones tell of what has ended meanwhile, which has a line of its own
       say(act.t, `The mission is paused: ${act.reason}.`, "reaction");
-    } else if (act.command === "resume") say(act.t, "The mission goes on.", "reaction");
-    else if (act.command === "abort") say(act.t, `The mission is told to stop: ${act.reason}.`, "reaction");
+    } else if (act.command === "resume") {
+      const { from } = pauses(run).findLast(({ to }) => to === act.t) ?? { from: act.t };
+      say(act.t, `The mission goes on${from < act.t ? `, after ${seconds(act.t - from)}` : ""}.`, "reaction");
+    } else if (act.command === "abort") {
+      const then = started(run, act.t, Infinity);
+      say(act.t, `The mission is told to stop: ${act.reason}${then && `; started ${then}`}.`, "reaction");
+    }
   }
 }
 
-/** A row for each failure, abort and pause, and one for the whole mission: [{what, why, t, until, done, cost}]; the last has no t. */
+/** A row for each failure, and one for the whole mission: [{what, why, t, until, done, cost}]; the last has no t. */
 function answers(run) {
   const rows = [];
   const failed = failures(run);
@@ -343,9 +349,7 @@ function answers(run) {
     const t = when === null ? run.begin : origin(run) + when;
     if (!rows.some((row) => Math.abs(row.t - t) < REACTION_S)) rows.push({ what: `the process ${name} died: ${how}`, t, done: "nothing that the record tells of", cost: "" });
   }
-  for (const act of run.operator) if (act.by === "mission" && act.command === "abort") rows.push({ what: `no failure: ${act.reason}`, t: act.t, done: `started: ${started(run, act.t, Infinity) || "nothing"}`, cost: "the rest of the mission" });
-  for (const { from, to } of pauses(run)) rows.push({ what: "no failure: the operator had the mission pause", t: from, until: to, done: run.operator.find(({ by, command, t }) => by === "mission" && command === "paused" && t >= from && (to === null || t < to))?.reason ?? "", cost: to === null ? "it is paused" : `${seconds(to - from)} paused` });
-  rows.sort((one, other) => one.t - other.t);
+  rows.sort(byTime);
   const whole = costs(run);
   if (whole.length) rows.push({ what: "the whole mission", t: null, done: wholeDone(run), cost: whole.join("; ") });
   return rows;
@@ -374,8 +378,9 @@ function failureRow(run, fault, own, failed) {
     cost.push(...[heldTold(run, origin(run) + recovery.fallback_running_s)].filter(Boolean));
   }
   if (recovered && recovery.moving_again_s != null) cost.push(`the vehicle moved on after ${seconds(recovery.moving_again_s - (recovery.failure_s ?? recovery.detected_s), 2)}`);
-  const why = own.map((failure) => endingTold(failure)).join(" ");
-  return { what: fault ? faultWords(fault) : `${first.skillset}.${first.skill}: ${endingOf(first) === "violated" ? `invariant ${first.result} violated` : `${words(first.state)} ${first.result}`.trim()}`, why, t: since, until: fault ? endOf(run, fault) : null, done: done.join("; ") || "nothing followed", cost: cost.join("; ") };
+  const endings = own.map((failure) => endingTold(failure));
+  const what = fault ? faultWords(fault) : endings.shift().replace(/\.$/, ""); // each ending is told once
+  return { what, why: endings.join(" "), failed: true, t: since, until: fault ? endOf(run, fault) : null, done: done.join("; ") || "nothing followed", cost: cost.join("; ") };
 }
 
 /** The skills that were started between two moments, in their order, as "hover, land"; empty where there are none. */
@@ -418,5 +423,5 @@ function marks(run) {
     for (const [name, label] of Object.entries(moments)) if (recovery[`${name}_s`] != null) found.push({ t: zero + recovery[`${name}_s`], kind: name, label });
   } else for (const failure of failures(run)) found.push({ t: failure.end, kind: "detected", label: `${failure.skill} ${endingOf(failure)}` });
   for (const { from, to } of pauses(run)) found.push({ t: from, kind: "pause", label: "paused" }, ...(to === null ? [] : [{ t: to, kind: "pause", label: "goes on" }]));
-  return found.sort((one, other) => one.t - other.t);
+  return found.sort(byTime);
 }

@@ -13,6 +13,14 @@ const LEGEND = [
 ];
 const MARKS = { SUCCESS: "✓ succeeded", FAILURE: "✗ failed", RUNNING: "… runs", INTERRUPTED: "◦ interrupted", INVALID: "" };
 
+const STOPPED = { SUCCESS: "◦ stopped, as it was told to", FAILURE: "✗ could not be stopped", RUNNING: "… is being stopped" };
+
+/** What a node's status means, in words and in colour: the root of a mission that was aborted did not succeed when all has come to rest. */
+function statusTold(run, node, status, t) {
+  const aborted = node.depth === 0 && abortAfter(run, -Infinity) <= t;
+  return { told: (aborted && STOPPED[status]) || (MARKS[status] ?? words(status)), colour: aborted && status === "SUCCESS" ? "INTERRUPTED" : status };
+}
+
 class TreeView {
   constructor(choose) {
     this.box = byId("tree");
@@ -48,9 +56,10 @@ class TreeView {
       node.shownStatus = status;
       if (status === "RUNNING" && !node.children.length) running.push(node);
       row.classList.toggle("active", status === "RUNNING");
-      if (row.dataset.status !== status) row.dataset.status = status;
+      const { told, colour } = statusTold(run, node, status, t);
+      if (row.dataset.status !== colour) row.dataset.status = colour;
       const parts = this.parts[index];
-      setText(parts.state, MARKS[status] ?? words(status));
+      setText(parts.state, told);
       setText(parts.why, status === "INVALID" ? "" : [status === "RUNNING" && since !== null ? seconds(t - since) : "", message].filter(Boolean).join("  "));
     });
     for (const node of tree.nodes) {
@@ -119,7 +128,7 @@ class TreeView {
   detail(node) {
     const { status, message, since } = nodeAt(node, this.t);
     const zero = origin(this.run);
-    const lines = [el("p", {}, el("b", {}, node.name), ` — ${node.kind}, ${status === "INVALID" ? "not ticked" : words(status)}${since === null ? "" : ` since ${seconds(since - zero)}`}${message ? `: ${message}` : ""}`)];
+    const lines = [el("p", {}, el("b", {}, node.name), ` — ${node.kind}, ${status === "INVALID" ? "not ticked" : statusTold(this.run, node, status, this.t).told}${since === null ? "" : ` since ${seconds(since - zero)}`}${message ? `: ${message}` : ""}`)];
     const executions = [...this.run.executions.values()].filter((one) => `${one.skillset}.${one.skill}` === node.skill && one.start <= this.t);
     for (const one of executions.slice(-8)) {
       const ended = one.end !== null && one.end <= this.t;

@@ -61,6 +61,8 @@ class Conditions:
 
 def read_mission(recorded: Recorded, *, tree: str = "", models: Sequence[Path] = (), behaviour: Sequence[Path] = ()) -> RecordedMission:
     """Return a recorded mission with another tree, other models, or more behaviour of the mocks; raises ReplayError."""
+    if not recorded.decisions and not recorded.whole:
+        raise ReplayError(f"{recorded.path}: breaks off before the mission's first decision; there is nothing to hold a replay against")
     plan = plan_for(recorded, tree)
     skillsets = skillsets_for(plan, models)
     return RecordedMission(recorded, plan, skillsets, behaviour_for(recorded, skillsets, behaviour))

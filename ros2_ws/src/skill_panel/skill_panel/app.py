@@ -11,7 +11,7 @@ from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Button, DataTable, Footer, Header, RichLog, Static
 
-from skill_panel.form import FormError, fields, values
+from alula.console.form import FormError, fields, values
 from skill_panel.memory import Memory
 from skill_panel.watcher import Watched
 from skill_panel.widgets import FORM_KEYS, DataLines, ResourceLine, ResourceList, SkillForm, SkillsetBar, SkillTable

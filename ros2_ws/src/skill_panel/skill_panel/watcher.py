@@ -11,6 +11,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from alula.console.view import SkillsetView
 from alula.model.model import Skillset
 from alula.runtime.core.events import EngineEvent
 from alula.runtime.core.records import SkillRecord
@@ -18,7 +19,6 @@ from alula.runtime.core.why import Why
 from alula.runtime.handle import SkillHandle
 from alula.runtime.views import DataReading
 from alula.runtime.waiting import Pending
-from skill_panel.view import SkillsetView
 from skillset_ros2.actions import execution_id
 from skillset_ros2.client import SkillsetClient
 from skillset_ros2.names import action_module, action_type

@@ -13,8 +13,8 @@ from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.message import Message
 from textual.widgets import Button, DataTable, Input, Label, Static
 
-from skill_panel.form import Field
-from skill_panel.view import DataRow, ResourceRow, SkillRow
+from alula.console.form import Field
+from alula.console.view import DataRow, ResourceRow, SkillRow
 
 BAR_WIDTH = 10
 STATUS_STYLES = {"ready": "green", "not ready": "yellow", "RUNNING": "bold cyan", "PAUSED": "bold magenta", "INTERRUPTING": "bold red"}

@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from alula.console.form import Field, FormError, fields, value_of, values
+from alula.console.view import DataRow, ResourceRow, Running, SkillRow, SkillsetView, one_line
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Comparison, DataIs, ResourceIs
 from alula.model.model import Data as ModelData
 from alula.model.model import Parameter, Precondition, Resource, Skill, Skillset, Transition
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
-from skill_panel.form import Field, FormError, fields, value_of, values
 from skill_panel.memory import Memory
-from skill_panel.view import DataRow, ResourceRow, Running, SkillRow, SkillsetView, one_line
 
 FULL = DataIs("battery", ("percentage",), Comparison.GT, 0.2)
 GO = Skill(

@@ -4,19 +4,23 @@
    all of it (``caught_up_s``).
 2. A flight that goes on at 20 entries a second, ten viewers and one that hangs: the server's share of a core, and how old an entry is
    when a viewer gets it.
+3. A mission's process under way, beside ``--load`` processes that only compute: how long from a command on the socket until its answer, of
+   the first one (``first_answer_s``) and of those that follow.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import json
+import os
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -25,10 +29,16 @@ import psutil
 from websockets.asyncio.client import ClientConnection, connect
 
 from alula.common.files import write_json
-from alula.common.network import free_port
+from alula.common.network import claim_domain, free_port
+from alula.common.processes import RUN_ID_VARIABLE
 from alula.common.record import DATA, EVENTS, FILE, TREE, RecordWriter
 
 QUICK_HOURS, QUICK_S = 0.5, 10.0
+ROUNDS = 15
+"""How often the mission is told to pause and to go on."""
+APART_S = 0.2
+"""A viewer may give ten commands a second."""
+RUN_ID = "bench-console"
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,10 @@ class Figures:
     age_p50_s: float
     age_p95_s: float
     server_rss_mb: float
+    load: int
+    first_answer_s: float
+    answer_p50_s: float
+    answer_max_s: float
 
 
 def tree(nodes: int, busy: int) -> dict[str, Any]:
@@ -143,24 +157,80 @@ async def live(
     return core, ages_s
 
 
-def measure(folder: Path, options: argparse.Namespace) -> Figures:
-    """Serve a record, and watch it."""
-    writer = RecordWriter(folder / FILE)
-    entries = write_hours(writer, options.hours, options.nodes)
-    (folder / "run.json").write_text('{"scenario": "bench", "domain": 0, "run_id": "bench"}', encoding="utf-8")
+@contextlib.contextmanager
+def served(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """Serve the run in a folder; give the server and its port."""
     port = free_port()
     words = [sys.executable, "-m", "alula.console", "--run", str(folder), "--port", str(port)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
         try:
             if server.stdout is None or not server.stdout.readline():
                 raise OSError("the server did not start")
-            last_s = (entries - 10) / 5  # samples behind that may be thinned out
-            read_s, caught_up_s = (asyncio.run(wait_for_all(port, last_s)) for _ in range(2))
-            process = psutil.Process(server.pid)
-            core, ages_s = asyncio.run(live(process, port, writer, last_s, options))
-            rss_mb = process.memory_info().rss / 1e6
+            yield server, port
         finally:
             server.terminate()
+
+
+@contextlib.contextmanager
+def mission(folder: Path, load: int) -> Iterator[None]:
+    """Run a mission in the folder, in a domain of its own, beside so many processes that take what they get of the processor."""
+    folder.mkdir()
+    with contextlib.ExitStack() as stack:
+        claim = claim_domain()
+        stack.callback(claim.release)
+        environment = {**os.environ, RUN_ID_VARIABLE: RUN_ID, "ROS_DOMAIN_ID": str(claim.domain)}
+        run = {"scenario": "bench", "domain": claim.domain, "run_id": RUN_ID}
+        (folder / "run.json").write_text(json.dumps(run), encoding="utf-8")
+        busy = [[sys.executable, "-c", "while True: pass"]] * load
+        for words in [[sys.executable, "-m", "console_bench", str(folder)], *busy]:
+            process = stack.enter_context(subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL))
+            stack.callback(process.kill)
+        yield
+
+
+async def answered(socket: ClientConnection, command: str, run: str) -> tuple[float, str]:
+    """Give a command; return how long its answer takes, and the answer."""
+    begun = time.perf_counter()
+    await socket.send(json.dumps({"command": command, "run": run}))
+    while True:
+        message = json.loads(await socket.recv())
+        if message.get("command") == command and "answer" in message:
+            return time.perf_counter() - begun, str(message["answer"])
+
+
+async def command(port: int, run: str) -> tuple[float, list[float]]:
+    """Have a mission pause and go on; return how long the first answer takes, and the others."""
+    socket, ticked = await viewer(port), False
+    while not ticked:
+        ticked = any(topic == TREE for topic, _, _ in json.loads(await socket.recv()).get("entries", []))
+    while not json.loads(await socket.recv()).get("status", {}).get("live"):
+        pass
+    first_s, _ = await answered(socket, "pause", run)
+    waits_s = []
+    for words in ["resume", "pause"] * ROUNDS:
+        await asyncio.sleep(APART_S)
+        waited_s, answer = await answered(socket, words, run)
+        if answer.startswith("refused"):
+            raise OSError(f"{words}: {answer}")
+        waits_s.append(waited_s)
+    await socket.close()
+    return first_s, waits_s
+
+
+def measure(folder: Path, options: argparse.Namespace) -> Figures:
+    """Serve a record, and watch it; then command a mission."""
+    writer = RecordWriter(folder / FILE)
+    entries = write_hours(writer, options.hours, options.nodes)
+    (folder / "run.json").write_text('{"scenario": "bench", "domain": 0, "run_id": "bench"}', encoding="utf-8")
+    with served(folder) as (server, port):
+        last_s = (entries - 10) / 5  # samples behind that may be thinned out
+        read_s, caught_up_s = (asyncio.run(wait_for_all(port, last_s)) for _ in range(2))
+        process = psutil.Process(server.pid)
+        core, ages_s = asyncio.run(live(process, port, writer, last_s, options))
+        rss_mb = process.memory_info().rss / 1e6
+    run = folder / "mission"
+    with mission(run, options.load), served(run) as (_, port):
+        first_s, waits_s = asyncio.run(command(port, run.name))
     cuts = statistics.quantiles(ages_s, n=20) if len(ages_s) > 1 else [0.0] * 19
     size_mb = (folder / FILE).stat().st_size / 1e6
     return Figures(
@@ -176,6 +246,10 @@ def measure(folder: Path, options: argparse.Namespace) -> Figures:
         age_p50_s=round(cuts[9], 3),
         age_p95_s=round(cuts[18], 3),
         server_rss_mb=round(rss_mb, 1),
+        load=options.load,
+        first_answer_s=round(first_s, 3),
+        answer_p50_s=round(statistics.median(waits_s), 3),
+        answer_max_s=round(max(waits_s), 3),
     )
 
 
@@ -187,6 +261,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--viewers", type=int, default=10, help="how many watch (default 10)")
     parser.add_argument("--rate", type=float, default=20.0, help="entries a second while it goes on (default 20)")
     parser.add_argument("--seconds", type=float, default=30.0, help="how long it goes on (default 30)")
+    parser.add_argument("--load", type=int, default=0, help="so many processes compute beside the mission that is commanded (default 0)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
     parser.add_argument("--quick", action="store_true", help="half an hour, gone on with for 10 s: for a first look, not for comparing")
     options = parser.parse_args(arguments)

@@ -1,0 +1,121 @@
+"""What the page needs of a robot whose run is under way, whatever it is reached over. An adapter makes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from threading import Lock
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+from alula.common.runs import Run
+
+if TYPE_CHECKING:
+    from alula.console.view import SkillsetView
+    from alula.runtime.client import Client
+    from alula.runtime.handle import SkillHandle
+
+
+class ActError(Exception):
+    """What was asked for can't be done; the message says why."""
+
+
+class Closable(Protocol):
+    """What listens, or is connected, until it is closed."""
+
+    def close(self) -> None:
+        """End it; what runs on the robot goes on running, and calls that wait for an answer end with an ActError."""
+        ...
+
+
+class Mission(Closable, Protocol):
+    """The mission of a run. Its methods wait for the answer and may be called from any thread; asking again changes nothing."""
+
+    def abort(self) -> str:
+        """Have it stop and land; return what it answers. Raises ActError where it gives no answer."""
+        ...
+
+    def set_paused(self, *, paused: bool) -> str:
+        """Have it hold, or go on; return what it answers. Raises ActError where it refuses, or gives no answer."""
+        ...
+
+
+class Skillset(Protocol):
+    """One skillset that has described itself."""
+
+    @property
+    def root(self) -> str:
+        """Namespace and name, as ``/navigation``."""
+        ...
+
+    @property
+    def client(self) -> Client:
+        """What calls its managers."""
+        ...
+
+    @property
+    def view(self) -> SkillsetView | None:
+        """What was heard of it."""
+        ...
+
+    def start(self, skill: str, inputs: dict[str, object]) -> SkillHandle:
+        """Start a skill; raise ValueError."""
+        ...
+
+
+class Skillsets(Closable, Protocol):
+    """The skillsets in one domain, listened to until it is closed."""
+
+    @property
+    def watched(self) -> Sequence[Skillset]:
+        """Those that have described themselves."""
+        ...
+
+    @property
+    def problems(self) -> Sequence[str]:
+        """What keeps others from being shown, a sentence each."""
+        ...
+
+    @property
+    def now_ns(self) -> int:
+        """The mission clock."""
+        ...
+
+
+class Link(Protocol):
+    """How robots are reached: by the domain of their run. Both methods take up to a second; what they return is used many times."""
+
+    def connect(self, domain: int) -> Mission:
+        """Return the mission there, which may come later, end, and come again. Raises ActError where nothing can be reached at all."""
+        ...
+
+    def listen(self, domain: int) -> Skillsets:
+        """Return the skillsets there. Raises ActError where nothing can be reached at all."""
+        ...
+
+
+T = TypeVar("T", bound=Closable)
+
+
+class Kept(Generic[T]):
+    """What is open of runs, made by ``make(domain)``: once a run, and kept until that is wanted no more.
+
+    A run that is started anew, be it in another domain, is another run.
+    """
+
+    def __init__(self, make: Callable[[int], T]) -> None:
+        self._make = make
+        self._open: dict[Run, T] = {}
+        self._lock = Lock()
+
+    def of(self, run: Run) -> T:
+        """Return what is open of a run; it is opened by the first call."""
+        with self._lock:
+            if run not in self._open:
+                self._open[run] = self._make(run.domain)
+            return self._open[run]
+
+    def keep(self, runs: set[Run]) -> None:
+        """Close what is open of other runs than these."""
+        with self._lock:
+            leaving = [self._open.pop(run) for run in set(self._open) - runs]
+        for one in leaving:
+            one.close()

@@ -1,0 +1,129 @@
+// The first thing that is looked at: how the mission is, what is active, the vehicle's figures, what is wrong, the last events; at one moment.
+// At the end of a run that is over the figures are those of the whole run.
+
+const RECENT = 6;
+const ALARM = /BROKEN|LOST|FAILED|ERROR|DOWN|CRITICAL/;
+
+/** What runs at t: [{name, since, inputs}], in the order of their starts. */
+function activeAt(run, t) {
+  const open = [...run.executions.values()].filter(({ running, end }) => running !== null && running <= t && (end === null || end > t));
+  return open.sort((one, other) => one.running - other.running).map(({ skill, running, inputs }) => ({ name: skill, since: running, inputs: listed(inputs) }));
+}
+
+/** The newest reading at t of the first data that has such a field: {value, since}; undefined where no data has it. */
+function fieldAt(run, t, pattern) {
+  for (const { t: times, columns } of run.data.values()) for (const [name, column] of columns) if (pattern.test(name)) return { name, ...readingAt(times, column, t) };
+  return undefined;
+}
+
+/** The vehicle's figures at t: [{label, text, tone}]; what nothing measures says so. */
+function readings(run, t) {
+  const numbers = (patterns) => patterns.map((pattern) => fieldAt(run, t, pattern));
+  const told = (label, fields, write) => {
+    if (fields.some((field) => field === undefined)) return { label, text: "not measured", tone: "soft" };
+    const { value, since } = fields.find((one) => one.value === null) ?? fields[0];
+    if (value !== null && value !== undefined) return { label, ...write(...fields.map((one) => one.value)) };
+    return { label, text: since === null ? "not measured yet" : `no data since ${seconds(since - origin(run))}`, tone: since === null ? "soft" : "fair" };
+  };
+  const position = numbers([/position_enu_m\.x$/, /position_enu_m\.y$/]);
+  const [height] = numbers([/position_enu_m\.z$/]);
+  const [battery] = numbers([/battery/]);
+  const reached = valueAt(run.blackboard.get("waypoints_reached") ?? newTrack(), t) ?? 0;
+  const of = last(run.mission.v)?.waypoints;
+  return [
+    told("height", [height], (z) => ({ text: `${fixed(z, 1)} m` })),
+    told("speed", numbers([/velocity_enu_m_s\.x$/, /velocity_enu_m_s\.y$/, /velocity_enu_m_s\.z$/]), (...v) => ({ text: `${fixed(Math.hypot(...v), 1)} m/s` })),
+    told("battery", [battery], (value) => batteryTold(battery.name, value)),
+    linkAt(run, t, told),
+    told("east, north of home", position, (x, y) => ({ text: `${fixed(x, 1)} m, ${fixed(y, 1)} m` })),
+    { label: "in the air", text: inTheAir(run, t) },
+    ...(of ? [{ label: "waypoints", text: `${reached} of ${of}` }] : []),
+    told("autopilot's mode", numbers([/(^|\.)mode$/]), (mode) => ({ text: String(mode), tone: MODES[mode] ? "fair" : "" })),
+  ];
+}
+
+function inTheAir(run, t) {
+  if (run.departure === null || t < run.departure) return "not yet";
+  const landed = landing(run);
+  return landed !== null && t >= landed ? `${seconds(landed - origin(run))}, ${cameDown(run)}` : seconds(t - origin(run));
+}
+
+/** A battery's charge: a share or per cent; other units as they are. */
+function batteryTold(name, value) {
+  if (typeof value !== "number") return { text: String(value) };
+  if (/volt|_v$/.test(name)) return { text: `${fixed(value, 1)} V` };
+  const percent = value <= 1 ? 100 * value : value;
+  return { text: `${fixed(percent, 0)} %`, tone: percent < 20 ? "bad" : percent < 35 ? "fair" : "" };
+}
+
+/** The links: the autopilot's, and each resource that is one. */
+function linkAt(run, t, told) {
+  const parts = [];
+  const autopilot = fieldAt(run, t, /(^|\.)link$/);
+  if (autopilot) parts.push(told("link", [autopilot], (up) => (up ? { text: "autopilot up" } : { text: "autopilot lost", tone: "bad" })));
+  for (const [name, track] of run.resources) {
+    if (!/\.(\w+_)?link$/.test(name)) continue;
+    const { state } = valueAt(track, t) ?? { state: "unknown" };
+    parts.push({ text: `${name.split(".")[0]} ${state.toLowerCase()}`, tone: ALARM.test(state) ? "bad" : "" });
+  }
+  const tone = ["bad", "fair", "soft"].find((one) => parts.some((part) => part.tone === one));
+  return { label: "link", text: parts.map(({ text }) => text).join(", ") || "not measured", tone: parts.length ? tone : "soft" };
+}
+
+/** What is wrong at t: [{text, tone, since}]. */
+function wrongAt(run, t) {
+  const found = [];
+  const flew = run.departure !== null && t >= run.departure;
+  const flies = flew && (landing(run) === null || t < landing(run));
+  if (!flew && !run.over) for (const [needed, otherwise] of valueAt(run.start, t) ?? []) if (otherwise) found.push({ text: `before the start: ${otherwise || needed}`, tone: "fair", since: null });
+  const held = valueAt(run.held, t) ?? null;
+  if (held !== null && (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "running") found.push({ text: "the mission is paused", tone: "fair", since: run.held.t[indexAt(run.held.t, t)] });
+  found.push(...faultsAt(run, t), ...endedBadly(run, t));
+  for (const [name, track] of run.resources) {
+    const index = indexAt(track.t, t);
+    const state = index < 0 ? "" : track.v[index].state;
+    if (ALARM.test(state) || (flies && state === "UNAVAILABLE")) found.push({ text: `${name.split(".")[1]} is ${state}`, tone: "bad", since: track.t[index] });
+  }
+  for (const [sensor, track] of run.health) {
+    const index = indexAt(track.t, t);
+    if (index >= 0 && !track.v[index].ok) found.push({ text: `${sensor}: ${track.v[index].reason || track.v[index].fault}`, tone: "bad", since: track.t[index] });
+  }
+  const since = flies ? fieldAt(run, t, /position_enu_m\.z$/)?.since : null;
+  if (since) found.push({ text: "no position", tone: "bad", since });
+  const crash = run.facts["/summary"]?.crash;
+  if (crash && t >= (landing(run) ?? Infinity)) found.push({ text: `crashed: ${crash}`, tone: "bad", since: landing(run) });
+  return found;
+}
+
+/** What was made to fail, or failed by itself, and does so still; of a sensor the resource that tells of it is enough. */
+function faultsAt(run, t) {
+  const now = new Map();
+  for (const fault of faultsOf(run)) if (fault.t <= t) now.set(fault.sensor, fault);
+  const told = [...run.resources].filter(([, track]) => ALARM.test(valueAt(track, t)?.state ?? "")).map(([name]) => name.split(".")[1]);
+  return [...now.values()].filter(({ sensor, mode }) => mode !== "ok" && !told.some((resource) => resource.startsWith(sensor))).map((fault) => ({ text: faultWords(fault), tone: "bad", since: fault.t }));
+}
+
+/** Skills whose last execution ended badly, and that do not run again. */
+function endedBadly(run, t) {
+  const latest = new Map();
+  for (const one of run.executions.values()) if (one.start <= t) latest.set(`${one.skillset}.${one.skill}`, one);
+  const ended = [...latest.values()].filter((one) => one.end !== null && one.end <= t && ["violated", "failure"].includes(endingOf(one)));
+  return ended.map((one) => ({ text: `${one.skill}: ${endingOf(one) === "violated" ? `invariant ${one.result} violated` : `${words(one.state)} ${one.result}`.trim()}`, tone: "fair", since: one.end }));
+}
+
+/** Shows all of that. */
+function showState(t) {
+  const zero = origin(run);
+  const ago = (since) => (Number.isFinite(since) ? ` since ${seconds(since - zero)}` : "");
+  const active = activeAt(run, t);
+  const none = run.mission.v.length && last(run.mission.v).outcome !== "running" ? "nothing any more" : "nothing yet";
+  rewrite(byId("active"), active.length ? active : [null], (one) => (one ? el("li", { title: one.inputs }, el("b", {}, one.name), el("span", {}, `since ${seconds(one.since - zero)}`)) : el("li", { class: "hint" }, none)));
+  rewrite(byId("readings"), readings(run, t), ({ label, text, tone }) => el("div", { class: tone ?? "" }, el("dt", {}, label), el("dd", {}, text)));
+  const whole = Boolean(run.facts["/summary"]) && cursor === null; // at the end of a run that is over, what it came to
+  [byId("readings").hidden, byId("figures-row").hidden] = [whole, !whole];
+  const wrong = wrongAt(run, t);
+  rewrite(byId("wrong"), wrong.length ? wrong : [null], (one) => (one ? el("li", { class: one.tone }, `${one.text}${ago(one.since)}`) : el("li", { class: "good" }, "Nothing is known to be wrong.")));
+  const upTo = currentEvent(t) + 1;
+  const recent = run.moments.slice(Math.max(0, upTo - RECENT), upTo).reverse();
+  rewrite(byId("recent"), recent, (event) => el("li", { class: event.bad ? "bad" : "" }, el("button", { type: "button", onclick: () => choose(event.t, event) }, seconds(event.t - zero, 2)), el("span", {}, event.text)));
+}
