@@ -11,15 +11,16 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-import alula_flight.replay
+import alula.commands.replay
 from alula.campaign import mock_run
 from alula.commands import expect
+from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.records.models import robot_skillsets
 from alula.runtime.mock import MockSkill, load_behaviour
-from alula_flight.replay import CANNOT_REPLAY, OTHERWISE, SAME, main
+from alula_flight.replay import main
 from uav_missions import mapping
 from uav_missions.route import inputs_of
 
@@ -29,7 +30,7 @@ ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
     """Make no report of a replay: seconds each; ``test_replays_kept`` has those that are made."""
-    monkeypatch.setattr(alula_flight.replay, "make_report", lambda *_: None)
+    monkeypatch.setattr(alula.commands.replay, "make_report", lambda *_: None)
 
 
 def fly(out: Path, *faults: str, scenario: str = "mapping") -> Path:

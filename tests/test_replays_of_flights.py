@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-import alula_flight.replay
+import alula.commands.replay
+from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.record import DECISIONS, FILE, MISSION, read_record
-from alula_flight.replay import CANNOT_REPLAY, OTHERWISE, SAME, main
+from alula_flight.replay import main
 from uav_missions import mapping
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
@@ -25,7 +26,7 @@ OTHERS = ALULA_ROOT.parent / "shared" / "data" / "bags"
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
     """Make no report of a replay: seconds each; ``test_replays_kept`` has those that are made."""
-    monkeypatch.setattr(alula_flight.replay, "make_report", lambda *_: None)
+    monkeypatch.setattr(alula.commands.replay, "make_report", lambda *_: None)
 
 
 def decided(run: Path) -> list[tuple]:

@@ -30,11 +30,11 @@ from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
 from alula.records.models import models_of
 from alula.report.deaths import Death
+from alula.report.live import LiveEvents
 from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
 from alula_flight.deaths import DeathRecord, describe_exit
 from alula_flight.ending import CANNOT_START, GIVEN_UP, finish
-from alula_flight.live import LiveEvents
 from alula_flight.mocked import STOPPING, MockFront
 from alula_flight.spec import RequestError, RunSpec
 

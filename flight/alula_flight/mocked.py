@@ -11,8 +11,8 @@ from pathlib import Path
 
 from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
+from alula.report.live import LiveEvents
 from alula_flight.ending import CANNOT_START, GIVEN_UP
-from alula_flight.live import LiveEvents
 from alula_flight.spec import RunSpec
 
 STOPPING = "stopping: the vehicle lands first; Ctrl-C again ends everything at once"

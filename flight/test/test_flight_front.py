@@ -18,6 +18,7 @@ from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
 from alula.model.execution_state import ExecutionState
 from alula.report.deaths import Death, read_deaths
+from alula.report.live import LiveEvents, event_line
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula_flight import mocked
@@ -26,7 +27,6 @@ from alula_flight.command_line import parse
 from alula_flight.deaths import DeathRecord, describe_exit
 from alula_flight.ending import CANNOT_START
 from alula_flight.fly import main, monitor_of, sensors_words
-from alula_flight.live import LiveEvents, event_line
 from alula_flight.mocked import MockFront, command
 from alula_flight.spec import RequestError, RunSpec
 from uav_simulator.world.config import find_world

@@ -1,4 +1,4 @@
-"""`python -m alula.editor.server`: a language server over the standard streams, for editors.
+"""`alula editor`: a language server over the standard streams, for editors.
 
 It tells the checker's findings on every change and the proofs' when a file is saved, completes, shows and renames names, finds where
 they are defined and used, lists symbols, indents, and offers the hints of findings as changes.
@@ -300,7 +300,7 @@ def _mended(file: ModelFile, finding: Diagnostic) -> tuple[str, lsp.TextEdit] | 
     return None
 
 
-def main() -> None:
+def serve() -> None:
     """Serve until the editor goes."""
     server.start_io()
 
@@ -325,7 +325,3 @@ def _place(file: ModelFile, position: lsp.Position) -> Place:
     text = file.line(position.line + 1)
     column = next((i for i in range(len(text) + 1) if _units(text[:i]) >= position.character), len(text))
     return Place(position.line + 1, column + 1)
-
-
-if __name__ == "__main__":
-    main()

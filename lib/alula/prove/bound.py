@@ -124,5 +124,5 @@ class Bound:
 
 def _written(skill: Skill) -> set[str]:
     effects: list[Effect] = [skill.start, skill.interrupt.effect]
-    effects += [one.effect for one in (*skill.invariants, *skill.results)]
+    effects += [invariant.effect for invariant in skill.invariants] + [result.effect for result in skill.results]
     return {change.resource for effect in effects for change in effect.assignments}

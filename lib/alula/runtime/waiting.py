@@ -124,6 +124,7 @@ class Pending(Waitable, Generic[T]):
 
     def __init__(self, waiter: Waiter | None = None) -> None:
         super().__init__(waiter)
+        self._settled = False
         self._value: T | None = None
         self._failure = ""
 
@@ -163,13 +164,13 @@ class Pending(Waitable, Generic[T]):
 
     def fail(self, reason: str) -> None:
         """Say why there will be no answer; ignored when there is one."""
-        self._settle(None, reason)
+        self._settle(None, reason or "there is no answer")
 
     def _settle(self, value: T | None, failure: str) -> None:
         with self._lock:
-            if self._ended.is_set() or self._failure or self._value is not None:
+            if self._settled:
                 return
-            self._value, self._failure = value, failure
+            self._settled, self._value, self._failure = True, value, failure
         self._end()
 
     def __await__(self) -> Generator[object, None, T]:

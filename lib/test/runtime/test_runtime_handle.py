@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import Report, SkillFailedError, SkillHandle, StillRunningError
-from alula.runtime.waiting import NoAnswerError, Pending
+from alula.runtime.waiting import Moment, NoAnswerError, Pending
 
 S = ExecutionState
 SOON_S = 10.0
@@ -164,6 +166,61 @@ def test_an_answer_comes_once_or_says_why_not():
             await lost
 
     asyncio.run(main())
+
+
+class Meddled:
+    """A lock at whose every release another thread gets in between, with what it does."""
+
+    def __init__(self, meddle: Callable[[], object]) -> None:
+        self._lock = threading.Lock()
+        self._meddle = meddle
+        self._inside = False
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+        if not self._inside:
+            self._inside = True
+            self._meddle()
+            self._inside = False
+
+
+@pytest.mark.parametrize("value", [None, "", "yes"])
+def test_an_answer_stands_whatever_comes_in_between(value):
+    given: Pending[Any] = Pending()
+    refused: Pending[Any] = Pending()
+    ends: list[str] = []
+    for answer in (given, refused):
+        answer.add_done_callback(lambda answer: ends.append(answer.failure or repr(answer.value)))
+    given._lock = Meddled(lambda: given.fail("gone"))
+    refused._lock = Meddled(lambda: refused.resolve(value))
+    given.resolve(value)
+    refused.fail("")
+    assert (given.done, given.failure, given.value) == (True, "", value)
+    assert refused.done
+    with pytest.raises(NoAnswerError, match="there is no answer"):
+        _ = refused.value
+    assert ends == [repr(value), "there is no answer"]
+
+
+def test_an_end_stands_whatever_comes_in_between():
+    one = handle()
+    ends: list[str] = []
+    one.add_done_callback(lambda ended: ends.append(ended.outcome))
+    one._lock = Meddled(lambda: one.fail("gone"))
+    one.end(S.TERMINATED, "DONE", "")
+    assert (one.outcome, one.result, one.message, ends) == ("TERMINATED", "DONE", "", ["TERMINATED"])
+
+
+def test_a_moment_comes_once_whatever_comes_in_between():
+    moment = Moment()
+    ends: list[str] = []
+    moment.call_at_end(lambda: ends.append("there"))
+    moment._lock = Meddled(moment.come)
+    moment.come()
+    assert ends == ["there"]
 
 
 def test_pauses_are_asked_for_where_there_are_managers_to_ask():

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import threading
 from collections.abc import Callable, Sequence
+from multiprocessing import AuthenticationError
 from multiprocessing.connection import Client, Connection, Listener
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookAnswer, Then
-from alula.runtime.hook_processes.place import Snapshot, snapshot
+from alula.runtime.hook_processes.place import Snapshot, admit, pipe_key, snapshot
 
 ENDED = "its process has ended"
 ASKED = {"terminate", "fail", "interrupted", "set_outputs"}
@@ -26,7 +27,7 @@ class RemoteHooks:
     """Calls the hooks of a skillset over the pipe at an address; ``attach`` the engine before anything is asked of it.
 
     Raises:
-        SkillRuntimeError: another process serves this address.
+        SkillRuntimeError: another process serves this address, or the key of this user's processes can't be had.
     """
 
     def __init__(self, skillset: Skillset, address: str, on_error: Callable[[str], None]) -> None:
@@ -37,6 +38,7 @@ class RemoteHooks:
         self._processes: dict[str, _SkillProcess] = {}
         self._skills = [skill.name for skill in skillset.skills]
         self._over = False
+        self._key = pipe_key(address)
         _take_over(address)
         self._listener = Listener(address, backlog=len(self._skills) + 1)
         threading.Thread(target=self._accept, name="hook_processes", daemon=True).start()
@@ -95,10 +97,17 @@ class RemoteHooks:
             threading.Thread(target=self._serve, args=(pipe,), name="hook_process", daemon=True).start()
 
     def _serve(self, pipe: Connection) -> None:
-        """Serve one skill's process to its end."""
+        """Serve one skill's process to its end, once it has shown that it is of this user."""
         try:
+            # Here, not where connections are accepted: one that says nothing would keep out all others.
+            admit(pipe, self._key)
             _, skill, written = pipe.recv()
+        except (AuthenticationError, AssertionError):
+            self._on_error("a process without this user's key was refused at the pipe of the hooks")
+            pipe.close()
+            return
         except (EOFError, OSError):
+            pipe.close()
             return
         process = _SkillProcess(pipe, frozenset(written), self._ask)
         with self._changed:
@@ -136,13 +145,22 @@ class _SkillProcess:
         self._ask = ask
         self._sending = threading.Lock()
         self._numbers = itertools.count(1)
+        self._lock = threading.Lock()
         self._waiting: dict[int, Then] = {}
+        self._gone: HookAnswer | None = None
+        """What calls are answered once the process has ended."""
 
     def call(self, hook: str, execution: Snapshot, then: Then) -> None:
         """Send a call."""
         number = next(self._numbers)
-        self._waiting[number] = then
-        self._send(("call", number, hook, execution))
+        with self._lock:
+            gone = self._gone
+            if gone is None:
+                self._waiting[number] = then
+        if gone is None:
+            self._send(("call", number, hook, execution))
+        else:
+            then(gone)
 
     def tell(self, execution: Snapshot) -> None:
         """Send what has become of an execution."""
@@ -163,9 +181,11 @@ class _SkillProcess:
                 self._send(("reply", number, self._ask(rest[0], rest[1])))
 
     def give_up(self, answer: HookAnswer) -> None:
-        """Answer all calls for a process that has ended."""
-        while self._waiting:
-            _, then = self._waiting.popitem()
+        """Answer all calls for a process that has ended, also those that are still on their way here."""
+        with self._lock:
+            self._gone = answer
+            waiting, self._waiting = self._waiting, {}
+        for then in waiting.values():
             then(answer)
 
     def close(self) -> None:

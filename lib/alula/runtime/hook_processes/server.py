@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from multiprocessing import AuthenticationError
 from multiprocessing.connection import Client, Connection
 from typing import Any
 
@@ -15,7 +16,7 @@ from alula.model.execution_state import ExecutionState
 from alula.runtime.core.execution import Execution
 from alula.runtime.core.hook_calls import HookAnswer, call_hook
 from alula.runtime.core.sanitize import as_text, error_line
-from alula.runtime.hook_processes.place import Snapshot
+from alula.runtime.hook_processes.place import Snapshot, pipe_key
 from alula.runtime.hooks import HOOKS, SkillHooks, is_written
 from alula.runtime.workers import Workers
 
@@ -28,13 +29,18 @@ STOPS = frozenset({"on_violation", "on_failure"})
 
 
 class HookServer:
-    """Serves the hooks of one skill, on threads of their own, to whatever engine is at an address; ``close`` ends it."""
+    """Serves the hooks of one skill, on threads of their own, to whatever engine of this user is at an address; ``close`` ends it.
+
+    Raises:
+        SkillRuntimeError: the key of this user's processes can't be had.
+    """
 
     def __init__(self, skillset: str, skill: str, hooks: SkillHooks, address: str, on_error: Callable[[str], object]) -> None:
         self._skillset = skillset
         self._skill = skill
         self._hooks = hooks
         self._address = address
+        self._key = pipe_key(address)
         self._on_error = on_error
         self._workers = Workers(f"{skillset}_{skill}_hooks", on_error)
         self._executions: dict[str, Execution] = {}
@@ -104,12 +110,20 @@ class HookServer:
 
     def _run(self) -> None:
         """Find the engine, serve it to its end, and find the next one."""
+        strange = False
         while not self._over.is_set():
             try:
-                pipe = Client(self._address)
-            except OSError:
+                pipe = Client(self._address, authkey=self._key)
+            except (OSError, EOFError):
                 self._over.wait(AGAIN_S)
                 continue
+            except (AuthenticationError, AssertionError):
+                if not strange:
+                    self._on_error(f"what listens at {self._address} does not have this user's key; end it")
+                strange = True
+                self._over.wait(AGAIN_S)
+                continue
+            strange = False
             written = [hook for hook in HOOKS if is_written(self._hooks, hook)]
             self._pipe = pipe
             self._send(("hello", self._skill, written))

@@ -2,9 +2,9 @@
 
 from alula.runtime.handle import SkillHandle
 from skillset_ros2.client import SkillsetClient
-from skillset_ros2.executor import StaticSingleThreadedExecutor
+from skillset_ros2.executor import NodeExecutor
 from skillset_ros2.node import SkillsetNode
 from skillset_ros2.robot import Robot
 from skillset_ros2.spin import run_skillset
 
-__all__ = ["Robot", "SkillHandle", "SkillsetClient", "SkillsetNode", "StaticSingleThreadedExecutor", "run_skillset"]
+__all__ = ["NodeExecutor", "Robot", "SkillHandle", "SkillsetClient", "SkillsetNode", "run_skillset"]

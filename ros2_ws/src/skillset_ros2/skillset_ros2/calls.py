@@ -92,11 +92,12 @@ class Calls:
         """Ask; either ``on_reply`` or ``on_error`` is called, once. The return value ends that: nothing is asked again or told."""
         call = _Call(request, on_reply, on_error, timeout_s, once, time.monotonic())
         with self._lock:
+            closed = self._closed
             full = len(self._waiting) >= QUEUE
-            if not full and not self._closed:
+            if not (closed or full):
                 self._waiting.append(call)
-        if full or self._closed:
-            why = f"{QUEUE} requests wait for it already" if full else "this client was closed"
+        if closed or full:
+            why = "this client was closed" if closed else f"{QUEUE} requests wait for it already"
             on_error(f"service {self._client.srv_name}: {why}")
         else:
             self._pump()
@@ -107,11 +108,10 @@ class Calls:
         """Ask nothing more."""
         with self._lock:
             self._closed = True
-            calls, self._open = [*self._waiting, *self._open], []
-            self._waiting.clear()
+            calls = [*self._waiting, *self._open]
         for call in calls:
-            call.over = True
-            call.on_error(f"service {self._client.srv_name}: this client was closed")
+            if self._close(call):
+                call.on_error(f"service {self._client.srv_name}: this client was closed")
 
     # --- inside ------------------------------------------------------------------------------------------------------
 

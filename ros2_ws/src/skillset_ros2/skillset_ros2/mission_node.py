@@ -28,7 +28,7 @@ from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
 from alula.runtime.codecs import event_of
-from skillset_ros2 import SkillsetClient, StaticSingleThreadedExecutor
+from skillset_ros2 import NodeExecutor, SkillsetClient
 
 TICK_PERIOD_S = 0.1
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
@@ -172,7 +172,7 @@ class Standstill:
 
 def tick_to_the_end(node: MissionNode, signals: Sequence[int]) -> End:
     """Tick until the mission is over; ``signals`` grows when the process is told to end."""
-    executor = StaticSingleThreadedExecutor()
+    executor = NodeExecutor()
     executor.add_node(node)
     standstill = Standstill(patience_s=60.0)
     obeyed = 0

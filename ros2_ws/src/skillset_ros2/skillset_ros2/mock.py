@@ -30,7 +30,7 @@ from alula.model.model import Skillset
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.managers import DataBindings
 from alula.runtime.mock import Behaviour, MockRobot, load_behaviour, starter
-from skillset_ros2.executor import StaticSingleThreadedExecutor
+from skillset_ros2.executor import NodeExecutor
 from skillset_ros2.mock_host import RosMockHost
 from skillset_ros2.node import SkillsetNode
 from skillset_ros2.spin import ros2_arguments, spin_until
@@ -73,7 +73,7 @@ class MockNodes:
 
     def spin(self, stop: threading.Event) -> None:
         """Serve until ``stop``, each skillset in a thread of its own; then end what runs and tell its callers."""
-        executor = StaticSingleThreadedExecutor()
+        executor = NodeExecutor()
         executor.add_node(self.helper)
         threads = [threading.Thread(target=spin_until, args=(node, stop), name=name) for name, node in self.host.nodes.items()]
         for thread in threads:

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from skillset_ros2.executor import StaticSingleThreadedExecutor
+from skillset_ros2.executor import NodeExecutor
 
 JOIN_S = 5.0
 
@@ -28,7 +28,7 @@ class Session:
         executor: what spins the node.
     """
 
-    def __init__(self, name: str, *, domain: int | None = None, executor: type[Executor] = StaticSingleThreadedExecutor) -> None:
+    def __init__(self, name: str, *, domain: int | None = None, executor: type[Executor] = NodeExecutor) -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
         self.node = Node(f"{name}_{os.getpid():x}_{threading.get_native_id():x}", context=self._context, enable_rosout=False)

@@ -25,7 +25,7 @@ from alula.model.model import Skillset
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.hook_processes import RemoteHooks, pipe_address
 from alula.runtime.managers import DataBindings
-from skillset_ros2.executor import StaticSingleThreadedExecutor
+from skillset_ros2.executor import NodeExecutor
 from skillset_ros2.names import latched
 from skillset_ros2.node import HooksFactory, HooksNode, SkillsetNode
 from skillset_ros2.processes import RESOURCES, end_with, supervise, wait_for
@@ -90,7 +90,8 @@ def run_skillset(
         if options.part in {ALL, RESOURCES} and rivals_there(skillset.name):
             refuse(f"managers of {skillset.name} are there already; end them first")
         else:
-            address = pipe_address(os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
+            names = (os.environ.get("ROS_DOMAIN_ID", ""), skillset.name, *words)
+            address = "" if options.part == ALL else pipe_address(*names)
             node = make_part(options.part, skillset, interfaces, hooks_factory, data_bindings, address=address, stop=stop, on_rival=refuse)
             if node is not None:
                 spin_until(node, stop, at_stop=_limit_the_end)
@@ -110,7 +111,7 @@ def rivals_there(skillset: str) -> bool:
     node = Node(skillset, enable_rosout=False)
     heard: list[object] = []
     node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))
-    executor = StaticSingleThreadedExecutor()
+    executor = NodeExecutor()
     executor.add_node(node)
     end_s = time.monotonic() + LISTEN_FIRST_S
     while not heard and (left_s := end_s - time.monotonic()) > 0:
@@ -171,7 +172,7 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
     A callback that raises (most are of hooks) fails what runs, as it is not known whose function is without its watch now;
     the managers live on.
     """
-    executor = StaticSingleThreadedExecutor()
+    executor = NodeExecutor()
     executor.add_node(node)
     over = threading.Event()
 

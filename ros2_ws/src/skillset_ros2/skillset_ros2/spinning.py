@@ -11,7 +11,7 @@ from typing import Any
 from rclpy.node import Node
 
 from alula.runtime.waiting import CannotWaitError
-from skillset_ros2.executor import StaticSingleThreadedExecutor
+from skillset_ros2.executor import NodeExecutor
 
 LOOK_S = 0.5
 """How often (wall clock) a wait looks whether the node is still spun."""
@@ -72,7 +72,7 @@ class NodeWaiter:
 
     def _spin(self, event: threading.Event, time_s: float) -> None:
         """Spin the node in an executor of its own until the event, the time, or until another executor takes the node."""
-        executor = StaticSingleThreadedExecutor(context=self._node.context)
+        executor = NodeExecutor(context=self._node.context)
         executor.add_node(self._node)
         end = time.monotonic() + time_s
         try:

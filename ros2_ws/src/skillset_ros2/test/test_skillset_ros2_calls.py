@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -66,6 +67,18 @@ def bench(monkeypatch):
         now.s = end_s
 
     return SimpleNamespace(service=service, calls=calls, ask=ask, run_for=run_for, answers=answers, now=now)
+
+
+def test_each_call_ends_once_where_answers_come_while_the_client_is_closed(bench):
+    def refuse(reason: str) -> None:
+        bench.answers.append(f"a {reason}")
+        bench.service.sent[1].answer("in between")
+
+    bench.calls.call("a", lambda *_: None, refuse, timeout_s=60.0, once=False)
+    tell = bench.answers.append
+    bench.calls.call("b", lambda *_: tell("b answered"), lambda _: tell("b refused"), timeout_s=60.0, once=False)
+    bench.calls.close()
+    assert bench.answers == ["a service ask: this client was closed", "b answered"]
 
 
 def test_what_is_withdrawn_is_not_asked_again_and_gives_no_answer(bench):
@@ -242,3 +255,23 @@ def test_a_job_that_raises_leaves_the_timer_set_for_the_others():
     with pytest.raises(ZeroDivisionError):
         node.ring()
     assert (node.wakes, node.runs, node.timer_period_ns) == (0, True, 10)
+
+
+def test_a_call_that_is_made_while_the_client_is_closed_is_refused_once(bench):
+    class Closing:
+        """The lock of a client that another thread closes as soon as it is free."""
+
+        def __init__(self) -> None:
+            self.lock = threading.Lock()
+
+        def __enter__(self) -> None:
+            self.lock.acquire()
+
+        def __exit__(self, *_: object) -> None:
+            self.lock.release()
+            bench.calls._lock = self.lock
+            bench.calls.close()
+
+    bench.calls._lock = Closing()
+    bench.ask("a")
+    assert bench.answers == ["service ask: this client was closed"]

@@ -1,118 +1,42 @@
-"""The executor that collects entities when they change, on real nodes; what rclpy's own does in the same order is its measure."""
+"""The executor on real nodes: what is ready, what is made, what raises, and the end; rclpy's own is the measure."""
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 rclpy = pytest.importorskip("rclpy")
 
+import skillset_ros2_executor_rig as rig  # noqa: E402
 from action_msgs.msg import GoalStatus  # noqa: E402
 from navigation_interfaces.action import Hover  # noqa: E402
 from rclpy.action import ActionClient, ActionServer  # noqa: E402
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # noqa: E402
-from rclpy.impl.implementation_singleton import rclpy_implementation  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.qos import QoSProfile  # noqa: E402
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup  # noqa: E402
 from rclpy.task import Future  # noqa: E402
+from skillset_ros2_executor_rig import DEEP, SOON_S, Counting, First, all_arrived, connected, quiet, turn, turned  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from alula_testing.waits import until  # noqa: E402
-from skillset_ros2 import StaticSingleThreadedExecutor  # noqa: E402
 from skillset_ros2.base import QUIET, RestingGroup  # noqa: E402
+from skillset_ros2.executor import RCLPY, NodeExecutor, RclpyExecutor, SparingExecutor, executor_for  # noqa: E402
 
-SOON_S = 30.0
-NOW_S = 0.0
-LONG_S = 20.0
-DEEP = QoSProfile(depth=100)
-
-
-@pytest.fixture
-def context(ros2_domain):
-    context = Context()
-    rclpy.init(context=context)
-    yield context
-    context.try_shutdown()
-
-
-@pytest.fixture
-def node(context):
-    node = Node("served", context=context)
-    yield node
-    node.destroy_node()
+context, executor, kind, node, other, partner, spun, victim = (
+    rig.context,
+    rig.executor,
+    rig.kind,
+    rig.node,
+    rig.other,
+    rig.partner,
+    rig.spun,
+    rig.victim,
+)
 
 
-@pytest.fixture
-def other(context):
-    node = Node("other", context=context)
-    yield node
-    node.destroy_node()
-
-
-@pytest.fixture
-def executor(context, node):
-    executor = StaticSingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    yield executor
-    executor.shutdown(timeout_sec=0)
-
-
-@pytest.fixture
-def spun(executor):
-    """Return the executor, spun by a thread of its own, and what callbacks have raised there."""
-    raised: list[Exception] = []
-
-    def spin():
-        while True:
-            try:
-                executor.spin()
-            except ExternalShutdownException:
-                return
-            except Exception as error:  # noqa: BLE001 - looked at by the test
-                raised.append(error)
-                continue
-            return
-
-    thread = threading.Thread(target=spin)
-    thread.start()
-    yield executor, raised
-    executor.shutdown(timeout_sec=0)
-    thread.join(SOON_S)
-    assert not thread.is_alive()
-
-
-def connected(publisher, subscribers: int = 1) -> None:
-    until(lambda: publisher.get_subscription_count() == subscribers, "the subscribers are known", SOON_S)
-
-
-def all_arrived(context, node, server) -> bool:
-    """Tell whether the last two subscriptions, the service "ask" and the action server of a node each have something to take."""
-    subscriptions = list(node.subscriptions)[-2:]
-    service = next(service for service in node.services if service.srv_name.endswith("ask"))
-    inside = server.get_num_entities()
-    wait_set = rclpy_implementation.WaitSet(2, 0, inside.num_timers, 0, 1 + inside.num_services, 0, context.handle)
-    wait_set.clear_entities()
-    for subscription in subscriptions:
-        wait_set.add_subscription(subscription.handle)
-    wait_set.add_service(service.handle)
-    server.add_to_wait_set(wait_set)
-    wait_set.wait(0)
-    arrived = len(wait_set.get_ready_entities("subscription")) == len(subscriptions)
-    return arrived and service.handle.pointer in wait_set.get_ready_entities("service") and server.is_ready(wait_set)
-
-
-def turned(executor, condition, what: str) -> None:
-    """Turn the executor here until a condition holds."""
-    end_s = time.monotonic() + SOON_S
-    while not condition():
-        assert time.monotonic() < end_s, what
-        executor.spin_once(timeout_sec=0.05)
+# --- what is ready -------------------------------------------------------------------------------------------------
 
 
 def test_every_kind_of_entity_is_served(node, other, spun):
@@ -129,9 +53,9 @@ def test_every_kind_of_entity_is_served(node, other, spun):
     connected(words)
     words.publish(String(data="subscription"))
     guard.trigger()
-    spun[0].create_task(lambda: asked.set_result("task") or heard.append("task"))
+    spun.executor.create_task(lambda: asked.set_result("task") or heard.append("task"))
     until(lambda: {"timer", "service", "guard", "client", "subscription", "task"} <= set(heard), f"all are served: {heard}", SOON_S)
-    assert spun[1] == []
+    assert spun.raised == []
 
 
 def test_an_action_with_a_coroutine_that_awaits_comes_to_its_end(node, spun):
@@ -151,54 +75,12 @@ def test_an_action_with_a_coroutine_that_awaits_comes_to_its_end(node, spun):
     )
     until(lambda: server._goal_handles, "the goal is there", SOON_S)
     assert statuses == []
-    spun[0].create_task(lambda: opened.set_result(None))
+    spun.executor.create_task(lambda: opened.set_result(None))
     until(lambda: statuses == [GoalStatus.STATUS_SUCCEEDED], "the goal has succeeded", SOON_S)
     client.destroy()
     server.destroy()
 
 
-def test_what_awaits_holds_its_callback_group_and_no_other(node, other, spun):
-    opened, heard = Future(), []
-    held, free = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
-
-    async def wait(message):
-        heard.append(f"begin {message.data}")
-        await opened
-        heard.append(f"end {message.data}")
-
-    node.create_subscription(String, "held", wait, DEEP, callback_group=held)
-    node.create_subscription(String, "free", lambda message: heard.append(message.data), DEEP, callback_group=free)
-    slow, fast = other.create_publisher(String, "held", DEEP), other.create_publisher(String, "free", DEEP)
-    connected(slow)
-    connected(fast)
-    slow.publish(String(data="1"))
-    until(lambda: heard == ["begin 1"], "the first waits", SOON_S)
-    slow.publish(String(data="2"))
-    for number in range(5):
-        fast.publish(String(data=f"fast {number}"))
-    until(lambda: heard[-1] == "fast 4", "the other group is served", SOON_S)
-    assert "begin 2" not in heard
-    spun[0].create_task(lambda: opened.set_result(None))
-    until(lambda: heard[-1] == "end 2", f"both have ended: {heard}", SOON_S)
-    assert [word for word in heard if not word.startswith("fast")] == ["begin 1", "end 1", "begin 2", "end 2"]
-
-
-def test_a_task_goes_on_with_what_an_older_task_brings(spun):
-    brought, ended = Future(), threading.Event()
-
-    async def wait():
-        await brought
-        ended.set()
-
-    def make_both():
-        spun[0].create_task(lambda: brought.set_result(None))
-        spun[0].create_task(wait)  # the newest is run first
-
-    spun[0].create_task(make_both)
-    assert ended.wait(SOON_S)
-
-
-@pytest.mark.parametrize("kind", [SingleThreadedExecutor, StaticSingleThreadedExecutor])
 def test_what_is_ready_at_once_is_dealt_with_in_rclpys_order(context, node, other, kind):
     order: list[str] = []
     executor = kind(context=context)
@@ -228,38 +110,113 @@ def test_what_is_ready_at_once_is_dealt_with_in_rclpys_order(context, node, othe
     server.destroy()
 
 
-def test_entities_are_collected_when_they_change_and_not_at_each_turn(node, other, executor, monkeypatch):
-    collected, heard = [], []
-    collect = executor._collect
-    monkeypatch.setattr(executor, "_collect", lambda: collected.append(1) or collect())
-    node.create_subscription(String, "words", lambda message: heard.append(message.data), DEEP)
-    words = other.create_publisher(String, "words", DEEP)
-    connected(words)
-    executor.spin_once(timeout_sec=NOW_S)
-    collected.clear()
-    for number in range(20):
-        words.publish(String(data=str(number)))
-        turned(executor, lambda number=number: len(heard) == number + 1, f"message {number} is heard")
-    assert collected == []
-    node.create_subscription(String, "more", lambda message: heard.append(message.data), DEEP)
-    executor.spin_once(timeout_sec=NOW_S)
-    assert collected == [1]
-
-
-def test_a_message_costs_one_wait(node, other, executor, monkeypatch):
-    waits, heard = [], []
-    wait = executor._wait
-    monkeypatch.setattr(executor, "_wait", lambda timeout_ns: waits.append(1) or wait(timeout_ns))
+@pytest.mark.parametrize("kind", [SparingExecutor], ids=["ours"])  # rclpy's takes two
+def test_a_message_costs_one_wait(node, other, executor):
+    heard, counting = [], Counting(node)
     node.create_subscription(String, "words", heard.append, DEEP)
     words = other.create_publisher(String, "words", DEEP)
     connected(words)
-    executor.spin_once(timeout_sec=NOW_S)
-    waits.clear()
+    turn(executor)
+    counting.waits = 0
     for _ in range(20):
         words.publish(String())
-        executor.spin_once(timeout_sec=LONG_S)
+        executor.spin_once(timeout_sec=SOON_S)
     assert len(heard) == 20
-    assert len(waits) < 30  # rclpy's own: 40; the middleware wakes a wait for nothing now and then
+    assert counting.waits < 30  # rclpy's own: 40; the middleware wakes a wait for nothing now and then
+
+
+def test_an_entity_that_rests_is_not_waited_for_until_it_is_awaited(node, other, executor):
+    heard, group, counting = [], RestingGroup(), Counting(node)
+    subscription = node.create_subscription(String, "words", heard.append, DEEP, callback_group=group, event_callbacks=QUIET)
+    group.resting.add(subscription)
+    words = other.create_publisher(String, "words", DEEP)
+    connected(words)
+    words.publish(String())
+    executor.spin_once(timeout_sec=0.5)
+    assert heard == []
+    assert counting.waits < 20  # were it waited for, each wait would return at once
+    group.resting.clear()
+    executor.spin_once(timeout_sec=SOON_S)
+    assert len(heard) == 1
+
+
+def test_what_was_ready_is_not_lost_where_the_time_out_changes_from_turn_to_turn(node, executor):
+    heard: list[int] = []
+    guards = [node.create_guard_condition(lambda number=number: heard.append(number)) for number in range(5)]
+    executor.spin_once(timeout_sec=0)
+    for guard in guards:
+        guard.trigger()
+    for number in range(40):
+        executor.spin_once(timeout_sec=0.01 + 0.001 * number)
+    assert sorted(heard) == [0, 1, 2, 3, 4]
+
+
+def test_a_timer_that_a_callback_of_the_same_turn_has_cancelled_does_not_ring(node, executor):
+    rung: list[int] = []
+    timers = []
+
+    def ring(number: int) -> None:
+        rung.append(number)
+        for timer in timers:
+            timer.cancel()
+
+    timers += [node.create_timer(0.001, lambda number=number: ring(number)) for number in range(3)]
+    until(lambda: all(timer.is_ready() for timer in timers), "all are due", SOON_S)
+    for _ in range(5):
+        executor.spin_once(timeout_sec=0.01)
+    assert rung == [0]
+
+
+# --- what is made ---------------------------------------------------------------------------------------------------
+
+
+def test_what_a_callback_makes_is_served(kind, context, node, partner, spun):
+    heard: list[str] = []
+    words = partner.create_publisher(String, "made", DEEP)
+    asks = partner.create_client(Trigger, "made")
+
+    def make():
+        node.create_subscription(String, "made", lambda _: heard.append("subscription"), DEEP)
+        node.create_service(Trigger, "made", lambda _, response: heard.append("service") or response)
+        node.create_timer(0.01, lambda: heard.append("timer"))
+        node.create_guard_condition(lambda: heard.append("guard")).trigger()
+
+    node.create_guard_condition(make).trigger()
+    until(lambda: words.get_subscription_count() == 1, "the subscription is known", SOON_S)
+    words.publish(String())
+    assert asks.wait_for_service(SOON_S)
+    asks.call_async(Trigger.Request())
+    until(lambda: {"subscription", "service", "timer", "guard"} <= set(heard), f"all are served: {heard}", SOON_S)
+    assert spun.raised == []
+
+
+def test_what_another_thread_makes_while_the_executor_sleeps_is_served(node, spun, victim):
+    quiet(spun)
+    victim.call()
+    until(lambda: victim.heard, "it is served", SOON_S)
+    rung = threading.Event()
+    quiet(spun)
+    node.create_timer(0.01, rung.set)
+    assert rung.wait(SOON_S)
+
+
+def test_a_node_that_comes_or_goes_in_a_callback_is_served_from_then_on_or_not(context, node, other, executor):
+    heard: list[str] = []
+    own, guest = (one.create_guard_condition(lambda one=one: heard.append(one.get_name())) for one in (node, other))
+    come = node.create_guard_condition(lambda: executor.add_node(other))
+    come.trigger()
+    turn(executor)
+    guest.trigger()
+    turn(executor)
+    assert heard == ["other"]
+    go = other.create_guard_condition(lambda: executor.remove_node(other))
+    turn(executor)
+    go.trigger()
+    turn(executor)
+    guest.trigger()
+    own.trigger()
+    turn(executor)
+    assert heard == ["other", "served"]
 
 
 def test_what_comes_and_goes_while_it_spins_from_other_threads_and_callbacks_is_served_and_disturbs_nothing(node, other, spun):
@@ -306,24 +263,49 @@ def test_what_comes_and_goes_while_it_spins_from_other_threads_and_callbacks_is_
     assert not thread.is_alive()
     until(lambda: len(heard) == 30, f"all are heard: {heard}", SOON_S)
     assert [word for word in heard if not word.startswith("nested")] == [str(number) for number in range(15)]
-    assert spun[1] == []
+    assert spun.raised == []
 
 
-def test_an_entity_that_rests_is_not_waited_for_until_it_is_awaited(node, other, executor, monkeypatch):
-    waits, heard, group = [], [], RestingGroup()
-    wait = executor._wait
-    monkeypatch.setattr(executor, "_wait", lambda timeout_ns: waits.append(1) or wait(timeout_ns))
-    subscription = node.create_subscription(String, "words", heard.append, DEEP, callback_group=group, event_callbacks=QUIET)
-    group.resting.add(subscription)
-    words = other.create_publisher(String, "words", DEEP)
-    connected(words)
-    words.publish(String())
-    executor.spin_once(timeout_sec=0.5)
-    assert heard == []
-    assert len(waits) < 20  # were it waited for, each wait would return at once
-    group.resting.clear()
-    executor.spin_once(timeout_sec=LONG_S)
-    assert len(heard) == 1
+# --- exceptions -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["at once", "after an await"])
+def test_a_callback_that_raises_is_told_once_and_frees_its_group(node, spun, late):
+    heard: list[str] = []
+    opened, group = Future(), MutuallyExclusiveCallbackGroup()
+
+    async def fail():
+        if late:
+            await opened
+        raise ValueError("broken")
+
+    node.create_guard_condition(fail, group).trigger()
+    quiet(spun)
+    spun.executor.create_task(lambda: opened.set_result(None))
+    until(lambda: spun.raised, "it is told", SOON_S)
+    node.create_guard_condition(lambda: heard.append("next"), group).trigger()
+    until(lambda: heard == ["next"], "the next is served", SOON_S)
+    assert [str(error) for error in spun.raised] == ["broken"]
+
+
+@pytest.mark.parametrize("kind", [SparingExecutor], ids=["ours"])  # with rclpy's, the group is held for ever
+def test_what_can_not_be_taken_is_told_and_frees_its_group(node, executor):
+    class Broken(First):
+        def take_data(self):
+            self.armed = False
+            raise ValueError("broken")
+
+    heard: list[str] = []
+    broken = Broken(node, lambda: None)
+    broken.callback_group = MutuallyExclusiveCallbackGroup()
+    broken.callback_group.add_entity(broken)
+    guard = node.create_guard_condition(lambda: heard.append("next"), broken.callback_group)
+    broken.armed = True
+    guard.trigger()
+    with pytest.raises(ValueError, match="broken"):
+        turn(executor)
+    turn(executor)
+    assert heard == ["next"]
 
 
 def test_a_callback_that_raises_is_told_once_and_what_was_ready_beside_it_is_served(node, executor):
@@ -333,41 +315,93 @@ def test_a_callback_that_raises_is_told_once_and_what_was_ready_beside_it_is_ser
         raise ValueError("broken")
 
     guards = [node.create_guard_condition(fail), node.create_guard_condition(lambda: heard.append("after"))]
-    executor.spin_once(timeout_sec=NOW_S)
+    executor.spin_once(timeout_sec=0)
     for guard in guards:
         guard.trigger()
     with pytest.raises(ValueError, match="broken"):
-        executor.spin_once(timeout_sec=LONG_S)
-    executor.spin_once(timeout_sec=LONG_S)
-    executor.spin_once(timeout_sec=NOW_S)
+        executor.spin_once(timeout_sec=SOON_S)
+    executor.spin_once(timeout_sec=SOON_S)
+    executor.spin_once(timeout_sec=0)
     assert heard == ["after"]
 
 
-def test_what_was_ready_is_not_lost_where_the_time_out_changes_from_turn_to_turn(node, executor):
-    heard: list[int] = []
-    guards = [node.create_guard_condition(lambda number=number: heard.append(number)) for number in range(5)]
-    executor.spin_once(timeout_sec=NOW_S)
-    for guard in guards:
+# --- turns, nested ones, and the end --------------------------------------------------------------------------------
+
+
+def test_a_callback_spins_for_an_answer_of_the_same_executor(node, partner, executor):
+    partner.create_service(Trigger, "answer", lambda _, response: response)
+    client = node.create_client(Trigger, "answer", callback_group=ReentrantCallbackGroup())
+    assert client.wait_for_service(SOON_S)
+    answered: list[bool] = []
+
+    def ask():
+        future = client.call_async(Trigger.Request())
+        executor.spin_until_future_complete(future, timeout_sec=SOON_S)
+        answered.append(future.done())
+
+    node.create_guard_condition(ask).trigger()
+    turn(executor)
+    assert answered == [True]
+
+
+def test_a_turn_without_time_does_what_is_there_and_returns(node, executor):
+    heard: list[str] = []
+    begun_s = time.monotonic()
+    for _ in range(3):
+        executor.spin_once(timeout_sec=0)
+    assert time.monotonic() - begun_s < SOON_S
+    node.create_guard_condition(lambda: heard.append("rung")).trigger()
+    for _ in range(3):
+        executor.spin_once(timeout_sec=0)
+    assert heard == ["rung"]
+
+
+def test_a_wake_up_of_another_thread_disturbs_nothing(node, spun):
+    heard: list[str] = []
+    for _ in range(100):
+        spun.executor.wake()
+    guard = node.create_guard_condition(lambda: heard.append("rung"))
+    quiet(spun)
+    guard.trigger()
+    until(lambda: heard == ["rung"], "it is served", SOON_S)
+    assert spun.raised == []
+
+
+@pytest.mark.parametrize("where", ["callback", "task", "thread"])
+def test_a_shutdown_ends_the_spinning(node, spun, where):
+    guard = node.create_guard_condition(lambda: spun.executor.shutdown(timeout_sec=0))
+    quiet(spun)
+    if where == "callback":
         guard.trigger()
-    for turn in range(40):
-        executor.spin_once(timeout_sec=0.01 + 0.001 * turn)
-    assert sorted(heard) == [0, 1, 2, 3, 4]
+    elif where == "task":
+        spun.executor.create_task(spun.executor.shutdown, 0)
+    else:
+        spun.executor.shutdown(timeout_sec=0)
+    spun.thread.join(SOON_S)
+    assert not spun.thread.is_alive()
+    assert spun.raised == []
 
 
-def test_a_timer_that_a_callback_of_the_same_turn_has_cancelled_does_not_ring(node, executor):
-    rung: list[int] = []
-    timers = []
+def test_a_shutdown_leaves_what_awaits_where_it_is(node, spun):
+    heard: list[str] = []
 
-    def ring(number: int) -> None:
-        rung.append(number)
-        for timer in timers:
-            timer.cancel()
+    async def wait():
+        await Future()
+        heard.append("on")
 
-    timers += [node.create_timer(0.001, lambda number=number: ring(number)) for number in range(3)]
-    until(lambda: all(timer.is_ready() for timer in timers), "all are due", SOON_S)
-    for _ in range(5):
-        executor.spin_once(timeout_sec=0.01)
-    assert rung == [0]
+    node.create_guard_condition(wait).trigger()
+    quiet(spun)
+    spun.executor.shutdown(timeout_sec=0)
+    spun.thread.join(SOON_S)
+    assert not spun.thread.is_alive()
+    assert (heard, spun.raised) == ([], [])
+
+
+def test_the_end_of_the_context_ends_the_spinning(context, spun):
+    quiet(spun)
+    context.try_shutdown()
+    spun.thread.join(SOON_S)
+    assert not spun.thread.is_alive()
 
 
 def test_a_turn_lasts_as_long_as_it_may_and_not_longer_than_it_must(node, executor):
@@ -385,33 +419,16 @@ def test_a_turn_lasts_as_long_as_it_may_and_not_longer_than_it_must(node, execut
     thread.join()
 
 
-def test_a_node_that_was_taken_away_is_served_no_more_and_one_that_came_is(node, other, context, executor):
-    heard: list[str] = []
-    guards = [one.create_guard_condition(lambda one=one: heard.append(one.get_name())) for one in (node, other)]
-    executor.add_node(other)
-    for guard in guards:
-        guard.trigger()
-    turned(executor, lambda: len(heard) == 2, "both are served")
-    heard.clear()
-    executor.remove_node(node)
-    for guard in guards:
-        guard.trigger()
-    turned(executor, lambda: "other" in heard, "the one that is left is served")
-    executor.spin_once(timeout_sec=NOW_S)
-    assert heard == ["other"]
+# --- which executor -------------------------------------------------------------------------------------------------
 
 
-def test_the_end_of_the_context_ends_the_spinning(context, executor):
-    ended = threading.Event()
+def test_with_another_rclpy_than_the_pinned_one_its_own_executor_is_taken():
+    assert NodeExecutor is executor_for(RCLPY) is SparingExecutor
+    assert executor_for("7.1.7") is executor_for("") is RclpyExecutor
+    changed = set(vars(RclpyExecutor)) - set(vars(object)) - {"__module__", "__doc__", "__dict__", "__weakref__", "__annotations__"}
+    assert changed - {"__abstractmethods__", "_abc_impl", "__parameters__", "__orig_bases__"} == {"idle"}
 
-    def spin():
-        with contextlib.suppress(ExternalShutdownException):
-            while True:
-                executor.spin_once()
-        ended.set()
 
-    thread = threading.Thread(target=spin)
-    thread.start()
-    context.try_shutdown()
-    assert ended.wait(SOON_S)
-    thread.join()
+def test_the_pinned_rclpy_is_the_one_that_the_executor_knows():
+    pins = (Path(__file__).resolve().parents[4] / "setup/ros2.txt").read_text(encoding="utf-8").split()
+    assert f"ros-rclpy=={RCLPY}" in pins
