@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 from importlib.metadata import distributions
+from pathlib import Path
 
 from workspace import ROOT, WORKSPACES, Built, Package, Workspace, build_files, digest
 

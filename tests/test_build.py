@@ -78,7 +78,8 @@ def test_one_more_message_of_ros_1_configures_and_builds_its_package_and_those_t
     devel = state / "ros1/devel"
 
     def build() -> str:
-        done = subprocess.run([*in_robot, "python3", f"{ALULA_ROOT}/setup/build_ros1.py", "robot"], capture_output=True, text=True, check=False)
+        command = [*in_robot, "python3", f"{ALULA_ROOT}/setup/build_ros1.py", "robot"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
         return done.stdout.splitlines()[0]
 

@@ -57,9 +57,9 @@ def test_wrong_input_is_exit_code_2_and_names_it(arguments: list[str], named: st
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("words", [["run", "patrol"], ["fly", "mapping"], ["mock"], ["check"], ["test"], ["replay", "x"], ["campaign", "x"]])
-def test_where_there_is_no_robot_one_line_says_what_to_do(words: list[str], tmp_path: Path) -> None:
-    done = outside(tmp_path, *words)
+@pytest.mark.parametrize("words", ["run patrol", "fly mapping", "mock", "check", "test", "replay x", "campaign x"])
+def test_where_there_is_no_robot_one_line_says_what_to_do(words: str, tmp_path: Path) -> None:
+    done = outside(tmp_path, *words.split())
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
     assert "there is no robot.yaml" in done.stderr
     assert "--robot DIR" in done.stderr
