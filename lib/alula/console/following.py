@@ -91,7 +91,7 @@ class RunFollower:
         return {**{key: values.get(key) for key in keep}, "world": world, "name": self.folder.name}
 
     def _route(self, path: Path) -> list[list[float]]:
-        return [[float(number) for number in waypoint[:3]] for waypoint in _json(path)["route"]]
+        return [[float(number) for number in waypoint[:3]] for waypoint in _json(path).get("route", [])]  # not every mission has one
 
 
 def _json(path: Path) -> Any:
