@@ -1,6 +1,11 @@
 """What pip, colcon and catkin read of the library; everything that only pip needs is in pyproject.toml."""
 
+import sys
+
 from setuptools import find_packages, setup
+
+if sys.version_info < (3, 11):  # as `requires-python` colcon could not read it: it wants literals only
+    sys.exit("error: alula needs Python 3.11 or newer")
 
 setup(
     name="alula",

@@ -1,8 +1,8 @@
-"""Build the ROS 1 workspace with catkin_make: the packages that have changed since they were last built, and those that need them.
+"""Build a ROS 1 workspace with catkin_make: the packages that have changed since they were last built, and those that need them.
 
-Runs in the ROS 1 world's environment. What was built from what is kept in ``$ALULA_STATE/ros1/built.json``. catkin configures a
-workspace as a whole, and asks each message of it whether it is as it was; so what has not changed is left out, and found in the devel
-space by what needs it. A change of Python or generators builds everything again.
+usage: python build_ros1.py alula|robot, in the ROS 1 world's environment. What was built from what is kept in ``built.json`` of the
+workspace. catkin configures a workspace as a whole, and asks each message of it whether it is as it was; so what has not changed is
+left out, and found in the devel space by what needs it. A change of Python or generators builds everything again.
 """
 
 from __future__ import annotations
@@ -11,15 +11,11 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 
-from workspace import Built, Package, digest, find_packages, state_of
+from workspace import WORKSPACES, Built, Workspace, digest
 
-ROOT = Path(os.environ["ALULA_ROOT"])
-STATE = Path(os.environ["ALULA_STATE"])
-WORKSPACE = STATE / "ros1"
-SOURCES, BUILD, DEVEL, BUILT = (WORKSPACE / name for name in ("src", "build", "devel", "built.json"))
 TOOLS = ("catkin", "genmsg", "genpy", "genaction", "actionlib_msgs")
 # The interpreter of the environment goes into the shebangs of the nodes' relay scripts; newer catkin looks for it under the second name.
 PYTHON = Path(sys.prefix) / "bin" / "python3"
@@ -34,41 +30,43 @@ def toolchain() -> str:
     return digest(sys.version, *CMAKE_ARGUMENTS, LEFT_OUT, *(path.read_bytes() for path in manifests if path.exists()))
 
 
-def link_sources(packages: Mapping[str, Package]) -> None:
+def link_sources(workspace: Workspace) -> None:
     """Have the source space hold links to the packages: catkin_make writes its toplevel file beside them."""
-    shutil.rmtree(SOURCES, ignore_errors=True)
-    SOURCES.mkdir(parents=True)
-    for package in packages.values():
-        (SOURCES / package.folder.name).symlink_to(package.folder.resolve())
+    sources = workspace.folder / "src"
+    shutil.rmtree(sources, ignore_errors=True)
+    sources.mkdir(parents=True)
+    for name, package in workspace.packages.items():
+        (sources / name).symlink_to(package.folder.resolve())
 
 
-def run_catkin(only: Collection[str]) -> int:
+def run_catkin(workspace: Workspace, only: Collection[str]) -> int:
     """Build some packages of a workspace whose others are in the devel space, or all when none are named; return catkin's exit code."""
-    command = ["catkin_make", "-C", str(WORKSPACE), "--source", str(SOURCES), "--force-cmake", f"-j{os.cpu_count()}"]
+    folder = workspace.folder
+    command = ["catkin_make", "-C", str(folder), "--source", str(folder / "src"), "--force-cmake", f"-j{os.cpu_count()}"]
     command += [*CMAKE_ARGUMENTS, f"-DCATKIN_WHITELIST_PACKAGES={';'.join(only)}"]
-    prefix = f"{DEVEL}:/usr" if only else "/usr"
-    return subprocess.run(command, env={**os.environ, "CMAKE_PREFIX_PATH": prefix, "ROS_LANG_DISABLE": LEFT_OUT}, check=False).returncode
+    prefixes = [folder / "devel"] if only else []
+    path = os.pathsep.join(map(str, [*prefixes, *workspace.prefixes]))
+    return subprocess.run(command, env={**os.environ, "CMAKE_PREFIX_PATH": path, "ROS_LANG_DISABLE": LEFT_OUT}, check=False).returncode
 
 
-def build() -> int:
+def build(workspace: Workspace) -> int:
     """Build what has changed; return the exit code."""
-    packages = find_packages([ROOT / "ros1_ws/src"]) | find_packages([STATE / "generated"], "*_interfaces")
-    states = {name: state_of(name, packages) for name in packages}
-    tools, built = toolchain(), Built.read(BUILT)
-    if built is not None and built.tools != tools:
-        for folder in (BUILD, DEVEL):
-            shutil.rmtree(folder, ignore_errors=True)
-    if built is None or not (DEVEL / "setup.sh").exists():
+    states, tools, record = workspace.states(), toolchain(), workspace.folder / "built.json"
+    built = Built.read(record)
+    if built is not None and (built.tools != tools or built.gone(states)):
+        workspace.clear()
+        built = None
+    if built is None or not (workspace.folder / "devel" / "setup.sh").exists():
         built = Built(tools, {})
     changed = built.changed(states)
     sys.stdout.write(f"to build: {' '.join(changed) or 'nothing'}\n")
     sys.stdout.flush()
-    link_sources(packages)
-    code = run_catkin(changed if built.packages else ()) if changed else 0
+    link_sources(workspace)
+    code = run_catkin(workspace, changed if built.packages else ()) if changed else 0
     if code == 0:
-        Built(tools, states).write(BUILT)
+        Built(tools, states).write(record)
     return code
 
 
 if __name__ == "__main__":
-    sys.exit(build())
+    sys.exit(build(WORKSPACES[sys.argv[1]]("1")))

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Says what of Alula is installed, what is missing, and how to mend it. Changes nothing. Exit code 0: all is well, 1: something is missing.
 ALULA_ROOT="$(cd "$(dirname "$(readlink -f "$0")")/.." && pwd)"
-ALULA_STATE="${ALULA_STATE:-$ALULA_ROOT/.alula}"
+. "$ALULA_ROOT/setup/places.sh"
 missing=0
 
 good() { printf '  ok       %-34s %s\n' "$1" "${2:-}"; }
@@ -35,14 +35,22 @@ look() { # WORLD TITLE PYTHON: the last line that the code prints is shown
 echo "ROS 1 world"
 look 1 "rospy" "import rospy, roslaunch, rosbag; print(rospy.__file__)"
 look 1 "Open3D, OpenCV, MAVLink" "import open3d, cv2, pymavlink; print(open3d.__version__, cv2.__version__, pymavlink.__version__)"
-look 1 "message packages (catkin_make)" "import uav_msgs.msg, skillset_interfaces.srv; print('uav_msgs, skillset_interfaces')"
+look 1 "message packages (catkin_make)" "import skillset_interfaces.srv; print('skillset_interfaces')"
 
 echo "ROS 2 world"
 look 2 "rclpy (Jazzy)" "import rclpy, importlib.metadata as m; print(m.version('ros-jazzy-rclpy'))"
-look 2 "message packages (colcon)" "import uav_msgs.msg, skillset_interfaces.srv; print('uav_msgs, skillset_interfaces')"
-look 2 "generated skillsets" "import navigation_managers, perception_managers, mapping_managers; print('navigation, perception, mapping')"
+look 2 "message packages (colcon)" "import skillset_interfaces.srv, tf2_msgs.msg; print('skillset_interfaces, tf2_msgs')"
 look 2 "proofs and language server" "import z3, dd.cudd, pygls; print('z3', z3.get_version_string())"
 look 2 "bridge" "import ros_bridge, rosbags; print('ros_bridge')"
+
+if [ -n "$ALULA_ROBOT" ]; then
+  echo "the robot $ALULA_ROBOT"
+  # Each skillset's generated packages, as they are imported in a run.
+  IMPORTED="import importlib, os, pathlib
+for path in sorted(pathlib.Path(os.environ['ALULA_ROBOT_STATE'], 'generated').glob('*_%s')): importlib.import_module(path.name); print(path.name, end=' ')"
+  look 1 "generated messages (catkin_make)" "${IMPORTED/\%s/interfaces}"
+  look 2 "generated skillsets (colcon)" "${IMPORTED/\%s/managers}"
+fi
 
 [ $missing = 0 ] && echo "all is well" || echo "something is missing, see above"
 exit $missing

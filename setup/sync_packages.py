@@ -4,7 +4,7 @@ usage: python sync_packages.py REQUIREMENTS [--runtime]
 
 ``--runtime`` leaves out the pins below the line ``# Only to build and to test``.
 A package counts as installed when its version is the pinned one and none of its files is missing. What no pin
-names is removed, but for pip, setuptools and the library itself.
+names is removed, but for pip and setuptools. An environment that sees another one by a path file has what is pinned there, too.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
-KEPT = {"pip", "setuptools", "alula"}
+KEPT = {"pip", "setuptools"}
 TOOLS = "# Only to build and to test"
 MARKER = re.compile(r'(?:python_version *(<|>=) *"(\d+)\.(\d+)")?')
 
@@ -53,7 +53,7 @@ def whole(distribution: Distribution) -> bool:
 
 
 def installed() -> dict[str, Distribution]:
-    """Map names to what Python finds first, in this environment and in the system below it."""
+    """Map names to what Python finds first, in this environment and in those below it."""
     found: dict[str, Distribution] = {}
     for distribution in distributions():
         found.setdefault(normalized(distribution.metadata["Name"]), distribution)

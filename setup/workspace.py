@@ -1,5 +1,6 @@
 """What the packages of a ROS workspace are made of, what they need, and what was built of them.
 
+There are two workspaces in each world: Alula's general packages, built once, and on top of them a robot's own.
 Contents decide what is built again, not time stamps: a fresh checkout may take over the state of another.
 """
 
@@ -7,16 +8,26 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+ROOT, STATE = Path(os.environ["ALULA_ROOT"]), Path(os.environ["ALULA_STATE"])
+GENERAL = {
+    "1": ("skillset_interfaces", "skillset_ros1", "resource_reporter"),
+    "2": ("skillset_interfaces", "tf2_msgs", "ros_bridge", "ros_bridge_native", "skillset_ros2", "skill_panel"),
+}
+"""Alula's packages that any robot uses, by world; a robot has them from the installation, also where its folders hold them."""
+PLACES = {"1": ("ros1_ws/src",), "2": ("ros2_ws/src", "bridge")}
 # Of a Python package only this is installed: its modules are found in the sources (setup/env.sh).
 BUILD_FILES = {"CMakeLists.txt", "package.xml", "setup.py", "setup.cfg"}
 BUILD_SUFFIXES = {".msg", ".srv", ".action", ".cpp", ".hpp"}
 SCRIPTS = "scripts"
 CACHE = "__pycache__"
+IGNORED = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 @dataclass(frozen=True)
@@ -54,10 +65,19 @@ def read_package(folder: Path) -> tuple[str, Package]:
     return str(manifest.findtext("name")).strip(), Package(folder, contents, needs)
 
 
-def find_packages(places: Iterable[Path], pattern: str = "*") -> dict[str, Package]:
+def package_folders(place: Path) -> Iterator[Path]:
+    """Yield the packages in a folder and the folders below it, as colcon and catkin look for them."""
+    if (place / "package.xml").is_file():
+        yield place
+    elif place.is_dir() and not any((place / name).exists() for name in IGNORED):
+        for child in sorted(place.iterdir()):
+            if not child.name.startswith("."):
+                yield from package_folders(child)
+
+
+def find_packages(places: Iterable[Path]) -> dict[str, Package]:
     """Return the packages in these folders by name."""
-    manifests = (path for place in places for path in sorted(place.glob(f"{pattern}/package.xml")))
-    return dict(read_package(path.parent) for path in manifests)
+    return dict(read_package(folder) for place in places for folder in package_folders(place))
 
 
 def state_of(name: str, packages: Mapping[str, Package]) -> str:
@@ -66,6 +86,56 @@ def state_of(name: str, packages: Mapping[str, Package]) -> str:
     if not (package.folder / "CMakeLists.txt").exists():
         return package.digest
     return digest(package.digest, *(state_of(needed, packages) for needed in sorted(package.needs & packages.keys())))
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """What is built on what, in one world.
+
+    Attributes:
+        folder: where: ``build``, ``devel`` or ``install``, ``built.json``.
+        packages: what is built there; ``below`` what it is built on.
+        prefixes: where that is found, what counts first first.
+    """
+
+    folder: Path
+    packages: Mapping[str, Package]
+    below: Mapping[str, Package]
+    prefixes: tuple[Path, ...]
+
+    def states(self) -> dict[str, str]:
+        """Return what each package's build depends on, as hashes."""
+        return {name: state_of(name, {**self.below, **self.packages}) for name in self.packages}
+
+    def clear(self) -> None:
+        """Remove what was built: of another toolchain, or with packages that are gone and would still be found."""
+        for name in ("build", "devel", "install", "built.json"):
+            place = self.folder / name
+            shutil.rmtree(place) if place.is_dir() else place.unlink(missing_ok=True)
+
+
+def alulas_workspace(world: str) -> Workspace:
+    """Return the workspace of the general packages."""
+    found = find_packages(ROOT / place for place in PLACES[world])
+    ros = Path("/usr") if world == "1" else STATE / "venv2"
+    return Workspace(STATE / f"ros{world}", {name: found[name] for name in found if name in GENERAL[world]}, {}, (ros,))
+
+
+def robots_workspace(world: str) -> Workspace:
+    """Return the workspace of the robot: its own packages, and those that its models generate; raises RobotError."""
+    from alula.common.robots import load_robot_folder
+
+    robot, state = load_robot_folder(Path(os.environ["ALULA_ROBOT"])), Path(os.environ["ALULA_ROBOT_STATE"])
+    below = alulas_workspace(world)
+    generated = find_packages([state / "generated"])
+    found = find_packages((robot.ros1 if world == "1" else robot.ros2).packages)
+    found |= {name: package for name, package in generated.items() if world == "2" or name.endswith("_interfaces")}
+    own = {name: package for name, package in found.items() if name not in below.packages}
+    prefix = below.folder / ("devel" if world == "1" else "install")
+    return Workspace(state / f"ros{world}", own, below.packages, (prefix, *below.prefixes))
+
+
+WORKSPACES = {"alula": alulas_workspace, "robot": robots_workspace}
 
 
 @dataclass(frozen=True)
@@ -86,6 +156,10 @@ class Built:
     def write(self, path: Path) -> None:
         """Write the record."""
         path.write_text(json.dumps({"tools": self.tools, "packages": self.packages}, indent=1) + "\n", encoding="utf-8")
+
+    def gone(self, states: Mapping[str, str]) -> set[str]:
+        """Return the packages that were built and are there no more."""
+        return self.packages.keys() - states.keys()
 
     def changed(self, states: Mapping[str, str]) -> list[str]:
         """Return the packages that were not built as they are now."""

@@ -1,4 +1,4 @@
-"""What is built again when something has changed, and which robots a model with errors keeps from working."""
+"""What is built again when something has changed, and what a robot whose models have errors can still do."""
 
 from __future__ import annotations
 
@@ -9,9 +9,6 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-
-from alula.common.network import claim_domain
-from alula_testing.cover import cover
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 
@@ -72,22 +69,24 @@ def message_package(folder: Path, message: str, *needs: str) -> None:
 
 
 def test_one_more_message_of_ros_1_configures_and_builds_its_package_and_those_that_need_it_only(tmp_path):
-    sources, state = tmp_path / "ros1_ws/src", tmp_path / "state"
+    sources, state = tmp_path / "ros1_ws/src", tmp_path / ".alula"
+    (tmp_path / "robot.yaml").write_text("name: three\n")
     message_package(sources / "below", "int32 number\n")
     message_package(sources / "above", "below/M below\n", "below")
     message_package(sources / "beside", "int32 number\n")
-    in_state = [f"{ALULA_ROOT}/setup/in_ros1", "env", f"ALULA_ROOT={tmp_path}", f"ALULA_STATE={state}"]
+    in_robot = ["env", f"ALULA_ROBOT={tmp_path}", f"{ALULA_ROOT}/setup/in_ros1"]
     devel = state / "ros1/devel"
 
     def build() -> str:
-        done = subprocess.run([*in_state, "python3", f"{ALULA_ROOT}/setup/build_ros1.py"], capture_output=True, text=True, check=False)
+        command = [*in_robot, "python3", f"{ALULA_ROOT}/setup/build_ros1.py", "robot"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
         return done.stdout.splitlines()[0]
 
     def fields(name: str) -> str:
         ask = f"from {name}.msg import M; print(*M.__slots__, *M()._slot_types)"
         path = f"PYTHONPATH={devel}/lib/python3/dist-packages"
-        return subprocess.run([*in_state, path, "python3", "-c", ask], capture_output=True, text=True, check=True).stdout.strip()
+        return subprocess.run([*in_robot, "env", path, "python3", "-c", ask], capture_output=True, text=True, check=True).stdout.strip()
 
     def configured_ns() -> dict[str, int]:
         return {name: (devel / f"share/{name}/cmake/{name}Config.cmake").stat().st_mtime_ns for name in ("below", "above", "beside")}
@@ -111,23 +110,35 @@ def test_one_more_message_of_ros_1_configures_and_builds_its_package_and_those_t
     assert configured_ns()["beside"] == first["beside"]
 
 
-def test_a_robot_whose_models_have_errors_is_left_out_and_named_and_keeps_no_other_from_working(tmp_path):
-    broken = (
-        "mkdir -p skillsets/broken && echo 'skillset broken { resource door { initial SHUT SHUT -> -> OPEN } }' > skillsets/broken/b.skill"
-    )
-    covered = cover(tmp_path)
-    claim = claim_domain()  # what others fly on this machine is not heard there
-    environment = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "ROS_DOMAIN_ID"}}
+def test_a_robot_whose_models_have_errors_can_be_checked_and_keeps_no_other_from_working(tmp_path):
+    (tmp_path / "skillsets").mkdir()
+    (tmp_path / "robot.yaml").write_text("name: broken\n")
+    (tmp_path / "skillsets/b.skill").write_text("skillset broken { resource door { initial SHUT SHUT -> -> OPEN } }\n")
+    environment = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "ROS_DOMAIN_ID", "ALULA_ROBOT"}}
 
-    def run(command: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([*covered, "sh", "-c", command], capture_output=True, text=True, check=False, env=environment)
+    def alula(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [str(ALULA_ROOT / "alula"), *words]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, env=environment)
 
-    assert run(broken).returncode == 0
-    checked = run("./alula check skillsets/broken/b.skill")
-    assert (checked.returncode, "skillsets/broken/b.skill:1:" in checked.stdout, "^" in checked.stdout) == (1, True, True), checked
-    assert run("./alula check --no-proofs skillsets/uav/mapping.skill").returncode == 0
-    listed = run(f"./alula skills --json --domain {claim.domain}")
-    claim.release()
-    assert "the robot 'broken' is left out" in listed.stderr, listed.stderr
-    assert "no skillset runs" in listed.stderr, listed.stderr
-    assert listed.stdout == ""
+    checked = alula("check")
+    assert (checked.returncode, "skillsets/b.skill:1:" in checked.stdout, "^" in checked.stdout) == (1, True, True), checked
+    refused = alula("mock")
+    assert (refused.returncode, refused.stdout) == (2, ""), refused
+    assert "skillsets/b.skill:1:" in refused.stderr
+    assert alula("setup", "--robot", str(ALULA_ROOT)).returncode == 0
+
+
+def test_robots_packages_are_found_as_colcon_and_catkin_find_them_but_for_alulas(workspace, tmp_path, monkeypatch):
+    (tmp_path / "ros2_ws/src/drivers/below").mkdir(parents=True)
+    package(tmp_path / "ros2_ws/src/drivers/camera", "setup.py")
+    package(tmp_path / "ros2_ws/src/drivers/below/laser", "CMakeLists.txt")
+    package(tmp_path / "ros2_ws/src/skillset_interfaces", "CMakeLists.txt")
+    (tmp_path / "ros2_ws/src/left_out").mkdir()
+    (tmp_path / "ros2_ws/src/left_out/COLCON_IGNORE").touch()
+    package(tmp_path / "ros2_ws/src/left_out/old", "setup.py")
+    (tmp_path / "robot.yaml").write_text("name: nested\n")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    monkeypatch.setenv("ALULA_ROBOT_STATE", str(tmp_path / ".alula"))
+    built = workspace.robots_workspace("2")
+    assert set(built.packages) == {"camera", "laser"}
+    assert set(built.below) == {"skillset_interfaces", "tf2_msgs", "ros_bridge", "ros_bridge_native", "skillset_ros2", "skill_panel"}

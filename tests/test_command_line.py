@@ -40,6 +40,8 @@ def alula(*arguments: str) -> subprocess.CompletedProcess[str]:
         (["panel", "--run", "no/such/run"], "no/such/run"),
         (["console", "--run", "no/such/run"], "no/such/run"),
         (["new", "robot", "Small-Rover"], "Small-Rover"),
+        (["new", "robot", "docs"], "docs"),
+        (["run"], "scenario"),
         (["conform", "no/such/run"], "no/such/run"),
         (["expect", "no/such/run"], "no/such/run"),
         (["compare", "no/such/run", "no/such/run"], "no/such/run"),
@@ -53,6 +55,41 @@ def test_wrong_input_is_exit_code_2_and_names_it(arguments: list[str], named: st
     assert done.returncode == 2
     assert named in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("words", ["run patrol", "fly mapping", "mock", "check", "test", "replay x", "campaign x"])
+def test_where_there_is_no_robot_one_line_says_what_to_do(words: str, tmp_path: Path) -> None:
+    done = outside(tmp_path, *words.split())
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
+    assert "there is no robot.yaml" in done.stderr
+    assert "--robot DIR" in done.stderr
+
+
+def outside(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder where there is no robot."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("ALULA_ROBOT")}
+    return subprocess.run([str(ALULA_ROOT / "alula"), *words], cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_what_needs_no_robot_works_without_one(tmp_path: Path) -> None:
+    model, run = str(ALULA_ROOT / "skillsets/uav/mapping.skill"), str(ALULA_ROOT / "tests/recordings/mapping")
+    models = [word for file in sorted((ALULA_ROOT / "skillsets/uav").glob("*.skill")) for word in ("--model", str(file))]
+    for words in (["help"], ["completion"], ["doctor"], ["check", "--no-proofs", model], ["conform", run, *models]):
+        done = outside(tmp_path, *words)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("words", [["--robot", "{}", "mock", "--starter"], ["mock", "--starter", "--robot={}"]])
+def test_the_robot_is_named_anywhere_on_the_command_line(words: list[str], tmp_path: Path) -> None:
+    done = outside(tmp_path, *(word.format(ALULA_ROOT) for word in words))
+    assert done.returncode == 0, done.stderr
+    assert "navigation.takeoff" in done.stdout
+
+
+def test_a_folder_that_is_no_robot_is_refused_by_name(tmp_path: Path) -> None:
+    done = outside(tmp_path, "check", "--robot", str(tmp_path))
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert str(tmp_path) in done.stderr
 
 
 def test_skillset_with_a_syntax_error_shows_where(tmp_path: Path) -> None:

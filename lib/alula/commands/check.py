@@ -1,4 +1,4 @@
-"""`./alula check FILE...`: read models, say what is wrong with them, and prove the rest.
+"""`alula check [FILE...]`: read models, say what is wrong with them, and prove the rest.
 
 A model without errors is handed to the prover; what that finds is told with the rest, on standard output. With ``--to`` the models
 are printed there instead, and findings go to standard error.
@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 from time import monotonic
 
+from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors, render
 from alula.language.models import ModelFile, check_files, models_in
 from alula.language.notation import Notation
@@ -35,7 +36,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from alula.commands import play  # it takes the counterexamples from here
 
         return play.main(arguments)
-    paths = dict.fromkeys(path for given in options.files for path in models_in(given))
+    try:
+        given = options.files or [str(find_robot().skillsets)]
+    except RobotError as error:
+        sys.stderr.write(f"alula check: no files are named, and {error}\n")
+        return 2
+    paths = dict.fromkeys(path for place in given for path in models_in(place))
     files = check_files(list(paths), sys.stdin.buffer)
     if options.proofs and options.to is None:
         _prove(files, options.time, closed_world=options.closed_world)
@@ -61,9 +67,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="alula check", description=description, epilog=EXIT_CODES)
     parser.add_argument(
         "files",
-        nargs="+",
+        nargs="*",
         metavar="FILE",
-        help=FILES_HELP,
+        help=f"{FILES_HELP} (default: the robot's)",
     )
     parser.add_argument(
         "--json",

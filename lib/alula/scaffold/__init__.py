@@ -1,1 +1,1 @@
-"""Working skeletons to begin with: ``./alula new robot NAME``."""
+"""Working skeletons to begin with: ``alula new robot DIR``."""

@@ -1,17 +1,17 @@
-"""``./alula new robot NAME``: put a working skeleton of a robot into the checkout.
+"""``alula new robot DIR``: make a robot, a working repository in a folder of its own.
 
-Ends with 0 when it was written, 2 when the name can't be used or something of that name is there already; then nothing was
-written.
+Ends with 0 when it was written, 2 when the folder's name can't be used or something is in it already; then nothing was written.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import keyword
 import re
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 TEMPLATES = Path(__file__).parent / "robot"
@@ -28,7 +28,7 @@ def camel(name: str) -> str:
 
 
 def files_of(name: str, templates: Path = TEMPLATES) -> dict[str, str]:
-    """Return the skeleton's files: text by path relative to the checkout. ``@name@`` and ``@Name@`` in names and texts are filled in."""
+    """Return the skeleton's files: text by path relative to its folder. ``@name@`` and ``@Name@`` in names and texts are filled in."""
     files = {}
     for template in sorted(templates.rglob("*.in")):
         path = template.relative_to(templates).as_posix().removesuffix(".in")
@@ -36,58 +36,57 @@ def files_of(name: str, templates: Path = TEMPLATES) -> dict[str, str]:
     return files
 
 
-def check(name: str, root: Path, files: Mapping[str, str]) -> None:
+def check(folder: Path) -> None:
     """See that the skeleton can be written.
 
     Raises:
-        ScaffoldError: the name is no name of a ROS package, or something is in the way.
+        ScaffoldError: the folder's name is no name of a ROS package, or something is in the way.
     """
+    name = folder.name
     if not NAME.fullmatch(name) or "__" in name or keyword.iskeyword(name):
         raise ScaffoldError(f"'{name}' can't name ROS packages; use lower-case letters, digits and single underscores, as small_rover")
-    model = f"skillset {name} "
-    for other in sorted((root / "skillsets").glob("*/*.*")):
-        if other.suffix in {".skill", ".rl"} and model in other.read_text(encoding="utf-8"):
-            raise ScaffoldError(f"{other.relative_to(root)} has a skillset {name} already; skillsets of all robots need different names")
-    for place in sorted({"/".join(path.split("/")[: 2 if path.startswith("skillsets/") else 3]) for path in files}):
-        if (root / place).exists():
-            raise ScaffoldError(f"{place} is there already; choose another name, or remove it first")
+    if folder.exists() and (not folder.is_dir() or any(path.name != ".git" for path in folder.iterdir())):
+        raise ScaffoldError(f"{folder} is there already; choose another folder, or remove it first")
 
 
-def tidy(root: Path, paths: Sequence[str]) -> None:
-    """Sort imports and fold lines: both depend on the name."""
-    for command in (["check", "--quiet", "--select", "I", "--fix"], ["format", "--quiet"]):
-        subprocess.run([sys.executable, "-m", "ruff", *command, *paths], cwd=root, check=True)
+def write(folder: Path, files: dict[str, str]) -> None:
+    """Write the files; sort imports and fold lines, for both depend on the name."""
+    for path, text in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+    if importlib.util.find_spec("ruff") is not None:  # an installation that builds nothing goes without
+        for command in (["check", "--quiet", "--select", "I", "--fix"], ["format", "--quiet"]):
+            subprocess.run([sys.executable, "-m", "ruff", *command, "."], cwd=folder, check=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make what the command line asks for; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula new", description="Make a working skeleton to begin with.")
+    parser = argparse.ArgumentParser(prog="alula new", description="Make a robot, a working repository to begin with.")
     parser.add_argument("what", choices=["robot"], help="what to make")
-    parser.add_argument("name", metavar="NAME", help="of the robot: lower-case letters, digits, underscores")
-    parser.add_argument("--root", type=Path, required=True, help=argparse.SUPPRESS)
+    parser.add_argument("folder", metavar="DIR", type=Path, help="a new folder, whose name is the robot's: a-z, 0-9, _")
+    parser.add_argument("--git", action="store_true", help="make it a repository of git")
     options = parser.parse_args(arguments)
-    files = files_of(options.name)
+    folder = options.folder.expanduser().absolute()
+    files = files_of(folder.name)
     try:
-        check(options.name, options.root, files)
+        check(folder)
+        write(folder, files)
     except ScaffoldError as error:
         sys.stderr.write(f"alula new: {error}\n")
         return 2
-    try:
-        for path, text in files.items():
-            target = options.root / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_text(text, encoding="utf-8")
-        tidy(options.root, [path for path in files if path.endswith(".py")])
     except OSError as error:
         sys.stderr.write(f"alula new: {error.filename}: can't be written: {error.strerror}\n")
         return 2
+    if options.git and subprocess.run(["git", "init", "--quiet", str(folder)], check=False).returncode:
+        return 2
     sys.stdout.write("".join(f"{path}\n" for path in files))
-    sys.stdout.write(f"\nNext: ./alula test ros2_ws/src/{options.name}_robot, and read ros2_ws/src/{options.name}_robot/README.md\n")
+    sys.stdout.write(f"\nNext: cd {options.folder} && alula test, and read README.md there\n")
     return 0
 
 
 def _filled(text: str, name: str) -> str:
-    return text.replace("@name@", name).replace("@Name@", camel(name))
+    return text.replace("@name@", name).replace("@Name@", camel(name)).replace("@dot@", ".")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, LanguageError
@@ -24,9 +25,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("robots", nargs="+", metavar="FOLDER", type=Path, help="a robot: *.skill, types.yaml, bindings.yaml")
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder to put packages and configurations into")
     parser.add_argument("--prune", action="store_true", help="remove whatever else is in DIR: what is left of models that are gone")
+    parser.add_argument("--name", help="what the robot is called (default: as its folder); for one robot")
     options = parser.parse_args(arguments)
+    if options.name and len(options.robots) > 1:
+        parser.error("--name: several robots can't have one name")
     try:
-        files = _all_files(options.robots)
+        files = _all_files(options.robots, options.name)
         changed = write_files(files, options.out)
         if options.prune:
             prune(files, options.out)
@@ -41,13 +45,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _all_files(folders: Sequence[Path]) -> dict[str, str]:
+def _all_files(folders: Sequence[Path], name: str | None) -> dict[str, str]:
     """Return the files of all robots; raise LanguageError with the findings of all."""
     findings: list[Diagnostic] = []
     files: dict[str, str] = {}
     for folder in folders:
         try:
-            made = robot_files(load_robot(folder))
+            robot = load_robot(folder)
+            made = robot_files(replace(robot, name=name) if name else robot)
         except LanguageError as error:
             findings += error.diagnostics
             continue

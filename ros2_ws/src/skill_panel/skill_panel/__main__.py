@@ -103,7 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     watcher = Watcher(domain=place.domain, namespace=options.namespace, names=options.skillsets)
     try:
-        memory = Memory(Path(os.environ["ALULA_STATE"]) / "panel.json" if "ALULA_STATE" in os.environ else None)
+        state = os.environ.get("ALULA_ROBOT_STATE", "")
+        memory = Memory(Path(state) / "panel.json" if state else None)
         Panel(watcher, where=place.title, others=others_than(place), memory=memory).run()
     finally:
         watcher.close()

@@ -1,4 +1,4 @@
-"""Mocked skillsets as real ROS 2 nodes: ``python -m skillset_ros2.mock ROBOT_FOLDER [--behaviour FILE] ... [--ros-args ...]``.
+"""Mocked skillsets as real ROS 2 nodes: ``python -m skillset_ros2.mock [FOLDER] [--behaviour FILE] ... [--ros-args ...]``.
 
 The interface is that of the real ones, so missions, clients and tools can't tell; the time is the system's, or ``/clock`` with
 ``-p use_sim_time:=true``. Ends with 0 after SIGINT or SIGTERM, with 2 when it was asked for something that can't be.
@@ -22,7 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from alula.common.faults import FaultError, FaultRequest, parse_fault
-from alula.common.robots import BEHAVIOUR
+from alula.common.robots import BEHAVIOUR, RobotError, find_robot
 from alula.language.errors import LanguageError
 from alula.language.load import load_robot
 from alula.language.robot import Robot
@@ -94,7 +94,8 @@ def parse(words: Sequence[str], *, program: str, folder: bool) -> argparse.Names
     """Read the command line without its ROS arguments."""
     parser = argparse.ArgumentParser(prog=program, description="Serve skillsets by mocks: the same interface, scripted behaviour.")
     if folder:
-        parser.add_argument("robot", type=Path, help=f"a robot's folder: models, bindings, and {BEHAVIOUR} if there is one")
+        models = f"a folder of models, bindings, and {BEHAVIOUR} if there is one (default: the robot's)"
+        parser.add_argument("robot", type=Path, nargs="?", help=models)
         parser.add_argument("--skillset", action="append", default=[], metavar="NAME", help="only this one of the robot's (several)")
     parser.add_argument("--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what they do, on top of the robot's")
     parser.add_argument("--fail", action="append", default=[], metavar="WHAT[:HOW][@SECONDS[-SECONDS]]", help="a fault of the behaviour")
@@ -131,7 +132,7 @@ def _interfaces(skillset: Skillset) -> ModuleType:
     except ModuleNotFoundError as error:
         raise MockRequestError(
             f"{error.name} is not built, and without it no client can call {skillset.name};"
-            " put the robot's folder into skillsets/ and run ./alula setup"
+            " run `alula setup` in the folder of the robot that it belongs to"
         ) from None
 
 
@@ -158,14 +159,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = ros2_arguments(sys.argv if arguments is None else arguments)
     options = parse(remove_ros_args(words)[1:], program="alula mock", folder=True)
     try:
-        robot = load_robot(options.robot)
+        folder = options.robot or find_robot().skillsets
+        robot = load_robot(folder)
         if options.starter:
             sys.stdout.write(starter(robot.skillsets))
             return 0
-        shipped = options.robot / BEHAVIOUR
+        shipped = folder / BEHAVIOUR
         cast = make_cast(robot, options.skillset)
         return run(cast, [shipped] if shipped.exists() else [], robot.skillsets, options, words)
-    except (LanguageError, SkillRuntimeError) as error:
+    except (LanguageError, RobotError, SkillRuntimeError) as error:
         sys.stderr.write(f"{error}\n")
         return CANNOT_START
 

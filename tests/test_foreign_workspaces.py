@@ -1,0 +1,124 @@
+"""Alula's packages in workspaces of others: built by plain colcon and catkin_make, with nothing of set-up; and what their manifests say."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+ALULA_ROOT = Path(__file__).resolve().parents[1]
+STATE = Path(os.environ["ALULA_STATE"])
+VENV2 = STATE / "venv2"
+INTERFACES, LIBRARY = ALULA_ROOT / "bridge/interfaces/skillset_interfaces", ALULA_ROOT / "lib"
+GENERAL = {
+    "lib": "alula",
+    "ros1_ws/src/skillset_ros1": "src/skillset_ros1",
+    "ros1_ws/src/resource_reporter": "src/resource_reporter",
+    "ros2_ws/src/skillset_ros2": "skillset_ros2",
+    "ros2_ws/src/skill_panel": "skill_panel",
+    "bridge/ros_bridge": "ros_bridge",
+}
+"""Manifest's folder: the folder of modules in it."""
+DISTRIBUTIONS = {
+    "yaml": "python3-yaml",
+    "py_trees": "python3-py-trees-pip",
+    "pydot": "python3-pydot",
+    "mcap": "python3-mcap-pip",
+    "rosbags": "python3-rosbags-pip",
+    "textual": "python3-textual-pip",
+}
+"""Packages by module, as rosdep calls them; others are called as the module, with `python3-` before it unless they are of ROS."""
+OF_PYPI = {"yaml": "PyYAML", "z3": "z3-solver", "py_trees": "py-trees", "lsprotocol": "pygls"}
+ROS = re.compile(r"rclpy|rospy|roslib|rosgraph|genpy|actionlib|alula|skillset_ros2|skillset_interfaces|\w+_msgs|\w+_srvs|\w+_interfaces")
+
+
+def copy(workspace: Path, *packages: Path) -> Path:
+    """Return a workspace with copies of packages, as somebody clones them."""
+    for package in packages:
+        shutil.copytree(package, workspace / "src" / package.name, ignore=shutil.ignore_patterns("test", "__pycache__", "*.egg-info"))
+    return workspace
+
+
+def build(workspace: Path, environment: dict[str, str], *command: str) -> None:
+    plain = {"PATH": "/usr/local/bin:/usr/bin:/bin", "HOME": str(workspace), **environment}
+    done = subprocess.run(command, cwd=workspace, env=plain, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-3000:]
+
+
+def where(path: Path, python: str, *modules: str) -> set[str]:
+    """Return the first folders below a path that modules are imported from."""
+    ask = f"import importlib\nfor name in {modules!r}: print(importlib.import_module(name).__file__)"
+    environment = {"PYTHONPATH": str(path), "PATH": os.environ["PATH"], "LD_LIBRARY_PATH": os.environ.get("LD_LIBRARY_PATH", "")}
+    done = subprocess.run([python, "-c", ask], env=environment, capture_output=True, text=True, check=True)
+    return {Path(line).relative_to(path).parts[0] for line in done.stdout.split()}
+
+
+@pytest.mark.timeout(0)  # compiles messages in every language that ROS 2 has: as long as the machine needs
+def test_the_general_packages_of_ros_2_are_built_by_plain_colcon(tmp_path: Path) -> None:
+    workspace = copy(tmp_path, INTERFACES, LIBRARY, ALULA_ROOT / "ros2_ws/src/skillset_ros2")
+    ros = {"PATH": f"{VENV2}/bin:/usr/bin:/bin", "ROS_VERSION": "2", "ROS_DISTRO": "jazzy"}
+    prefix = {"AMENT_PREFIX_PATH": str(VENV2), "CMAKE_PREFIX_PATH": str(VENV2)}
+    build(workspace, {**ros, **prefix}, "colcon", "build", "--merge-install")
+    site = workspace / f"install/lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
+    names = ("alula.runtime.middleware", "skillset_ros2", "skillset_interfaces.srv")
+    assert where(site, str(VENV2 / "bin/python"), *names) == {"alula", "skillset_ros2", "skillset_interfaces"}
+
+
+@pytest.mark.timeout(0)
+def test_the_general_packages_of_ros_1_are_built_by_plain_catkin_make(tmp_path: Path) -> None:
+    general = [ALULA_ROOT / "ros1_ws/src" / name for name in ("skillset_ros1", "resource_reporter")]
+    workspace = copy(tmp_path, INTERFACES, LIBRARY, *general)
+    build(workspace, {"CMAKE_PREFIX_PATH": "/usr", "ROS_VERSION": "1"}, "catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3")
+    site = workspace / "devel/lib/python3/dist-packages"
+    names = ("alula.common.robots", "resource_reporter", "skillset_interfaces.srv")
+    assert where(site, "/usr/bin/python3", *names) >= {"alula", "resource_reporter", "skillset_interfaces"}
+
+
+def imports(folder: Path) -> set[str]:
+    """Return what the modules of a folder import, at the top or late, but for Python's own and templates."""
+    found = set()
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                found.add((node.module or "").partition(".")[0])
+    return found - sys.stdlib_module_names - {folder.name}
+
+
+def depends(manifest: Path) -> set[str]:
+    """Return what a package needs to run, by its manifest."""
+    root = ET.parse(manifest).getroot()  # noqa: S314 - our own
+    return {str(element.text) for element in root if element.tag in {"depend", "exec_depend"}}
+
+
+def called(module: str) -> str:
+    return module if ROS.fullmatch(module) else DISTRIBUTIONS.get(module, f"python3-{module}")
+
+
+def dependencies(*, extra: bool) -> set[str]:
+    project = tomllib.loads((LIBRARY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    optional = [name for names in project["optional-dependencies"].values() for name in names if not name.startswith("alula")]
+    return set(optional if extra else project["dependencies"])
+
+
+@pytest.mark.parametrize("package", GENERAL)
+def test_a_manifest_names_what_the_package_imports_and_no_more(package: str) -> None:
+    folder = ALULA_ROOT / package
+    # What only some of the library's commands import is an extra of pip, which no manifest of ROS knows.
+    extras = dependencies(extra=True) if package == "lib" else set()
+    needed = {called(module) for module in imports(folder / GENERAL[package]) if OF_PYPI.get(module, module) not in extras}
+    assert depends(folder / "package.xml") == needed
+
+
+def test_the_librarys_distribution_names_what_it_imports_and_no_more() -> None:
+    imported = {OF_PYPI.get(module, module) for module in imports(LIBRARY / "alula")}
+    assert imported == dependencies(extra=False) | dependencies(extra=True)
