@@ -4,7 +4,7 @@ import sys
 
 from setuptools import find_packages, setup
 
-if sys.version_info < (3, 11):  # as `requires-python` colcon could not read it: it wants literals only
+if sys.version_info < (3, 11):  # noqa: UP036 - as `requires-python` colcon could not read it: it wants literals only
     sys.exit("error: alula needs Python 3.11 or newer")
 
 setup(

@@ -143,6 +143,8 @@ def test_each_story_of_the_proofs_comes_to_its_end_in_managers_over_a_ros(world,
 
 TAKEOFF = {"height": 3, "speed": 1}
 STRAIGHT = {"target": [1, 2.5, 3], "speed": 1}
+EXECUTION_FIELDS = 10
+"""Of an event of an execution in a trace; those of transitions have less."""
 READY = (
     Step("transition", resource="SDK_authority", state="AVAILABLE"),
     Step("transition", resource="homepoint_status", state="VALID"),
@@ -151,7 +153,12 @@ FLYING = (*READY, Step("transition", resource="flight_status", state="IN_AIR"))
 
 
 def states(trace: dict[str, Any], label: str) -> list[str]:
-    return [event[3] for event in trace["events"] if len(event) == 8 and event[2] == label]
+    return [event[3] for event in trace["events"] if len(event) == EXECUTION_FIELDS and event[2] == label]
+
+
+def ends_told(trace: dict[str, Any]) -> dict[str, tuple[str, list[dict[str, Any]]]]:
+    """Return of each execution that has ended the kind of its result and what was unmet, as its last event tells."""
+    return {event[2]: tuple(event[8:]) for event in trace["events"] if len(event) == EXECUTION_FIELDS}
 
 
 def test_refusals_with_their_reasons_to_the_caller(players):
@@ -179,6 +186,14 @@ def test_refusals_with_their_reasons_to_the_caller(players):
         "other": ["NOT_READY", "not_moving"],
     }
     assert trace["ends"]["high"][2] == "too high"
+    refused = {label: (kind, [(one["name"], one["states"]) for one in unmet]) for label, (kind, unmet) in ends_told(trace).items()}
+    assert refused == {
+        "early": ("", [("sdk_authority", {"SDK_authority": "UNAVAILABLE"})]),
+        "high": ("", []),
+        "first": ("success", []),
+        "second": ("", [("not_moving", {"axes_authority": "USED"})]),
+        "other": ("", [("not_moving", {"axes_authority": "USED"})]),
+    }
     assert trace["hooks"] == {"early": [], "high": [], "first": ["on_dispatch"], "second": [], "other": []}
     resources, last = trace["replies"][2]
     assert resources["axes_authority"] == "USED"
@@ -212,6 +227,8 @@ def test_ends_of_every_kind(players):
             Step("start", "wrong", "hover", {"duration": 1}),
             Step("finish", "wrong", result="NONSENSE"),
             Step("interrupt", "arrives"),
+            Step("start", "blocked", "goto", STRAIGHT),
+            Step("finish", "blocked", result="BLOCKED"),
         ),
         {"goto_straight": (Behaviour(ends="ARRIVED", message="there"),)},
     )
@@ -221,7 +238,19 @@ def test_ends_of_every_kind(players):
         "stopped": "INTERRUPTED",
         "violated": "RESOURCE_INVARIANT_VIOLATED",
         "wrong": "FAILED",
+        "blocked": "TERMINATED",
     }
+    told = ends_told(trace)
+    kinds = {label: kind for label, (kind, _) in told.items()}
+    assert kinds == {"arrives": "success", "stopped": "", "violated": "", "wrong": "", "blocked": "failure"}
+    unmet = {
+        "name": "keep_sdk_authority",
+        "condition": "SDK_authority == AVAILABLE",
+        "states": {"SDK_authority": "UNAVAILABLE"},
+        "data": {},
+    }
+    assert told["violated"][1] == [unmet | {"reason": "keep_sdk_authority: SDK_authority is UNAVAILABLE"}]
+    assert trace["ends"]["violated"][2].startswith(told["violated"][1][0]["reason"])
     assert states(trace, "arrives") == ["REQUESTED", "RUNNING", "TERMINATED"]
     assert trace["ends"]["arrives"][1:3] == ["ARRIVED", "there"]
     assert trace["hooks"]["violated"] == ["on_dispatch", "on_violation"]

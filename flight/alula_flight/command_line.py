@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import uuid
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from radio_link.kernel import KernelError
-from radio_link.kernel import check as check_kernel
-
 from alula.common.network import free_port
 from alula.common.scenarios import Scenario, scenario_names
-from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_sensors, read_world
+from alula_flight.autopilot import check_body_port, check_connection, read_sensors
+from alula_flight.spec import RequestError, RunSpec, read_faults, read_imperfections, read_scenario, read_world
 from uav_simulator.sensors.faults import FAULTS
 from uav_simulator.world.config import world_names
 
@@ -36,7 +35,7 @@ class Arguments(argparse.Namespace):
     console: bool
     record: str
     monitor: bool
-    netem: bool
+    physics_port: int | None
     behaviour: list[Path]
 
 
@@ -59,6 +58,12 @@ def _parser() -> argparse.ArgumentParser:
         "followed:URL: they are where the autopilot says over a second MAVLink connection",
     )
     parser.add_argument(
+        "--physics-port",
+        type=int,
+        metavar="PORT",
+        help="with --sensors simulated: the UDP port where ArduPilot looks for the body (default: 9002 + 10 x its instance)",
+    )
+    parser.add_argument(
         "--imperfections",
         default="off",
         metavar="off|realistic|NAME=VALUE,...",
@@ -72,9 +77,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--record", choices=["functional", "sensors"], default="functional", help="sensors: functional.bag also holds raw measurements"
     )
-    parser.add_argument(
-        "--netem", action="store_true", help="let the kernel be the radio: namespaces, tbf and netem, as root, in real time"
-    )
     parser.add_argument("--monitor", action="store_true", help="hold every event of the skillsets against the models, while it flies")
     return parser
 
@@ -87,9 +89,8 @@ def parse(arguments: list[str]) -> RunSpec:
         raise RequestError(f"--seed {given.seed}: must lie between 0 and {2**31 - 1}")
     if given.rate is not None and not 0 <= given.rate <= 1000:  # also refuses nan
         raise RequestError(f"--rate {given.rate:g}: must be 0 (no limit) or a positive factor up to 1000")
-    check_autopilot(given)
+    check_autopilot(given, scenario)
     check_mock(given)
-    check_netem(given, scenario)
     return RunSpec(
         scenario=given.scenario,
         out_dir=str(run_folder(given.out, given.scenario)),
@@ -100,7 +101,7 @@ def parse(arguments: list[str]) -> RunSpec:
         world=read_world(given.world or scenario.world),
         autopilot=given.autopilot,
         sensors=read_sensors(given.sensors or ""),
-        imperfections=read_imperfections(given.imperfections),
+        body_port=0 if given.physics_port is None else check_body_port(given.physics_port, f"--physics-port {given.physics_port}"),
         master_port=0 if given.mock else free_port(),
         mavlink_port=0 if given.mock else free_port(),
         domain=0,
@@ -108,21 +109,37 @@ def parse(arguments: list[str]) -> RunSpec:
         console=given.console,
         record=given.record,
         monitor=given.monitor,
-        netem=given.netem,
         behaviour=tuple(str(path.expanduser().absolute()) for path in given.behaviour),
+        launch={"imperfections": read_imperfections(given.imperfections)},
     )
 
 
-def check_autopilot(given: Arguments) -> None:
+def check_autopilot(given: Arguments, scenario: Scenario) -> None:
     """Refuse what does not go together with another autopilot, or without one."""
     if given.sensors is not None and given.autopilot is None:
         raise RequestError("--sensors says what a real autopilot has for sensors; add --autopilot URL")
-    if given.autopilot is None or given.sensors is not None:
+    if given.physics_port is not None and given.sensors != "simulated":
+        raise RequestError("--physics-port is where ArduPilot looks for the simulated body; add --autopilot URL --sensors simulated")
+    if given.autopilot is None:
+        return
+    check_connection(given.autopilot)
+    if given.sensors is not None:
+        check_ground_link(given.fail, scenario)
         return
     if given.fail:
         raise RequestError("--fail breaks simulated sensors; with --autopilot there are none, unless --sensors simulated is added")
     if given.imperfections != "off":
         raise RequestError("--imperfections are those of simulated sensors; with --autopilot there are none")
+
+
+def check_ground_link(faults: Sequence[str], scenario: Scenario) -> None:
+    """Refuse to break what only the simulated autopilot is connected to."""
+    broken = [what for what in scenario.ground_link if any(text.partition("@")[0].partition(":")[0] == what for text in faults)]
+    if broken:
+        raise RequestError(
+            f"--fail {broken[0]}: is of the ground's link to the autopilot, which only the simulated one is connected to; "
+            "leave it out, or --autopilot"
+        )
 
 
 def check_mock(given: Arguments) -> None:
@@ -137,20 +154,6 @@ def check_mock(given: Arguments) -> None:
         raise RequestError("--console: a flight over mocks is over in a moment; look at its report.html")
     if given.mock and given.rate is not None:
         raise RequestError("--mock flies in virtual time, which no --rate limits; leave it out")
-
-
-def check_netem(given: Arguments, scenario: Scenario) -> None:
-    """Refuse a kernel's radio where there is no radio, where time is not the wall's, and where the kernel can't."""
-    if not given.netem:
-        return
-    if "radio" not in dict(scenario.faults):
-        raise RequestError(f"--netem: the scenario {given.scenario} has no radio; leave it out")
-    if given.mock or given.rate not in {None, 1.0}:
-        raise RequestError(f"--netem shapes in real time: leave out {'--mock' if given.mock else f'--rate {given.rate:g}'}")
-    try:
-        check_kernel()
-    except KernelError as error:
-        raise RequestError(f"--netem: {error}") from None
 
 
 def run_folder(wanted: Path | None, scenario: str) -> Path:

@@ -16,13 +16,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
-from radio_link.kernel import remove as remove_namespaces
-from radio_link.netem import Radio
 
-from alula.common.network import DomainClaim, NoFreeDomainError, claim_domain
+from alula.common.network import DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain, udp_ports_of
 from alula.common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
 from alula.common.scenarios import load_scenario
 from alula.common.shared_memory import sweep_shared_memory
@@ -30,7 +29,9 @@ from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
 from alula.records.models import models_of
 from alula.report.deaths import Death
+from alula.report.ends import FRONT, Ended, ended_by_signal, note_end
 from alula.report.live import LiveEvents
+from alula_flight.autopilot import body_port, command_of_ardupilot, read_connection
 from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
 from alula_flight.deaths import DeathRecord, describe_exit
@@ -42,6 +43,7 @@ PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
 PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
 MISSION_NODE = "mission"
+RADIO_PORT, RADIO_PORTS = 20_000, 10
 SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
 
 
@@ -104,12 +106,11 @@ class Front:
             end_run(self._spec.run_id, patience_s=0.0 if self._interrupts.at_once else PATIENCE_S)
             supervisor.wait()
             sweep_shared_memory()
-            if self._spec.netem:
-                remove_namespaces(Radio(self._spec.radio_port))
         return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
 
     def _land(self) -> None:
         self._say(STOPPING)
+        note_end(Path(self._spec.out_dir), ended_by_signal(self._interrupts.first))
         if self._supervisor is not None and self._supervisor.poll() is None:
             self._supervisor.send_signal(signal.SIGINT)
 
@@ -117,6 +118,7 @@ class Front:
         """Let the mission land the vehicle; it lives in a session of its own and knows nothing of its parents."""
         record = DeathRecord(Path(self._spec.out_dir) / "deaths.jsonl")
         record.add(Death("supervisor", describe_exit(code), None))
+        note_end(Path(self._spec.out_dir), Ended(FRONT, "the supervisor died"))
         self._say("the supervisor died; the mission lands the vehicle")
         missions = [process for process in processes_of_run(self._spec.run_id) if node_name(process) == MISSION_NODE]
         for mission in missions:
@@ -135,10 +137,10 @@ def main(arguments: list[str]) -> int:
         if request.mock:
             return fly_mocked(request)
         claim = claim_domain()
-    except (RequestError, NoFreeDomainError) as error:
+        spec = with_ports(request, claim.domain)
+    except (RequestError, NoFreeDomainError, NoFreePortError) as error:
         sys.stderr.write(f"alula fly: {error}\n")
         return CANNOT_START
-    spec = RunSpec(**{**request.__dict__, "domain": claim.domain})
     out = Path(spec.out_dir)
     try:
         (out / "logs").mkdir(parents=True)
@@ -148,6 +150,9 @@ def main(arguments: list[str]) -> int:
     spec_path = out / "run.json"
     spec.save(spec_path)
     say = announce(spec)
+    if spec.body_port:
+        command = command_of_ardupilot(read_connection(spec.autopilot or ""), spec.body_port)
+        say(f"ArduPilot, where it does not run yet, is started with: {command}")
     if spec.record == "sensors":
         say(sensors_words(out))
     monitor = monitor_of(spec)
@@ -155,6 +160,15 @@ def main(arguments: list[str]) -> int:
         code = Front(spec, claim, say, monitor).fly(spec_path)
         say("making the report")
         return finish(spec, code, monitor)
+
+
+def with_ports(request: RunSpec, domain: int) -> RunSpec:
+    """Return the run with its domain, and the UDP ports that only it takes; raises RequestError, NoFreePortError."""
+    port = request.body_port
+    if request.sensors == "simulated" and request.autopilot is not None and not port:
+        port = body_port(read_connection(request.autopilot), domain)
+    radio_port = udp_ports_of(domain, first=RADIO_PORT, step=RADIO_PORTS, count=RADIO_PORTS)
+    return replace(request, domain=domain, body_port=port, radio_port=radio_port)
 
 
 def monitor_of(spec: RunSpec) -> Monitor | None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from alula.common.signals import Interrupts
 from alula.records.conformance import Monitor
+from alula.report.ends import ended_by_signal, note_end
 from alula.report.live import LiveEvents
 from alula_flight.ending import CANNOT_START, GIVEN_UP
 from alula_flight.spec import RunSpec
@@ -63,6 +64,7 @@ class MockFront:
     def _land(self) -> None:
         if self._flight is not None and self._flight.poll() is None:
             self._say(STOPPING)
+            note_end(Path(self._spec.out_dir), ended_by_signal(self._interrupts.first))
             self._flight.send_signal(signal.SIGINT)
 
     def _kill(self) -> None:

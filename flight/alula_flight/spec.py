@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 from alula.common.faults import FaultError, parse_fault
@@ -15,9 +15,6 @@ from uav_simulator.errors import ConfigError
 from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.settings import FOLLOWED
 from uav_simulator.world.config import find_world, load_world
-
-RADIO_PORT, RADIO_PORTS = 42000, 10
-"""The UDP ports of a run's radio: from the first on, so many for each DDS domain, so that runs don't meet."""
 
 
 class RequestError(Exception):
@@ -49,13 +46,6 @@ def read_imperfections(text: str) -> str:
     return text
 
 
-def read_sensors(text: str) -> str:
-    """Check where a real autopilot's sensors come from, and return it."""
-    if text in {"", "simulated"} or text.removeprefix(FOLLOWED) not in {"", text}:
-        return text
-    raise RequestError(f"--sensors {text}: simulated, or {FOLLOWED}URL with a MAVLink connection as {FOLLOWED}udpin:127.0.0.1:14551")
-
-
 def read_world(text: str) -> str:
     """Check a world, given by name or file, and return its file."""
     try:
@@ -73,12 +63,13 @@ class RunSpec:
     ``world`` is a world file; ``autopilot`` is None for the simulated vehicle; ``rate`` is simulated seconds per second at
     most, 0 unlimited. ``sensors``: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors,
     "followed:URL" where it has the sensors only, which are where the autopilot says over this connection, "" where real drivers run.
-    ``imperfections`` of the simulated autopilot and sensors.
+    ``body_port``: UDP port where ArduPilot's simulator looks for the body, with sensors "simulated"; ``radio_port``: the first of the
+    radio's ten. Both 0 until the run's domain is known.
     ``record``: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
     ``console``: whether the operator's page is served beside the flight.
     ``monitor``: every event is held against the models.
-    ``netem``: the kernel is the radio.
     ``mock``: over mocks in one process; then ``behaviour`` are files on top of the drone's own, and ports and domain are 0.
+    ``launch``: arguments of the launch files that nothing here reads; in the file they stand beside the others.
     """
 
     scenario: str
@@ -93,13 +84,14 @@ class RunSpec:
     mavlink_port: int
     domain: int
     sensors: str = ""
-    imperfections: str = "off"
+    body_port: int = 0
+    radio_port: int = 0
     mock: bool = False
     record: str = "functional"
     monitor: bool = False
     behaviour: tuple[str, ...] = ()
     console: bool = False
-    netem: bool = False
+    launch: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def simulated(self) -> bool:
@@ -108,18 +100,16 @@ class RunSpec:
 
     def save(self, path: Path) -> None:
         """Write the specification beside the results."""
-        write_json(path, asdict(self))
+        values = asdict(self)
+        launch = values.pop("launch")
+        write_json(path, {**values, **launch})
 
     @classmethod
     def load(cls, path: Path) -> RunSpec:
         """Read what `save` wrote."""
         values = json.loads(path.read_text(encoding="utf-8"))
-        return cls(**{**values, "faults": tuple(values["faults"]), "behaviour": tuple(values.get("behaviour", ()))})
-
-    @property
-    def radio_port(self) -> int:
-        """Return the first of the radio's UDP ports."""
-        return RADIO_PORT + RADIO_PORTS * self.domain
+        launch = {name: values.pop(name) for name in set(values) - {one.name for one in fields(cls)}}
+        return cls(**{**values, "faults": tuple(values["faults"]), "behaviour": tuple(values["behaviour"]), "launch": launch})
 
     @property
     def process_faults(self) -> list[ProcessFault]:
@@ -141,15 +131,12 @@ class RunSpec:
             f"faults:={','.join(fault for fault in self.faults if fault not in others)}",
             f"world:={self.world}",
             f"mavlink_port:={self.mavlink_port}",
+            f"record:={self.record}",
+            f"radio_port:={self.radio_port}",
+            f"radio_faults:={','.join(radio)}",
+            f"ardupilot_port:={self.body_port}",
+            *(f"{name}:={value}" for name, value in self.launch.items()),
         ]
-        if self.record != "functional":
-            arguments.append(f"record:={self.record}")
-        if self.imperfections != "off":
-            arguments.append(f"imperfections:={self.imperfections}")
-        if scenario.faults:
-            arguments += [f"radio_faults:={','.join(radio)}", f"radio_port:={self.radio_port}"]
-        if self.netem:
-            arguments.append("netem:=true")
         if self.autopilot is not None:
             vehicle = {"": "simulate:=false", "simulated": "vehicle:=ardupilot"}.get(self.sensors, f"vehicle:={self.sensors}")
             arguments += [vehicle, f"autopilot:={self.autopilot}"]

@@ -22,18 +22,19 @@ from alula.common.processes import end_run
 from alula.common.scenarios import load_scenario
 from alula.common.signals import on_end_signal
 from alula.report.deaths import Death
+from alula.report.ends import SIGNAL, SUPERVISOR, Ended, note_end
 from alula_flight.album import Album
 from alula_flight.deaths import CONSEQUENCES, Consequence, DeathRecord, describe_exit
 from alula_flight.ending import GIVEN_UP, finish
+from alula_flight.mission_clock import MissionClock
 from alula_flight.process_faults import ProcessFaults, Started
 from alula_flight.spec import RunSpec
+from alula_flight.waits import Beginning, clock_words
 
 LANDING_PATIENCE_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
 FOR_EVER_S = 2**31
 STATE_PATIENCE_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
 ABORT_PATIENCE_S = 150.0  # wall clock; stop, hover, land
-STANDSTILL_PATIENCE_S = 60.0  # wall clock without a tick of the mission clock
-START_PATIENCE_S = 120.0  # wall clock until the mission clock runs
 
 log = logging.getLogger("alula.supervisor")
 
@@ -48,6 +49,7 @@ class Watch:
         self._launch: Any = None
         self.mission_exit: int | None = None
         self.worst = Consequence.GO_ON
+        self.worst_death = ""  # which death it was, in words
         self.changed = threading.Event()
         self.ending = False
 
@@ -70,43 +72,13 @@ class Watch:
         else:
             respawned = bool(getattr(process, "respawn", False)) and math.isfinite(getattr(process, "respawn_delay", 0.0))
             self._record.add(Death(name=name, how=describe_exit(exit_code), when_s=self._clock.now_s, respawned=respawned))
-            consequence = CONSEQUENCES.get(name, Consequence.GO_ON)
-            order = list(Consequence)
-            self.worst = max(self.worst, consequence, key=order.index)
+            self._note_consequence(CONSEQUENCES.get(name, Consequence.GO_ON), f"{name} died ({describe_exit(exit_code)})")
         self.changed.set()
 
-
-class MissionClock:
-    """The last tick of the mission clock, and how long ago it was on the wall."""
-
-    def __init__(self, *, simulated: bool) -> None:
-        self._simulated = simulated
-        self._now_s: float | None = None
-        self._moved = time.monotonic()
-
-    def listen(self) -> None:
-        """Subscribe to the clock; only where it is simulated."""
-        if not self._simulated:
-            return
-        import rospy
-        from rosgraph_msgs.msg import Clock
-
-        rospy.Subscriber("/clock", Clock, self._tick, queue_size=1)
-
-    def _tick(self, message: Any) -> None:
-        self._now_s = message.clock.to_sec()
-        self._moved = time.monotonic()
-
-    @property
-    def now_s(self) -> float | None:
-        """Mission clock in seconds, or None before its first tick."""
-        return self._now_s if self._simulated else time.time()
-
-    @property
-    def stands_still(self) -> bool:
-        """Tell whether the clock has not moved for so long that nothing will move it any more."""
-        patience_s = START_PATIENCE_S if self._now_s is None else STANDSTILL_PATIENCE_S
-        return self._simulated and time.monotonic() - self._moved > patience_s
+    def _note_consequence(self, consequence: Consequence, death: str) -> None:
+        order = list(Consequence)
+        if order.index(consequence) > order.index(self.worst):
+            self.worst, self.worst_death = consequence, death
 
 
 class Supervisor:
@@ -114,10 +86,12 @@ class Supervisor:
 
     def __init__(self, spec: RunSpec) -> None:
         self._spec = spec
+        self._out = Path(spec.out_dir)
         self._clock = MissionClock(simulated=spec.simulated)
-        self._record = DeathRecord(Path(spec.out_dir) / "deaths.jsonl")
+        self._record = DeathRecord(self._out / "deaths.jsonl")
         self._watch = Watch(self._record, self._clock)
-        self._asked_to_end = threading.Event()
+        self._asked_to_end: signal.Signals | None = None
+        self._beginning = Beginning(spec)
         self._front = os.getppid()
         self._front_died = False
         self._last_heartbeat: Any = None
@@ -154,19 +128,35 @@ class Supervisor:
             sigterm_timeout=2.0,
         )
         self._watch.follow(launch)
+        self._beginning.look(clock=False)
         launch.start()
         # roslaunch has put its own handlers; ours let the vehicle land first.
         on_end_signal(self._end_asked)
         rospy.init_node("alula_supervisor", disable_signals=True)
         self._clock.listen()
-        Album(Path(self._spec.out_dir)).listen()
-        self._faults = ProcessFaults(self._spec.process_faults, functools.partial(process_of, launch.pm), Path(self._spec.out_dir))
+        self._beginning.listen()
+        Album(self._out).listen()
+        self._faults = ProcessFaults(self._spec.process_faults, functools.partial(process_of, launch.pm), self._out)
         self._faults.listen()
         return launch
 
-    def _end_asked(self) -> None:
-        self._asked_to_end.set()
+    def _end_asked(self, number: signal.Signals) -> None:
+        self._asked_to_end = number
         self._watch.changed.set()
+
+    def _ends(self, why: str) -> None:
+        """Note that the supervisor ends the run by itself."""
+        log.error("the run is ended: %s", why)
+        note_end(self._out, Ended(SUPERVISOR, why, self._clock.now_s))
+
+    def _note_abort(self) -> None:
+        """Note who has the mission land, and why; what the front has noted before it asked for it stays."""
+        if self._front_died:
+            self._ends("the front has died")
+        elif self._asked_to_end is not None:
+            note_end(self._out, Ended(SIGNAL, f"{self._asked_to_end.name} to the supervisor", self._clock.now_s))
+        else:
+            self._ends(self._watch.worst_death)
 
     def _until_over(self, launch: Any) -> int:
         abort_since: float | None = None
@@ -174,20 +164,24 @@ class Supervisor:
             self._watch.changed.wait(timeout=0.2)
             self._watch.changed.clear()
             self._look_for_the_front()
+            self._beginning.look(clock=self._clock.began)
             if self._watch.mission_exit is not None:
                 if self._watch.mission_exit != 0:
                     self._land()  # what the mission could not bring down
                 return self._watch.mission_exit if self._watch.worst is Consequence.GO_ON else GIVEN_UP
             if self._clock.stands_still:
-                log.error("the mission clock has stood still for too long; ending the run")
+                self._ends(f"{self._clock.standstill}: nothing came from {clock_words(self._spec)}")
                 return GIVEN_UP
             if self._watch.worst is Consequence.END:
+                self._ends(self._watch.worst_death)
                 return GIVEN_UP
             if self._watch.worst is Consequence.LAND:
                 self._land()
                 return GIVEN_UP
-            if (self._asked_to_end.is_set() or self._watch.worst is Consequence.ABORT) and abort_since is None:
+            asked = self._asked_to_end is not None or self._front_died or self._watch.worst is Consequence.ABORT
+            if asked and abort_since is None:
                 abort_since = time.monotonic()
+                self._note_abort()
                 self._abort_mission(launch)
             if abort_since is not None and time.monotonic() - abort_since > ABORT_PATIENCE_S:
                 log.error("the mission did not end within %.0f s after it was told to", ABORT_PATIENCE_S)
@@ -198,7 +192,6 @@ class Supervisor:
         if os.getppid() != self._front and not self._front_died:
             self._front_died = True
             self._record.add(Death(name="front", how="gone", when_s=self._clock.now_s))
-            self._end_asked()
 
     def _abort_mission(self, launch: Any) -> None:
         """Tell the mission to stop what runs and land; it ends by itself when the vehicle is down."""
@@ -210,8 +203,10 @@ class Supervisor:
     def _land(self) -> None:
         """Land through the guidance, because no mission decides any more; return when the vehicle is down or it takes too long.
 
-        Nothing is done where the vehicle is down already, or where the pilot has it.
+        Nothing is done where the vehicle is down already, where the pilot has it, or where time has not begun.
         """
+        if not self._clock.began:
+            return
         import rospy
         from uav_msgs.msg import GuidanceState
         from uav_msgs.srv import Command

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -31,6 +32,8 @@ from alula_flight.mocked import MockFront, command
 from alula_flight.spec import RequestError, RunSpec
 from uav_simulator.world.config import find_world
 
+ARDUPILOT = ["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "simulated"]
+
 
 @pytest.mark.parametrize(
     ("arguments", "names"),
@@ -44,12 +47,25 @@ from uav_simulator.world.config import find_world
         (["mapping", "--seed", "-3"], ["--seed -3"]),
         (["mapping", "--rate", "nan"], ["--rate nan"]),
         (["mapping", "--rate", "-1"], ["--rate -1"]),
-        (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--fail", "zed@3"], ["--autopilot", "--sensors simulated"]),
-        (["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--imperfections", "realistic"], ["--imperfections"]),
+        (["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--fail", "zed@3"], ["--autopilot", "--sensors simulated"]),
+        (["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--imperfections", "realistic"], ["--imperfections"]),
         (["mapping", "--sensors", "simulated"], ["--sensors", "add --autopilot"]),
         (["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "real"], ["--sensors real", "simulated, or followed:URL"]),
         (["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--sensors", "followed:"], ["--sensors followed:", "udpin:127.0.0.1:14551"]),
         (["mapping", "--imperfections", "some"], ["--imperfections", "'some'", "realistic"]),
+        (["mapping", "--autopilot=/dev/../etc/passwd"], ["--autopilot /dev/../etc/passwd", "no serial device", "tcp:HOST:PORT"]),
+        (["mapping", "--autopilot=/dev/nosuch"], ["/dev/nosuch", "no such device"]),
+        (["mapping", "--autopilot=nonsense"], ["nonsense", "is no MAVLink connection"]),
+        (["mapping", "--autopilot=file:///etc/passwd"], ["is no MAVLink connection"]),
+        (["mapping", "--autopilot=tcp:127.0.0.1"], ["tcp:127.0.0.1", "needs a host and a port"]),
+        (["mapping", "--autopilot=tcp::5760"], ["needs a host and a port"]),
+        (["mapping", "--autopilot=udpin:127.0.0.1:70000"], ["port from 1 to 65535"]),
+        (["mapping", "--autopilot=tcp:no such host:5760"], ["there is no host 'no such host'"]),
+        ([*ARDUPILOT[:-1], "followed:/etc/passwd"], ["--sensors followed:/etc/passwd", "no serial device"]),
+        ([*ARDUPILOT, "--physics-port", "0"], ["--physics-port 0"]),
+        (["mapping", "--physics-port", "9012"], ["--physics-port", "--sensors simulated"]),
+        (["inspection", *ARDUPILOT[1:], "--fail", "control@40"], ["--fail control", "only the simulated one"]),
+        (["inspection", *ARDUPILOT[1:], "--fail", "ground_station:hung@40-60"], ["--fail ground_station", "only the simulated one"]),
     ],
 )
 def test_wrong_request_is_one_line_and_exit_code_2(arguments, names, capsys):
@@ -108,8 +124,9 @@ def test_a_world_file_that_is_wrong_is_refused_with_its_line(tmp_path, capsys):
 
 
 def test_real_autopilot_takes_the_place_of_the_simulator(tmp_path):
-    spec = parse(["mapping", "--autopilot", "udpin:127.0.0.1:14550", "--out", str(tmp_path / "run")])
-    assert {"simulate:=false", "autopilot:=udpin:127.0.0.1:14550"} <= set(spec.launch_arguments())
+    url = f"udpin:127.0.0.1:{free_port()}"
+    spec = parse(["mapping", "--autopilot", url, "--out", str(tmp_path / "run")])
+    assert {"simulate:=false", f"autopilot:={url}"} <= set(spec.launch_arguments())
 
 
 def test_ardupilot_flies_the_simulators_body(tmp_path):
@@ -118,12 +135,17 @@ def test_ardupilot_flies_the_simulators_body(tmp_path):
     assert {"vehicle:=ardupilot", "autopilot:=tcp:127.0.0.1:5760", "faults:=zed@30"} <= set(spec.launch_arguments())
     assert "simulate:=false" not in spec.launch_arguments()
     assert spec.simulated
-    followed = parse([*words[:4], "followed:udpin:127.0.0.1:14551", *words[5:]])
-    assert {"vehicle:=followed:udpin:127.0.0.1:14551", "rate:=0", "faults:=zed@30"} <= set(followed.launch_arguments())
+    url = f"followed:udpin:127.0.0.1:{free_port()}"
+    followed = parse([*words[:4], url, *words[5:]])
+    assert {f"vehicle:={url}", "rate:=0", "faults:=zed@30"} <= set(followed.launch_arguments())
     assert followed.simulated
     assert not parse(["mapping", "--autopilot", "tcp:127.0.0.1:5760", "--out", str(tmp_path / "run")]).simulated
     imperfect = parse(["mapping", "--imperfections", "realistic,exposure=0", "--out", str(tmp_path / "run")])
     assert "imperfections:=realistic,exposure=0" in imperfect.launch_arguments()
+    imperfect.save(tmp_path / "run.json")
+    saved = json.loads((tmp_path / "run.json").read_text())
+    assert (saved["imperfections"], "launch" in saved) == ("realistic,exposure=0", False)
+    assert RunSpec.load(tmp_path / "run.json") == imperfect
 
 
 def test_mocks_need_no_ports_and_know_their_own_faults(tmp_path):
@@ -213,7 +235,7 @@ def test_everything_of_a_run_ends_and_nothing_else(tmp_path):
 
 def test_sensors_are_recorded_where_that_is_asked_for_and_can_be():
     assert "record:=sensors" in parse(["mapping", "--record", "sensors"]).launch_arguments()
-    assert not [word for word in parse(["mapping"]).launch_arguments() if word.startswith("record:=")]
+    assert "record:=functional" in parse(["mapping"]).launch_arguments()
     with pytest.raises(RequestError, match="mocks measure nothing"):
         parse(["mapping", "--mock", "--record", "sensors"])
 

@@ -2,21 +2,65 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
-from roslaunch.config import load_config_default
+from roslaunch.config import ROSLaunchConfig, load_config_default
 
 from alula.common.scenarios import load_scenario, scenario_names
+from alula_flight.command_line import parse
+from alula_flight.fly import with_ports
 
 LAUNCH = Path(__file__).parents[2] / "ros1_ws/src/uav_bringup/launch"
 
 
+def launched(scenario: str, tmp_path: Path, *arguments: str) -> ROSLaunchConfig:
+    launch = LAUNCH / load_scenario(scenario).launch.removeprefix("uav_bringup/")
+    return load_config_default([(str(launch), [f"out:={tmp_path}", *arguments])], None, verbose=False, assign_machines=False)
+
+
 @pytest.mark.parametrize("scenario", scenario_names())
 def test_simulated_time_waits_only_for_nodes_that_the_scenario_starts(scenario: str, tmp_path: Path) -> None:
-    launch = LAUNCH / load_scenario(scenario).launch.removeprefix("uav_bringup/")
-    config = load_config_default([(str(launch), [f"out:={tmp_path}"])], None, verbose=False, assign_machines=False)
+    config = launched(scenario, tmp_path)
     topics = [word.partition("=")[0] for word in config.params["/uav_simulator/pace_topics"].value.split(",")]
     paced = {topic.split("/")[1] for topic in topics}
     assert {"mission", "uav_guidance"} <= paced
     assert paced <= {node.name for node in config.nodes}
+
+
+@pytest.mark.parametrize("scenario", scenario_names())
+def test_what_the_command_line_asks_for_reaches_the_nodes(scenario: str, tmp_path: Path) -> None:
+    words = ["--autopilot", "tcp:127.0.0.1:15760", "--sensors", "simulated", "--imperfections", "realistic", "--record", "sensors"]
+    words += ["--seed", "7", "--rate", "3", "--fail", "zed@30", "--world", "forest", "--out", str(tmp_path / "run")]
+    spec = with_ports(parse([scenario, *words]), 77)
+    config = launched(scenario, tmp_path, *spec.launch_arguments())
+    given = {name.rpartition("/")[2]: param.value for name, param in config.params.items() if name.startswith("/uav_simulator/")}
+    expected = {"seed": 7, "rate": 3.0, "faults": "zed@30", "vehicle": "ardupilot", "imperfections": "realistic", "world": spec.world}
+    expected |= {"ardupilot_port": spec.body_port, "mavlink_port": spec.mavlink_port}
+    assert {name: given[name] for name in expected} == expected
+    assert config.params["/uav_guidance/url"].value == spec.autopilot
+    (record,) = [node for node in config.nodes if node.name == "record"]
+    assert "/zed/left/image_raw" in record.args
+
+
+def test_the_radios_faults_and_ports_reach_the_nodes(tmp_path: Path) -> None:
+    spec = with_ports(parse(["inspection", "--fail", "radio@40", "--fail", "control@50", "--out", str(tmp_path / "run")]), 77)
+    params = {name: param.value for name, param in launched("inspection", tmp_path, *spec.launch_arguments()).params.items()}
+    assert params["/radio_link/faults"] == "radio@40,control@50"
+    ports = [params[name] - spec.radio_port for name in ("/radio_link/base_port", "/ground_station/video_port", "/uav_simulator/gcs_port")]
+    assert ports == [0, 1, 5]
+
+
+def test_every_argument_of_a_run_is_declared_and_has_one_default(tmp_path: Path) -> None:
+    """An argument reaches all files that are included: roslaunch would not tell of one that no file knows."""
+    texts = [path.read_text(encoding="utf-8") for path in LAUNCH.glob("*.launch")]
+    declared = {name for text in texts for name in re.findall(r'<arg name="(\w+)" (?:default="[^"]*" )?doc="[^"]+"/>', text)}
+    spec = parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", "--out", str(tmp_path / "run")])
+    assert {word.partition(":=")[0] for word in spec.launch_arguments()} <= declared
+    defaults = Counter(name for text in texts for name in set(re.findall(r'<arg name="(\w+)" default=', text)))
+    # Each scenario has a world of its own, and the radio has a seed, too.
+    assert {name for name, count in defaults.items() if count > 1} <= {"world", "seed"}
+    for text in texts:
+        assert text.count("<include ") == text.count('pass_all_args="true"')

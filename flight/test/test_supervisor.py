@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+
 from alula.report.deaths import read_deaths
+from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, Ended, note_end, read_end
+from alula_flight import mission_clock, supervisor
 from alula_flight.deaths import Consequence, DeathRecord
-from alula_flight.supervisor import MissionClock, Watch
+from alula_flight.ending import GIVEN_UP
+from alula_flight.mission_clock import MissionClock
+from alula_flight.spec import RunSpec
+from alula_flight.supervisor import Supervisor, Watch
 
 
 @dataclass
@@ -29,3 +37,63 @@ def test_a_death_while_roslaunch_still_starts_is_noted(tmp_path: Path) -> None:
     launch.start()
     assert [death.name for death in read_deaths(tmp_path / "deaths.jsonl")] == ["uav_simulator"]
     assert watch.worst is not Consequence.GO_ON
+
+
+class Flight:
+    """A supervisor whose run has no process left: it ends as soon as it is told to."""
+
+    def __init__(self, out: Path) -> None:
+        spec = RunSpec("mapping", str(out), "", 0, 0.0, (), "", "tcp:127.0.0.1:1", 0, 0, 1, sensors="simulated", body_port=9772)
+        self.supervisor = Supervisor(spec)
+        process = SimpleNamespace(spawn_count=1, respawn=False)
+        self.launch = SimpleNamespace(pm=SimpleNamespace(get_process=lambda _: process, get_active_names=list))
+        self.supervisor._watch.follow(self.launch)
+
+    def died(self, name: str) -> None:
+        self.supervisor._watch.process_died(f"{name}-1", 1)
+
+    def signalled(self, number: signal.Signals) -> None:
+        self.supervisor._end_asked(number)
+
+    def ends(self) -> int:
+        return self.supervisor._until_over(self.launch)
+
+
+@pytest.fixture
+def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Flight:
+    monkeypatch.setattr(supervisor, "ABORT_PATIENCE_S", 0.0)
+    return Flight(tmp_path)
+
+
+def test_a_clock_that_never_begins_is_the_reason_that_is_told(flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mission_clock, "START_PATIENCE_S", 0.0)
+    assert flight.ends() == GIVEN_UP
+    assert read_end(tmp_path) == Ended(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from ArduPilot on UDP 9772")
+
+
+@pytest.mark.parametrize("name", ["uav_simulator", "master"])
+def test_a_death_that_ends_a_run_is_the_reason_that_is_told(name: str, flight: Flight, tmp_path: Path) -> None:
+    flight.died("zed_depth")
+    flight.died(name)
+    assert flight.ends() == GIVEN_UP
+    assert read_end(tmp_path) == Ended(SUPERVISOR, f"{name} died (exit code 1)")
+
+
+def test_a_signal_from_outside_is_named(flight: Flight, tmp_path: Path) -> None:
+    flight.signalled(signal.SIGTERM)
+    assert flight.ends() == GIVEN_UP
+    assert read_end(tmp_path) == Ended(SIGNAL, "SIGTERM to the supervisor")
+
+
+def test_what_the_operator_asked_the_front_for_is_the_operators(flight: Flight, tmp_path: Path) -> None:
+    note_end(tmp_path, Ended(OPERATOR, "Ctrl-C"))
+    flight.signalled(signal.SIGINT)
+    flight.ends()
+    assert read_end(tmp_path) == Ended(OPERATOR, "Ctrl-C")
+
+
+def test_a_front_that_has_died_is_named(flight: Flight, tmp_path: Path) -> None:
+    flight.supervisor._front = 0  # no process's parent
+    flight.signalled(signal.SIGTERM)  # by the kernel
+    flight.ends()
+    assert read_end(tmp_path) == Ended(SUPERVISOR, "the front has died")

@@ -10,14 +10,13 @@ from alula.common.faults import FaultRequest
 from alula.model.conditions import NO_DATA, judge
 from alula.model.execution_state import ExecutionState as S
 from alula.model.expressions import ResourceIs, atoms
-from alula.model.model import Invariant, Resource, Result, ResultKind, Skillset, Transition
+from alula.model.model import Invariant, Resource, ResultKind, Skill, Skillset, Transition
 from alula.records.causes.answers import NO_SKILL, answer_to, answer_to_fault
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.records.causes.faults import Fault, trace
 from alula.records.causes.reach import EXTERN
 from alula.records.tree import Places
 from alula.runtime.core.events import EngineEvent, TransitionEvent
-from alula.runtime.mock.behaviour import UNHAPPY_WORDS
 
 FAULT, PROCESS, RESULT, INVARIANT, ARROW = "fault", "process", "result", "invariant", "extern arrow"
 KINDS = (FAULT, PROCESS, RESULT, INVARIANT, ARROW)
@@ -56,11 +55,11 @@ class Failure:
 
 
 def ways_to_fail(skillsets: Iterable[Skillset], processes: Iterable[str] = ()) -> list[Way]:
-    """Return every result that is no success, every invariant, every extern arrow that breaks an invariant, every process."""
+    """Return every result that is a failure, every invariant, every extern arrow that breaks an invariant, every process."""
     found: list[Way] = []
     for skillset in skillsets:
         for skill in skillset.skills:
-            found += [Way(RESULT, f"{skillset.name}.{skill.name} {one.name}") for one in skill.results if is_failure(one)]
+            found += [Way(RESULT, f"{skillset.name}.{skill.name} {name}") for name in _failures_of(skill)]
             found += [Way(INVARIANT, f"{skillset.name}.{skill.name} {one.name}") for one in skill.invariants]
         for resource in skillset.resources:
             arrows = [arrow for arrow in resource.transitions if arrow.extern and breaks(skillset, resource, arrow)]
@@ -68,11 +67,8 @@ def ways_to_fail(skillsets: Iterable[Skillset], processes: Iterable[str] = ()) -
     return [*dict.fromkeys(found), *(Way(PROCESS, name) for name in processes)]
 
 
-def is_failure(result: Result) -> bool:
-    """Tell whether a result is none of success: a failure, or, where the notation does not say, a name that says so."""
-    if result.kind is ResultKind.PLAIN:
-        return any(word in result.name.upper() for word in UNHAPPY_WORDS)
-    return result.kind is ResultKind.FAILURE
+def _failures_of(skill: Skill) -> list[str]:
+    return [result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.FAILURE]
 
 
 def breaks(skillset: Skillset, resource: Resource, arrow: Transition) -> bool:

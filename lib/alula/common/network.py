@@ -1,4 +1,4 @@
-"""TCP ports and DDS domains for parallel runs on one machine, so that they never meet."""
+"""Ports and DDS domains for parallel runs on one machine, so that they never meet."""
 
 from __future__ import annotations
 
@@ -12,11 +12,16 @@ from dataclasses import dataclass
 DOMAINS = range(1, 102)
 RTPS_PORT, RTPS_PORTS_PER_DOMAIN = 7400, 250
 # Linux takes outgoing connections' ports from 32768 up; the claims of domains lie among these.
+EPHEMERAL_PORT = 32_768
 PORTS = [port for port in range(20_000, 32_700) if (port - RTPS_PORT) % RTPS_PORTS_PER_DOMAIN]
 
 
 class NoFreeDomainError(Exception):
     """All DDS domains are claimed by other runs on this machine."""
+
+
+class NoFreePortError(Exception):
+    """Other programs hold all UDP ports that a run of a domain may take; the message names them."""
 
 
 def free_port() -> int:
@@ -33,6 +38,32 @@ def free_port() -> int:
             except OSError:
                 continue
         return port
+
+
+def udp_port_is_free(port: int, address: str = "127.0.0.1") -> bool:
+    """Tell whether a UDP port of this machine can be bound at this moment."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((address, port))
+        except OSError:
+            return False
+    return True
+
+
+def udp_ports_of(domain: int, *, first: int, step: int, count: int = 1) -> int:
+    """Return the first of ``count`` UDP ports in a row on loopback that are free, and that only a run of this DDS domain takes.
+
+    The candidates are ``first`` plus a multiple of ``step``, below the ports of outgoing connections. Who has claimed the domain can't
+    meet another run there, however close their starts are; of other programs it is looked that they don't hold the ports.
+
+    Raises:
+        NoFreePortError: other programs hold one of each candidate.
+    """
+    candidates = range(first + step * DOMAINS.index(domain), EPHEMERAL_PORT - count, step * len(DOMAINS))
+    for candidate in candidates:
+        if all(udp_port_is_free(candidate + n) for n in range(count)):
+            return candidate
+    raise NoFreePortError(f"other programs hold UDP ports from each of {', '.join(map(str, candidates))} on; end some first")
 
 
 @dataclass(frozen=True)

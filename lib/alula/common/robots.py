@@ -107,9 +107,9 @@ class RobotFolder:
 
     def import_path(self) -> None:
         """Have the robot's own packages found by imports."""
-        for folder in map(str, self.python):
-            if folder not in sys.path:
-                sys.path.append(folder)
+        own = [str(folder) for folder in self.python]
+        # Before what is installed: the folder that was named is the robot.
+        sys.path[:] = [*own, *(place for place in sys.path if place not in own)]
 
     def load(self, text: str) -> Any:
         """Return a module, or what ``module:name`` is; raises RobotError."""

@@ -17,32 +17,37 @@ class Interrupts:
     def __init__(self, on_first: Callable[[], None], on_second: Callable[[], None]) -> None:
         self._on_first = on_first
         self._on_second = on_second
-        self._count = 0
+        self._received: list[signal.Signals] = []
 
     def install(self) -> None:
         """Handle the signals from now on; call it in the main thread."""
         for number in END_SIGNALS:
-            signal.signal(number, lambda *_: self._note())
+            signal.signal(number, lambda received, _frame: self._note(signal.Signals(received)))
 
     @property
     def asked(self) -> bool:
         """Tell whether the end was asked for."""
-        return self._count > 0
+        return bool(self._received)
+
+    @property
+    def first(self) -> signal.Signals | None:
+        """The signal that asked for the end; None when none has."""
+        return self._received[0] if self._received else None
 
     @property
     def at_once(self) -> bool:
         """Tell whether it was asked for twice."""
-        return self._count > 1
+        return len(self._received) > 1
 
-    def _note(self) -> None:
-        self._count += 1
-        if self._count == 1:
+    def _note(self, received: signal.Signals) -> None:
+        self._received.append(received)
+        if len(self._received) == 1:
             self._on_first()
         else:
             self._on_second()
 
 
-def on_end_signal(callback: Callable[[], None]) -> None:
-    """Call back at each SIGINT, SIGTERM or SIGHUP, in the main thread; call this there, too."""
+def on_end_signal(callback: Callable[[signal.Signals], None]) -> None:
+    """Call back with each SIGINT, SIGTERM or SIGHUP, in the main thread; call this there, too."""
     for number in END_SIGNALS:
-        signal.signal(number, lambda *_: callback())
+        signal.signal(number, lambda received, _frame: callback(signal.Signals(received)))

@@ -3,9 +3,10 @@
 Without a time are facts of the whole run (``FACTS``), and what came before the mission clock was heard: a clock that was not heard
 reads zero, and zero is no time of a flight whose clock is Unix time.
 
-Topics of the record (``alula.common.record``) keep their names and contents, with three exceptions. Of the tree the page gets the shape
+Topics of the record (``alula.common.record``) keep their names and contents, with four exceptions. Of the tree the page gets the shape
 once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what the
-mission needs to start, met or not; of the reports none, because the events tell how executions go.
+mission needs to start, met or not; of the reports none, because the events tell how executions go. Older events get the kind of their
+result.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from alula.common.files import strict
-from alula.common.record import DATA, REPORTS, TICKS, TREE, Entry
+from alula.common.record import DATA, EVENTS, REPORTS, TICKS, TREE, Entry
+from alula.records.kinds import with_kind
 
 RUN = "/run"
 """What was asked for: the values of ``run.json``, and the ``name`` of its folder."""
@@ -81,7 +83,7 @@ class Converter:
         if entry.topic == TREE:
             yield from self._tree(t_s, entry.value)
         elif self._wanted(t_s, entry):
-            yield entry.topic, t_s, entry.value
+            yield entry.topic, t_s, with_kind(entry.value) if entry.topic == EVENTS else entry.value
 
     def _wanted(self, t_s: float | None, entry: Entry) -> bool:
         if entry.topic == TICKS:

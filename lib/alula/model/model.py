@@ -202,7 +202,7 @@ class Interrupt:
 
 
 class ResultKind(Enum):
-    """A plain result says nothing about success: the mission decides (the paper's notation)."""
+    """What a result is called; a plain one has no word. What that means is said by ``Skill.kind_of`` alone."""
 
     PLAIN = "result"
     SUCCESS = "success"
@@ -244,6 +244,17 @@ class Skill:
             if result.name == name:
                 return result
         raise KeyError(f"skill {self.name} has no result {name}; it has {', '.join(r.name for r in self.results)}")
+
+    def kind_of(self, result_name: str) -> ResultKind:
+        """Tell whether a result is a success or a failure; PLAIN: neither, the mission decides. Raise KeyError as ``result``.
+
+        It is what it is called. Where no result of the skill is called either, as in the paper's listings, the first one is the
+        success and the others are failures.
+        """
+        kind = self.result(result_name).kind
+        if any(result.kind is not ResultKind.PLAIN for result in self.results):
+            return kind
+        return ResultKind.SUCCESS if result_name == self.results[0].name else ResultKind.FAILURE
 
 
 class PropertyKind(Enum):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from alula.model.conditions import NO_DATA, States, judge, present
+from alula.model.conditions import NO_DATA, States, judge
 from alula.model.deadlines import good, is_due, is_stuck, waits, watch
 from alula.model.effects import after, effect_changes, given_back, without
 from alula.model.errors import EffectError
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Invariant, Skill, Skillset
 from alula.model.situation import Change, Entered, Running, Situation, Step
+from alula.model.unmet import Unmet, unmet_condition
 
 
 def propagate(skillset: Skillset, step: Step) -> Step:
@@ -27,14 +28,14 @@ def propagate(skillset: Skillset, step: Step) -> Step:
         step = ended
 
 
-def violate(skillset: Skillset, step: Step, execution: Running, invariant: Invariant, message: str) -> Step:
+def violate(skillset: Skillset, step: Step, execution: Running, invariant: Invariant, unmet: Unmet, message: str) -> Step:
     """End one execution by its broken invariant; an effect that is no transition is told in the message and not applied."""
     states, effect_failed = step.situation.states, False
     try:
         changes = effect_changes(skillset, execution, invariant.effect, invariant.name, states)
     except EffectError as error:
         changes, message, effect_failed = (), f"{message}; {error}", True
-    entered = Entered(execution, ExecutionState.RESOURCE_INVARIANT_VIOLATED, invariant.name, message, effect_failed)
+    entered = Entered(execution, ExecutionState.RESOURCE_INVARIANT_VIOLATED, invariant.name, message, effect_failed, (unmet,))
     return step.then(*changes, entered, situation=without(step.situation, execution, after(states, changes)))
 
 
@@ -57,7 +58,7 @@ def false_invariant(skill: Skill, states: States) -> tuple[Invariant | None, boo
 
 def _propagate_resources(skillset: Skillset, step: Step) -> tuple[Step, bool]:
     """End what resources alone have broken; tell whether data or time decide anything of what runs on."""
-    found: dict[Running, tuple[Invariant, str]] = {}
+    found: dict[Running, tuple[Invariant, Unmet, str]] = {}
     while True:
         undecided = False
         for execution in step.situation.running:
@@ -65,22 +66,24 @@ def _propagate_resources(skillset: Skillset, step: Step) -> tuple[Step, bool]:
                 invariant, asks_more = false_invariant(skillset.skill(execution.skill), step.situation.states)
                 undecided = undecided or asks_more
                 if invariant is not None:
-                    found[execution] = (invariant, _because(step, invariant))
+                    found[execution] = (invariant, *_because(step, invariant))
         if not found:
             return step, undecided
         execution = next(iter(found))
         step = violate(skillset, step, execution, *found.pop(execution))
 
 
-def _because(step: Step, invariant: Invariant) -> str:
-    message = f"{invariant.name}: {present(invariant.condition, step.situation.states, step.situation.data)}"
+def _because(step: Step, invariant: Invariant) -> tuple[Unmet, str]:
+    """Return what is not as the invariant says, and the message: that, for how long it was so, and after which change."""
+    unmet = unmet_condition(invariant.name, invariant.condition, step.situation.states, step.situation.data)
+    message = unmet.reason
     if invariant.hold is not None and invariant.hold.for_s > 0:
         message += f" for {invariant.hold.for_s:g} s"
     causes = [happening for happening in step.happenings if isinstance(happening, Change)]
     if causes:
         last = causes[-1]
         message += f", after {last.resource} {last.source} -> {last.target} ({last.cause})"
-    return message
+    return unmet, message
 
 
 # --- what data and time decide ----------------------------------------------------------------------------------------
@@ -93,7 +96,7 @@ def _first_due(skillset: Skillset, step: Step) -> Step | None:
         skill = skillset.skill(execution.skill)
         for invariant in skill.invariants:
             if not good(skill, invariant, situation) and is_due(execution, invariant, situation):
-                return violate(skillset, step, execution, invariant, _because(step, invariant))
+                return violate(skillset, step, execution, invariant, *_because(step, invariant))
         if is_stuck(skill, execution, situation):
             return _give_up(skillset, step, skill, execution)
     return None

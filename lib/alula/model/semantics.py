@@ -9,18 +9,19 @@ and the violated state. An execution is broken by the first false invariant in t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from alula.model import deadlines
 from alula.model.conditions import Data, States, data_of, holds, in_si, judge, present
 from alula.model.effects import after, effect_changes, event_changes, given_back, without
-from alula.model.errors import DataMissingError, EffectError, UnsupportedModelError
+from alula.model.errors import EffectError, UnsupportedModelError
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Expression
 from alula.model.model import Event, Skill, Skillset
 from alula.model.propagation import propagate, violate
 from alula.model.situation import Change, Entered, Running, Situation, Step
+from alula.model.unmet import Unmet, unmet_condition, unmet_effect
 
 __all__ = [
     "EXTERN",
@@ -44,7 +45,7 @@ __all__ = [
     "start",
     "terminate",
     "transition",
-    "unmet_precondition",
+    "unmet_preconditions",
 ]
 
 EXTERN = "extern"
@@ -83,13 +84,14 @@ def initial(skillset: Skillset) -> Situation:
 def start(skillset: Skillset, situation: Situation, execution: Running) -> Step:
     """Test preconditions and apply the start effect as one: the execution is RUNNING, or NOT_READY and nothing changed."""
     skill = skillset.skill(execution.skill)
-    refusal = unmet_precondition(skill, situation.states, situation.data)
-    if refusal is not None:
-        return Step(situation, (Entered(execution, ExecutionState.NOT_READY, *refusal),))
+    unmet = next(unmet_preconditions(skill, situation.states, situation.data), None)
+    if unmet is not None:
+        return Step(situation, (Entered(execution, ExecutionState.NOT_READY, unmet.name, unmet.reason, unmet=(unmet,)),))
     try:
         changes = effect_changes(skillset, execution, skill.start, "start", situation.states)
     except EffectError as error:
-        return Step(situation, (Entered(execution, ExecutionState.NOT_READY, "", str(error)),))
+        unmet = unmet_effect(skill.start, str(error), situation.states)
+        return Step(situation, (Entered(execution, ExecutionState.NOT_READY, "", unmet.reason, unmet=(unmet,)),))
     begun = replace(situation, states=after(situation.states, changes), running=(*situation.running, execution))
     return propagate(skillset, Step(progressed(skillset, begun, execution), (*changes, Entered(execution, ExecutionState.RUNNING))))
 
@@ -204,23 +206,18 @@ def fail(skillset: Skillset, situation: Situation, execution: Running, message: 
 def lose(skillset: Skillset, situation: Situation, execution: Running, invariant_name: str) -> Step:
     """Have data or time break an invariant of one running execution: what ``receive`` and ``elapse`` do, value and time aside."""
     invariant = next(one for one in skillset.skill(execution.skill).invariants if one.name == invariant_name)
-    return propagate(skillset, violate(skillset, Step(situation), execution, invariant, invariant_name))
+    unmet = unmet_condition(invariant_name, invariant.condition, situation.states, situation.data)
+    return propagate(skillset, violate(skillset, Step(situation), execution, invariant, unmet, invariant_name))
 
 
 # --- parts -----------------------------------------------------------------------------------------------------------
 
 
-def unmet_precondition(skill: Skill, states: States, data: Data) -> tuple[str, str] | None:
-    """Return name and reason of the first precondition that does not hold, in the model's order."""
+def unmet_preconditions(skill: Skill, states: States, data: Data) -> Iterator[Unmet]:
+    """Yield the preconditions that do not hold, in the model's order; a start is refused by the first."""
     for precondition in skill.preconditions:
-        try:
-            if holds(precondition.condition, states, data):
-                continue
-            reason = present(precondition.condition, states, data) or "it is never true"
-        except DataMissingError as error:
-            reason = str(error)
-        return precondition.name, f"{precondition.name}: {reason}"
-    return None
+        if judge(precondition.condition, states, data) is not True:
+            yield unmet_condition(precondition.name, precondition.condition, states, data)
 
 
 def _if_fulfilled(ended: Entered, postcondition: Expression, where: str, after_effect: Situation) -> Entered:

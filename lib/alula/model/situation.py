@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from alula.model.conditions import NO_DATA, Data, States
 from alula.model.execution_state import ExecutionState
+from alula.model.unmet import Unmet
 
 
 @dataclass(frozen=True)
@@ -47,13 +48,14 @@ class Change:
 
 @dataclass(frozen=True)
 class Entered:
-    """An execution entered a state; ``result`` as in ``Execution``; ``effect_failed`` when a violation's effect was not possible."""
+    """An execution entered a state; ``result`` and ``unmet`` as in ``Execution``; ``effect_failed``: a violation's was not possible."""
 
     execution: Running
     state: ExecutionState
     result: str = ""
     message: str = ""
     effect_failed: bool = False
+    unmet: tuple[Unmet, ...] = field(default=(), hash=False)
 
 
 @dataclass(frozen=True)

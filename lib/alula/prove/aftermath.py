@@ -38,6 +38,8 @@ class Step:
     groups: tuple[Group, ...]
     about: frozenset[str]
     sets: frozenset[str]
+    ends: frozenset[str]
+    """The skills of which it may end an execution."""
 
 
 class Aftermath:
@@ -67,7 +69,8 @@ class Aftermath:
                 about |= set(violation.values) | set(self.bdd.support(violation.guard))
         for skill in whole:
             about |= set(self.bdd.support(self._broken[skill]))
-        return Step(update, groups, frozenset(about), frozenset(sets))
+        ends = whole | ({update.ends} if update.ends else set())
+        return Step(update, groups, frozenset(about), frozenset(sets), frozenset(ends))
 
     def following(self, skill: str) -> tuple[str, ...]:
         """Return the skills that the violations of one may break."""

@@ -60,17 +60,13 @@ def neighbours(count: int) -> Skillset:
 
 
 def sparse(count: int) -> Skillset:
-    """Return skills that each use three of sixty resources at random: one is taken, the others must be free and stay so."""
+    """Return skills that each use three of at most sixty resources: one is taken, two at random must be free and stay so."""
     chance = random.Random(count)  # noqa: S311 - nothing here is secret
-    names = [f"part{i}" for i in range(SPARSE_RESOURCES)]
-    skills = tuple(_taking(f"use{i}", *chance.sample(names, 3)) for i in range(count))
-    alone = Property("alone", PropertyKind.NEVER, And((SkillRuns("use0"), Not(ResourceIs(_taken(skills[0]), "Used")))))
-    ends = Property("ends", PropertyKind.LEADS_TO, SkillRuns("use0"), ResourceIs(_taken(skills[0]), "Free"), fair=True)
-    return Skillset("sparse", resources=tuple(map(_free_or_used, names)), skills=skills, properties=(alone, ends))
-
-
-def _taken(skill: Skill) -> str:
-    return skill.start.assignments[0].resource
+    names = [f"part{i}" for i in range(max(3, min(count, SPARSE_RESOURCES)))]
+    taken = [names[i % len(names)] for i in range(count)]
+    skills = tuple(_taking(f"use{i}", one, *chance.sample([n for n in names if n != one], 2)) for i, one in enumerate(taken))
+    alone = Property("alone", PropertyKind.NEVER, And((SkillRuns("use0"), Not(ResourceIs(taken[0], "Used")))))
+    return Skillset("sparse", resources=tuple(map(_free_or_used, names)), skills=skills, properties=(alone,))
 
 
 def _taking(name: str, mine: str, *others: str) -> Skill:

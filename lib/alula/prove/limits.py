@@ -29,6 +29,7 @@ class Deadline:
     given_s: float
     tell: Callable[[str], None] | None = None
     doing: str = ""
+    _begun_s: float = field(default_factory=time.monotonic)
     _told_s: float = field(default_factory=time.monotonic)
 
     @classmethod
@@ -51,4 +52,4 @@ class Deadline:
             raise OutOfTimeError
         if self.tell is not None and now_s - self._told_s >= EVERY_S:
             self._told_s = now_s
-            self.tell(f"{self.doing}; {self.given_s - self.left_s():.0f} s of {self.given_s:.3g} s")
+            self.tell(f"{self.doing}; {now_s - self._begun_s:.0f} s of {self.given_s:.3g} s")

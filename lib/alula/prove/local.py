@@ -94,12 +94,12 @@ class _Checks:
             before.append(self._solver.term(invariant.condition))
 
     def ends(self, skill: Skill) -> None:
-        """ALU511 to ALU516; a plain result counts as a success."""
+        """ALU511 to ALU516; what is neither a success nor a failure counts as a success."""
         interrupt = skill.interrupt
         where, span = f"the interruption of `{skill.name}`", interrupt.span if interrupt.span.line else skill.span
         self._end(skill, where, interrupt.effect, interrupt.postcondition, span, "ALU511", ("interrupt", skill.name))
         for result in skill.results:
-            code = "ALU515" if result.kind is ResultKind.FAILURE else "ALU513"
+            code = "ALU515" if skill.kind_of(result.name) is ResultKind.FAILURE else "ALU513"
             where = f"{_KIND[result.kind]} `{result.name}` of `{skill.name}`"
             self._end(skill, where, result.effect, result.postcondition, result.span, code, _key(skill, result))
 

@@ -169,11 +169,22 @@ class Sets:
         goal = situations & self.bdd.var(ENDED) if ending else situations
         result = self.bdd.false
         for step in self.steps:
-            self.deadline.check()
-            result |= self._one_before(step, goal, within, ending)
+            if not ending or ending in step.ends:
+                self.deadline.check()
+                result |= self._one_before(step, goal, within, ending)
         if ending:
             result = self.bdd.let({ENDED: False}, result)
         return result & self.reached if self.exact else result & self.bound.near(result)
+
+    def staying(self, situations: Any) -> Any:
+        """Return those of these situations that have a step to one of these."""
+        left = situations
+        for step in sorted(self.steps, key=lambda one: not one.update.ends):
+            if left == self.bdd.false:
+                break
+            self.deadline.check()
+            left &= ~self._one_before(step, situations)
+        return situations & ~left
 
     def nearer(self, situations: Any) -> Iterator[Any]:
         """Yield, a step after another, ``before`` without situations that are left as they are in what these are about."""

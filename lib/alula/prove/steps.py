@@ -111,7 +111,7 @@ class World:
     def _starts(self, situation: Situation) -> Iterator[Move]:
         counts = [execution.skill for execution in situation.running]
         for skill in self.skillset.skills:
-            if semantics.unmet_precondition(skill, situation.states, {}) is not None:
+            if next(semantics.unmet_preconditions(skill, situation.states, {}), None) is not None:
                 continue
             if self._fails(skill, skill.start, situation):
                 yield Move("start", (skill.name,), self.state(situation), faults=(("effect", "start", skill.name),))

@@ -180,11 +180,11 @@ class _Search:
     def _for_ever(self, goal: Any, *, fair: bool) -> Any:
         """Return all from which a run may avoid the goal for ever (Emerson and Lei's greatest fixpoint), or more."""
         sets = self.sets
-        stuck = sets.reached & ~sets.before(sets.reached)
+        stuck = sets.reached & ~sets.staying(sets.reached)
         avoiding, before = sets.reached & ~goal, sets.bdd.false
         while avoiding != before:
             before = avoiding
-            avoiding &= sets.before(avoiding) | stuck
+            avoiding = sets.staying(avoiding) | (avoiding & stuck)
             for skill in self.skillset.skills if fair else ():
                 rests = ~self.model.runs(skill.name)
                 if avoiding & ~rests == sets.bdd.false:

@@ -140,13 +140,13 @@ def _from_message(message: Any, path: Path) -> Logged:
     stamp_s = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
     names = ("sequence", "skillset", "skill", "id", "state", "result", "message", "resource", "from_state", "to_state", "cause")
     value = {"stamp_s": stamp_s, "kind": _KINDS.get(message.kind), **{name: getattr(message, name) for name in names}}
-    value |= dict(_values(message, path))
+    value |= {"result_kind": getattr(message, "result_kind", "")} | dict(_values(message, path))
     return _event({**value, "life": message.header.frame_id}, str(path))
 
 
 def _values(message: Any, path: Path) -> Iterator[tuple[str, object]]:
-    for name in ("inputs", "outputs"):
-        text = getattr(message, f"{name}_json")
+    for name in ("inputs", "outputs", "unmet"):
+        text = getattr(message, f"{name}_json", "")  # older bags do not say what was unmet
         try:
             yield name, json.loads(text) if text else {}
         except (ValueError, RecursionError) as error:

@@ -15,12 +15,15 @@ from alula.model.execution_state import ExecutionState
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.tree import Places, places_in
 from alula.report.files import Problems, mapping
-from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, read_event
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, kind_record, read_event
 
 
 @dataclass(frozen=True)
 class PastExecution:
-    """A skill's execution from request to end; ``outcome`` is the last state seen, so RUNNING or REQUESTED if no end was."""
+    """A skill's execution from request to end; ``outcome`` is the last state seen, so RUNNING or REQUESTED if no end was.
+
+    ``result_kind`` is as in the record of an event.
+    """
 
     skillset: str
     skill: str
@@ -32,6 +35,7 @@ class PastExecution:
     outcome: str
     result: str
     message: str
+    result_kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -148,4 +152,5 @@ def _advance(execution: PastExecution, event: ExecutionEvent) -> PastExecution:
         outcome=event.state.value,
         result=event.result or execution.result,
         message=event.message or execution.message,
+        result_kind=kind_record(event.result_kind),
     )

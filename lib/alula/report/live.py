@@ -10,6 +10,7 @@ from alula.model.execution_state import ExecutionState
 from alula.records.conformance import Monitor
 from alula.records.run import departure
 from alula.report.deaths import read_deaths
+from alula.report.waits import read_waits
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 
@@ -29,24 +30,31 @@ def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: flo
 
 
 class LiveEvents:
-    """Follows ``skills.mcap`` and ``deaths.jsonl`` of a run's folder. A ``monitor`` is given each event, and what it finds is said."""
+    """Follows ``skills.mcap``, ``deaths.jsonl`` and ``waits.jsonl`` of a run's folder.
+
+    A ``monitor`` is given each event, and what it finds is said.
+    """
 
     def __init__(self, out: Path, say: Callable[[str], None], monitor: Monitor | None = None) -> None:
         self._record = RecordFollower(out / FILE)
-        self._deaths = out / "deaths.jsonl"
+        self._out = out
         self._say = say
         self._monitor = monitor
         self._begun_s: float | None = None
         self._lift_off_s: float | None = None
         self._departure = departure()
-        self._deaths_shown = 0
+        self._deaths_shown = self._waits_shown = 0
 
     def show_new(self) -> None:
         """Say what was written since the last call; what is written in part waits for the rest."""
         for entry in self._record.poll():
             if entry.topic == EVENTS:
                 self._show(entry.value)
-        deaths = read_deaths(self._deaths)
+        waits = list(read_waits(self._out))
+        for wait in waits[self._waits_shown :]:
+            self._say(f"waiting for {wait}")
+        self._waits_shown = len(waits)
+        deaths = read_deaths(self._out / "deaths.jsonl")
         for death in deaths[self._deaths_shown :]:
             self._say(death.sentence())
         self._deaths_shown = len(deaths)

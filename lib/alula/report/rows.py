@@ -9,7 +9,7 @@ from alula.report.phases import Phases
 
 
 class SkillSummary(TypedDict):
-    """One execution; ``outcome`` RUNNING or REQUESTED: its end was never seen."""
+    """One execution; ``outcome`` RUNNING or REQUESTED: its end was never seen. ``result_kind`` is as in the record of an event."""
 
     skillset: str
     skill: str
@@ -20,6 +20,7 @@ class SkillSummary(TypedDict):
     end_s: float | None
     outcome: str
     result: str
+    result_kind: str
     message: str
 
 
@@ -42,6 +43,7 @@ def skills(history: History, phases: Phases) -> list[SkillSummary]:
             end_s=phases.since(execution.end_s),
             outcome=execution.outcome,
             result=execution.result,
+            result_kind=execution.result_kind,
             message=execution.message,
         )
         for execution in history.executions

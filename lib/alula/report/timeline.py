@@ -10,8 +10,6 @@ from alula.report.recovery import Recovery
 from alula.report.rows import SkillSummary, skills
 from alula.runtime.core.events import TransitionEvent
 
-# The paper's notation does not tell good results from bad ones, the mission does; these names say it by themselves.
-FAILURE_WORDS = ("BLOCKED", "ABORT", "FAIL", "ERROR", "LOST", "TIMEOUT", "REFUSED", "DRIFT", "UNREACH", "STUCK", "REJECT", "INVALID")
 _COLOURS = {
     "RESOURCE_INVARIANT_VIOLATED": "violated",
     "INTERRUPTED": "interrupted",
@@ -26,7 +24,7 @@ _COLOURS = {
 
 
 class Bar(SkillSummary):
-    """An execution; ``ending`` is success, interrupted, violated, failure or running; ``until_s`` where its bar ends."""
+    """An execution; ``ending`` is success, ended, interrupted, violated, failure or running; ``until_s`` where its bar ends."""
 
     ending: str
     until_s: float
@@ -86,10 +84,10 @@ def make_timeline(history: History, phases: Phases, recovery: Recovery | None) -
     )
 
 
-def ending(outcome: str, result: str) -> str:
-    """Return how an execution ended, in five words."""
+def ending(outcome: str, result_kind: str) -> str:
+    """Return how an execution ended, in six words; ``ended``: by a result that is neither a success nor a failure, or not known as one."""
     if outcome == "TERMINATED":
-        return "failure" if any(word in result.upper() for word in FAILURE_WORDS) else "success"
+        return result_kind if result_kind in {"success", "failure"} else "ended"
     return _COLOURS.get(outcome, "failure")
 
 
@@ -98,7 +96,7 @@ def _skill_rows(executions: list[SkillSummary], end_s: float) -> list[SkillRow]:
     rows: dict[tuple[str, str], SkillRow] = {}
     for execution in executions:
         until_s = end_s if execution["end_s"] is None else execution["end_s"]
-        bar = Bar(**execution, ending=ending(execution["outcome"], execution["result"]), until_s=until_s)
+        bar = Bar(**execution, ending=ending(execution["outcome"], execution["result_kind"]), until_s=until_s)
         key = (execution["skillset"], execution["skill"])
         rows.setdefault(key, SkillRow(skillset=key[0], skill=key[1], bars=[]))["bars"].append(bar)
     skillsets = list(dict.fromkeys(row["skillset"] for row in rows.values()))

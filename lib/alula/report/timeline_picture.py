@@ -16,15 +16,23 @@ from matplotlib.ticker import MaxNLocator
 from alula.report.timeline import Bar, Mark, ResourceRow, SkillRow, Timeline
 
 # After Okabe and Ito (2008): told apart by the colour-blind and, with the hatching of a violation, in grey print too.
-COLOURS = {"success": "#2a9d78", "interrupted": "#a6a6a6", "violated": "#c8322b", "failure": "#f0a202", "running": "#4a90c4"}
+COLOURS = {
+    "success": "#2a9d78",
+    "ended": "#8aa59b",
+    "interrupted": "#a6a6a6",
+    "violated": "#c8322b",
+    "failure": "#f0a202",
+    "running": "#4a90c4",
+}
 MEANINGS = {
     "success": "ended by itself",
+    "ended": "ended, success unknown",
     "interrupted": "interrupted",
     "violated": "invariant violated",
     "failure": "failed or refused",
     "running": "still running",
 }
-TEXT_ON = {"success": "white", "interrupted": "black", "violated": "white", "failure": "black", "running": "white"}
+TEXT_ON = {"success": "white", "ended": "black", "interrupted": "black", "violated": "white", "failure": "black", "running": "white"}
 MARK_STYLES = {"failure": ("#c8322b", "-"), "detected": ("#7b2cbf", "--"), "fallback": ("#1d4e89", "-."), "moving": ("#2a6f4e", ":")}
 BAND_SHADES = ("#dfe5ec", "#8fa3ba", "#c3cede", "#6d87a3")
 ALARM_STATES = {"BROKEN", "LOST", "FAILED", "ERROR"}

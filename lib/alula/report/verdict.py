@@ -7,16 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from alula.report.deaths import DIED, Death
+from alula.report.ends import SIGNAL, Ended, read_end
+from alula.report.waits import read_waits
 
 MEANING = {
     "accomplished": "mission accomplished",
     "degraded": "mission accomplished in degraded mode",
     "given_up": "mission given up",
-    "aborted": "mission aborted by the operator",
+    "aborted": "mission aborted",
     "not_started": "the mission could not start",
     "running": "the mission's process ended before the mission did",
 }
 BY_EXIT_CODE = {0: "accomplished", 1: "given_up", 2: "not_started"}
+TOLD_TO_END = "told to end by "
+"""Begins the reason of a mission that a signal has ended: who sent it, it can't know."""
 PICTURES = ("report.html", "timeline.svg", "tree.svg", "map.png", "video.svg", "summary.json")
 
 
@@ -32,9 +36,21 @@ def landed(summary: Mapping[str, Any]) -> str:
     return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
 
 
-def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> str:
+def was_ended(summary: Mapping[str, Any]) -> bool:
+    """Tell whether the mission came to no end of its own."""
+    outcome = summary.get("outcome")
+    return outcome in {None, "running"} or (outcome == "aborted" and str(summary.get("reason")).startswith(TOLD_TO_END))
+
+
+def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, ended: Ended | None) -> str:
     """Return how the mission ended, in words; where its files are lost, by the exit code of its process, or by what died."""
     outcome, code, reason = summary.get("outcome"), summary.get("mission_exit"), summary.get("reason")
+    if outcome == "aborted" and ended is None and was_ended(summary):
+        ended = Ended(SIGNAL, str(reason))
+    if ended is not None and was_ended(summary):
+        return f"mission {ended.sentence()}"
+    if outcome == "aborted" and str(reason).startswith(outcome):  # as "aborted by the operator" of the page
+        return f"mission {reason}"
     if outcome is not None:
         return MEANING.get(str(outcome), f"outcome: {outcome}") + (f": {reason}" if reason else "")
     if code in BY_EXIT_CODE and all(death.respawned for death in died):  # else it may be the supervisor's
@@ -106,8 +122,12 @@ def conformance_lines(found: Mapping[str, Any]) -> list[str]:
 
 
 def verdict_lines(summary: Mapping[str, Any], died: Sequence[Death], out: Path) -> list[str]:
-    """Return the verdict, a line each."""
-    lines = ["", outcome_words(summary, died, out), *death_lines(died)]
+    """Return the verdict, a line each; who ended the run stands in its folder."""
+    ended = read_end(out)
+    lines = ["", outcome_words(summary, died, out, ended), *death_lines(died)]
+    if ended is not None and not was_ended(summary):
+        lines.append(f"  the run was {ended.sentence()}")
+    lines += [f"  it still waited for {wait}" for wait, over in read_waits(out).items() if not over]
     if summary.get("mock"):
         lines += mock_lines(summary)
     elif summary.get("landed") is not None or summary.get("distance_m") is not None:  # else nothing is known to have flown

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from alula.model.execution_state import ExecutionState
-from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
+from alula.model.unmet import Unmet
+from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent, kind_record, read_kind, read_unmet, unmet_record
 from alula.runtime.core.records import ExecutionRecord, ResourceStatus, SkillRecord
 from alula.runtime.core.replies import PauseReply, TransitionReply
-from alula.runtime.core.why import Unmet, Why
+from alula.runtime.core.why import Why
 from alula.runtime.middleware import EVENTS, RESOURCE_STATES, SKILL_STATES, PublishedEvent, ResourceStates, SkillStates, Topic, WhyReply
 from alula.runtime.plain import to_plain
 from alula.runtime.views import DataReading, Sample
@@ -129,6 +130,8 @@ def event_of(message: Any) -> EngineEvent:
         json.loads(message.inputs_json or "null"),
         json.loads(message.outputs_json or "{}"),
         message.skillset,
+        read_kind(message.result_kind),
+        read_unmet(json.loads(message.unmet_json or "null")),
     )
 
 
@@ -184,7 +187,9 @@ class Codecs:
         if isinstance(event, ExecutionEvent):
             message.kind = kind.EXECUTION
             message.skill, message.id, message.state = event.skill, event.id, event.state.value
-            message.result, message.message = event.result, event.message
+            message.result, message.result_kind, message.message = event.result, kind_record(event.result_kind), event.message
+            if event.unmet:
+                message.unmet_json = json.dumps(unmet_record(event.unmet))
             message.inputs_json = json.dumps(to_plain(event.inputs))
             if event.state.terminal:
                 message.outputs_json = json.dumps(to_plain(event.outputs))

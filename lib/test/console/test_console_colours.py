@@ -15,7 +15,7 @@ from alula.common.record import EVENTS
 from alula.console.page import PARTS
 
 LEAST = 4.5
-BARS = ("success", "interrupted", "violated", "failure", "running")
+BARS = ("success", "ended", "interrupted", "violated", "failure", "running")
 INKS = {
     "bar-ink": BARS,
     "band-ink": ("band-a", "band-b", "alarm"),

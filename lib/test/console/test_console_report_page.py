@@ -305,6 +305,25 @@ def test_a_tree_of_another_shape_replaces_the_first(browser: Any, tmp_path: Path
     assert "navigate" in page.text(".row .box")
 
 
+def test_how_an_execution_ended_is_what_its_event_says_and_not_what_its_name_sounds_like(browser: Any, tmp_path: Path) -> None:
+    told = [("UNBLOCKED", "success", "rover"), ("DONE", "failure", "rover"), ("FAILSAFE_OFF", "result", "rover")]
+    told += [("BLOCKED", "", "rover"), ("BLOCKED", "", "navigation"), ("ARRIVED", "", "navigation")]  # as older records do not say it
+    story: Story = []
+    for number, (name, kind, skillset) in enumerate(told):
+        end = execution(f"{skillset}.goto", "TERMINATED", number, result=name)
+        story.append((LIFT_OFF_S + number, EVENTS, {**end, "id": str(number), "result_kind": kind}))
+    page = Page(browser, make_story_report(tmp_path, story, {"outcome": "accomplished"}))
+    page.wait("alula.run.count > 0")
+    assert page.run("alula.run.moments.map((one) => [one.text.split(' (')[0], one.bad])") == [
+        ["rover.goto ended by itself", False],
+        ["rover.goto failed or was refused", True],
+        ["rover.goto ended, success unknown", False],
+        ["rover.goto ended, success unknown", False],
+        ["navigation.goto failed or was refused", True],
+        ["navigation.goto ended by itself", False],
+    ]
+
+
 def test_a_failure_is_credited_to_the_fault_that_the_summary_traces_it_to(browser: Any, tmp_path: Path) -> None:
     at = LIFT_OFF_S
     story: Story = [

@@ -25,7 +25,7 @@ from alula.model.model import (
     Skillset,
     Transition,
 )
-from alula.prove import bench, prove
+from alula.prove import bench, limits, prove
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
 GOTO = """
@@ -125,6 +125,13 @@ def test_the_vehicles_skillsets_are_proved():
     assert "`keep_sdk_authority` of takeoff is false and ends it" in findings[0].counterexample[-1]
 
 
+def test_a_long_search_says_what_it_is_doing(monkeypatch):
+    monkeypatch.setattr(limits, "EVERY_S", 0.0)
+    told = []
+    assert prove(bench.sparse(6), most=0, timeout_s=600, tell=told.append) == []
+    assert {line.split(";")[0] for line in told} == {"each block alone", "situations one by one", "situations as sets"}
+
+
 def test_the_benchmark_measures(capsys):
     assert bench.main(["--one", "neighbours", "6", "sets", "--timeout", "20"]) == 0
     row = json.loads(capsys.readouterr().out)
@@ -141,5 +148,7 @@ def test_the_benchmark_tells_each_line_and_writes_what_it_measured(capsys, tmp_p
         ("tools", "sets", 2, True),
         ("neighbours", "one by one", 2, True),
         ("neighbours", "sets", 2, True),
+        ("sparse", "one by one", 2, True),
+        ("sparse", "sets", 2, True),
     ]
-    assert len(capsys.readouterr().out.splitlines()) == 5
+    assert len(capsys.readouterr().out.splitlines()) == 7

@@ -14,7 +14,7 @@ from alula.language.paper import parse
 from alula.language.printer import print_skillset
 from alula.model.expressions import ResourceIs
 from alula.model.json_form import from_json, to_json
-from alula.model.model import Effect, Interrupt, Skill
+from alula.model.model import Effect, Interrupt, ResultKind, Skill
 
 SKILLSETS = next(parent / "skillsets" for parent in Path(__file__).resolve().parents if (parent / "skillsets").is_dir())
 MODELS = sorted((SKILLSETS / "uav").glob("*.skill"))
@@ -149,3 +149,9 @@ def test_a_broken_camera_breaks_the_invariant_zed_ok(robot):
     (lidar,) = perception.skill("lidar_depthmap").invariants
     assert (zed.name, zed.condition) == ("zed_ok", ResourceIs("zed_status", "OK"))
     assert (lidar.name, lidar.condition) == ("lidar_ok", ResourceIs("lidar_status", "OK"))
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_every_result_is_a_success_or_a_failure(path):
+    skills = check_file(path)[0].skills
+    assert [(skill.name, one.name) for skill in skills for one in skill.results if skill.kind_of(one.name) is ResultKind.PLAIN] == []

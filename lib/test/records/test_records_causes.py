@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -11,13 +12,17 @@ from alula.campaign.plan import MOCKS, Flight
 from alula.common.faults import parse_fault
 from alula.common.record import REPORTS, Entry
 from alula.model.execution_state import ExecutionState as S
+from alula.model.model import ResultKind
+from alula.model.unmet import Unmet
 from alula.records.causes.answers import answer_to_fault
+from alula.records.causes.failures import skill_failures
 from alula.records.causes.fault_file import reaches_of_robot
 from alula.records.causes.faults import Fault, faults_asked, trace
 from alula.records.causes.reach import Reaches
 from alula.records.causes.told_ends import with_told_ends
+from alula.records.kinds import with_kind
 from alula.records.tree import Places
-from alula.runtime.core.events import ExecutionEvent, TransitionEvent
+from alula.runtime.core.events import ExecutionEvent, TransitionEvent, event_record
 
 DRONE = reaches_of_robot()
 VIOLATED, TERMINATED, NOT_READY = S.RESOURCE_INVARIANT_VIOLATED, S.TERMINATED, S.NOT_READY
@@ -28,9 +33,12 @@ def change(at_s, name, source, target, cause="extern"):
     return TransitionEvent(0, round(at_s * 1e9), resource, source, target, cause, skillset)
 
 
-def end(at_s, name, state, result="", message="", number=1):
+def end(at_s, name, state, result="", message="", number=1, states=None):
+    """Return an end; of a result, a failure; ``states``: of the resources that an unmet condition asks."""
     skillset, skill = name.split(".")
-    return ExecutionEvent(0, round(at_s * 1e9), skill, f"{skill} {number}", state, result, message, {}, {}, skillset)
+    kind = ResultKind.FAILURE if state is TERMINATED else None
+    unmet = () if states is None else (Unmet(result, "", message, states, {}),)
+    return ExecutionEvent(0, round(at_s * 1e9), skill, f"{skill} {number}", state, result, message, {}, {}, skillset, kind, unmet)
 
 
 def started(at_s, name, number=1):
@@ -38,7 +46,7 @@ def started(at_s, name, number=1):
 
 
 def zed_breaks(at_s, number=1):
-    broken = end(at_s, "perception.zed_depthmap", VIOLATED, "zed_ok", "zed_ok: zed_status is BROKEN, after zed_status OK -> BROKEN", number)
+    broken = end(at_s, "perception.zed_depthmap", VIOLATED, "zed_ok", number=number, states={"zed_status": "BROKEN"})
     return [change(at_s, "perception.zed_status", "OK", "BROKEN"), broken]
 
 
@@ -64,7 +72,7 @@ def test_a_skill_that_fails_for_another_reason_after_a_fault_is_no_answer_to_it(
 
 def test_of_two_faults_each_has_the_failures_that_follow_from_its_own_resource():
     lidar = change(22.3, "perception.lidar_status", "OK", "BROKEN")
-    stopped = end(22.3, "perception.lidar_depthmap", VIOLATED, "lidar_ok", "lidar_ok: lidar_status is BROKEN, after ...")
+    stopped = end(22.3, "perception.lidar_depthmap", VIOLATED, "lidar_ok", states={"lidar_status": "BROKEN"})
     several = [("zed", 20.0, math.inf), ("lidar", 22.0, math.inf)]
     unused = change(20.3, "perception.zed_status", "OK", "BROKEN")
     assert told(several, unused, lidar, stopped) == [(20.3, []), (22.3, [22.3])]
@@ -79,8 +87,8 @@ def test_of_two_faults_of_one_sensor_the_failure_follows_from_the_one_that_holds
 
 
 def test_a_skill_that_is_refused_for_a_resource_fails_by_the_fault_that_broke_it():
-    refused = [end(41.0, "perception.lidar_depthmap", S.REQUESTED), end(41.0, "perception.lidar_depthmap", NOT_READY, "lidar_ready")]
-    refused[1] = end(41.0, "perception.lidar_depthmap", NOT_READY, "lidar_ready", "lidar_ready: lidar_status is BROKEN")
+    refused = [end(41.0, "perception.lidar_depthmap", S.REQUESTED)]
+    refused += [end(41.0, "perception.lidar_depthmap", NOT_READY, "lidar_ready", states={"lidar_status": "BROKEN"})]
     events = [change(10.3, "perception.lidar_status", "OK", "BROKEN"), *refused, *started(41.2, "navigation.hover")]
     (traced,) = trace(faults(("lidar", 10.0, math.inf)), events)
     answer, after_s = answer_to_fault(traced, events, Places())
@@ -95,7 +103,7 @@ def test_a_mapping_that_gets_no_scans_fails_by_the_lidar():
 
 def test_the_authority_is_lost_by_the_control_link_and_not_by_a_radio_that_fails_beside_it():
     lost = change(10.7, "navigation.SDK_authority", "AVAILABLE", "UNAVAILABLE")
-    stopped = end(10.7, "navigation.hover", VIOLATED, "keep_sdk_authority", "keep_sdk_authority: SDK_authority is UNAVAILABLE, after ...")
+    stopped = end(10.7, "navigation.hover", VIOLATED, "keep_sdk_authority", states={"SDK_authority": "UNAVAILABLE"})
     assert told([("control", 5.7, 33.0), ("radio", 6.5, math.inf)], lost, stopped) == [(10.7, [10.7]), (None, [])]
     assert told([("radio", 6.5, math.inf)], lost, stopped) == [(10.7, [10.7])], "the control link is a radio link, too"
 
@@ -147,6 +155,26 @@ def test_the_end_of_an_execution_whose_managers_have_gone_is_what_the_mission_wa
     assert (told.stamp_s, told.skillset, told.skill, told.state) == (30.0, "perception", "zed_depthmap", S.FAILED)
     (traced,) = trace([Fault("perception", 29.5, reach=DRONE.of("perception"))], known)
     assert (traced.detected_s, [one.end for one in traced.failures]) == (30.0, [told])
+
+
+def test_messages_name_no_causes():
+    taken, broken = change(30.0, "perception.lidar_status", "OK", "BROKEN"), change(30.2, "perception.zed_status", "OK", "BROKEN")
+    said = "zed_ok: zed_status is BROKEN; skill f, effect g: resource lidar_status is BROKEN and has no transition BROKEN -> OK"
+    ended = end(30.2, "perception.zed_depthmap", VIOLATED, "zed_ok", said, states={"zed_status": "BROKEN"})
+    assert [failure.behind for failure in skill_failures([broken, taken, ended])] == [(0,)]
+    silent = end(30.2, "perception.zed_depthmap", VIOLATED, "zed_ok", said)
+    assert [failure.behind for failure in skill_failures([broken, taken, silent])] == [()], "a record that does not say it"
+
+
+def test_kinds_of_results_that_a_record_does_not_say_are_those_of_the_model():
+    ended = [("goto", "BLOCKED"), ("goto", "ARRIVED"), ("lock_head", "UNLOCKED"), ("goto", "?"), ("fly", "BLOCKED")]
+    events = [ExecutionEvent(0, 0, skill, "1", TERMINATED, result, "", {}, {}, "navigation") for skill, result in ended]
+    events += [ExecutionEvent(0, 0, "goto", "1", TERMINATED, "BLOCKED", "", {}, {}, "rover")]
+    failure, success = ResultKind.FAILURE, ResultKind.SUCCESS
+    assert [event.result_kind for event in with_told_ends(events, [])] == [failure, success, failure, None, None, None]
+    assert [with_kind(event_record(event))["result_kind"] for event in events] == ["failure", "success", "failure", "", "", ""]
+    said = replace(events[0], result_kind=ResultKind.PLAIN)
+    assert with_told_ends([said], []) == [said], "what a record says counts"
 
 
 def test_a_robot_without_a_file_has_the_rule_by_names(monkeypatch, tmp_path):

@@ -51,7 +51,9 @@ def bag(path, events, storage):
             topic = topics.setdefault(event.skillset, None) or writer.add_connection(f"/{event.skillset}/events", MESSAGE, typestore=store)
             topics[event.skillset] = topic
             told = event_record(event)
-            fields = {name: told.get(name, "") for name in ("skillset", "skill", "id", "state", "result", "message", "resource")}
+            fields = {
+                name: told.get(name, "") for name in ("skillset", "skill", "id", "state", "result", "result_kind", "message", "resource")
+            }
             fields |= {name: told.get(name, "") for name in ("from_state", "to_state", "cause")}
             stamp = time(sec=event.stamp_ns // 10**9, nanosec=event.stamp_ns % 10**9)
             whole = message(
@@ -60,6 +62,7 @@ def bag(path, events, storage):
                 kind=int(told["kind"] == "TRANSITION"),
                 inputs_json=json.dumps(told.get("inputs", {})),
                 outputs_json="",
+                unmet_json=json.dumps(told["unmet"]) if told.get("unmet") else "",
                 EXECUTION=0,
                 TRANSITION=1,
                 **fields,

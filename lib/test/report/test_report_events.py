@@ -16,6 +16,8 @@ from alula.common.record import EVENTS, FILE, RecordError, RecordWriter
 from alula.model.execution_state import ExecutionState
 from alula.report.files import Problems
 from alula.report.history import fold, gaps, in_order, read_history
+from alula.report.phases import Phases
+from alula.report.timeline import make_timeline
 from alula.runtime.core.events import TransitionEvent, event_record, read_event
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -170,3 +172,12 @@ def test_any_interleaving_folds_to_the_same_executions(drawn):
         assert execution.running_s == stamps[k].get("RUNNING")
         assert execution.end_s == (stamps[k][chosen[k][-1]] if chosen[k][-1] in TERMINAL_STATES else None)
     assert [e.start_s for e in history.executions] == sorted(e.start_s for e in history.executions)
+
+
+@pytest.mark.parametrize("name", ["UNLOCKED", "BLOCKING", "UNBLOCKED", "FAILSAFE_OFF", "ABORTED", "ARRIVED"])
+@pytest.mark.parametrize(("kind", "shown"), [("success", "success"), ("failure", "failure"), ("result", "ended"), ("", "ended")])
+def test_the_timeline_shows_how_an_execution_ended_as_its_event_says_it(name, kind, shown):
+    events = [started(), started(sequence=3, state="TERMINATED", result=name, result_kind=kind)]
+    phases = Phases()
+    timeline = make_timeline(fold([read_event(event) for event in events], Problems()), phases, None)
+    assert [(bar["result"], bar["ending"]) for row in timeline["skills"] for bar in row["bars"]] == [(name, shown)]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import signal
 from pathlib import Path
 
 import pytest
 
 from alula.report.deaths import Death
+from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, Ended, ended_by_signal, note_end, read_end
 from alula.report.verdict import verdict_lines
 
 LATER = {"detected_s": 40.5, "fallback_running_s": None, "moving_again_s": None}
@@ -68,6 +71,61 @@ def test_a_flight_that_left_no_outcome_still_tells_what_flew() -> None:
     lines = verdict_lines(summary, [Death("mission", "signal SIGKILL", 12.0)], OUT)
     assert lines[1] == "the mission came to no outcome: mission died; /runs/one/logs tells why"
     assert lines[3].startswith("  landed: no, duration 12.0 s")
+
+
+SIGINT, SIGTERM = "told to end by SIGINT", "told to end by SIGTERM"
+NO_CLOCK = "the mission clock did not begin within 120 s: nothing came from ArduPilot on UDP 9002"
+
+
+@pytest.mark.parametrize(
+    ("outcome", "reason", "ended", "told"),
+    [
+        ("aborted", SIGINT, Ended(SUPERVISOR, NO_CLOCK), f"mission ended by the supervisor: {NO_CLOCK}"),
+        ("aborted", SIGINT, Ended(OPERATOR, "Ctrl-C"), "mission aborted by the operator: Ctrl-C"),
+        ("aborted", SIGINT, Ended(SIGNAL, "SIGTERM to ./alula fly"), "mission aborted from outside: SIGTERM to ./alula fly"),
+        ("aborted", SIGTERM, None, "mission aborted from outside: told to end by SIGTERM"),
+        ("aborted", "aborted by the operator", None, "mission aborted by the operator"),
+        ("aborted", "the tree raised ValueError: x", None, "mission aborted: the tree raised ValueError: x"),
+        (None, None, Ended(SUPERVISOR, "uav_simulator died"), "mission ended by the supervisor: uav_simulator died"),
+        ("running", None, Ended(FRONT, "the supervisor died"), "mission ended by the front: the supervisor died"),
+    ],
+)
+def test_whoever_ends_a_mission_is_told_by_name(outcome: str | None, reason: str | None, ended: Ended | None, told: str, tmp_path: Path):
+    if ended is not None:
+        note_end(tmp_path, ended)
+        note_end(tmp_path, Ended(OPERATOR, "who came later"))
+    lines = verdict_lines({"outcome": outcome, "reason": reason, "mission_exit": 1, "landed": None}, [], tmp_path)
+    assert lines == ["", told]
+
+
+def test_a_mission_that_had_come_to_its_end_keeps_its_outcome(tmp_path: Path) -> None:
+    note_end(tmp_path, Ended(OPERATOR, "Ctrl-C"))
+    lines = verdict_lines({"outcome": "accomplished", "landed": None}, [], tmp_path)
+    assert lines == ["", "mission accomplished", "  the run was aborted by the operator: Ctrl-C"]
+
+
+def test_what_a_run_still_waited_for_at_its_end_is_told(tmp_path: Path) -> None:
+    waits = [
+        {"for": "ArduPilot on UDP 9002", "over": False},
+        {"for": "the autopilot", "over": False},
+        {"for": "the autopilot", "over": True},
+    ]
+    (tmp_path / "waits.jsonl").write_text("".join(json.dumps(wait) + "\n" for wait in waits) + '{"for": "cut', encoding="utf-8")
+    lines = verdict_lines({"outcome": "not_started", "reason": "the mission clock stands still", "landed": None}, [], tmp_path)
+    assert lines[1:] == ["the mission could not start: the mission clock stands still", "  it still waited for ArduPilot on UDP 9002"]
+
+
+def test_a_folder_that_is_gone_or_holds_nonsense_ends_nothing_else(tmp_path: Path) -> None:
+    note_end(tmp_path / "gone", Ended(OPERATOR, "Ctrl-C"))
+    assert read_end(tmp_path / "gone") is None
+    for nonsense in ("", "[]", '{"by": 1}', '{"who": "x"}'):
+        (tmp_path / "ended.json").write_text(nonsense, encoding="utf-8")
+        assert read_end(tmp_path) is None
+
+
+def test_a_signal_to_the_command_is_the_operators_when_it_is_ctrl_c() -> None:
+    assert ended_by_signal(signal.SIGINT) == Ended(OPERATOR, "Ctrl-C")
+    assert ended_by_signal(signal.SIGHUP) == Ended(SIGNAL, "SIGHUP to ./alula fly")
 
 
 def test_an_outcome_is_told_with_its_reason() -> None:

@@ -151,6 +151,8 @@ def test_records_are_those_of_the_event_messages():
         "id": "000000000001",
         "state": "REQUESTED",
         "result": "",
+        "result_kind": "",
+        "unmet": [],
         "message": "",
         "inputs": {"height": 3.0},
         "outputs": {},

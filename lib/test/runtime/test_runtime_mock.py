@@ -61,7 +61,7 @@ def test_without_a_script_a_skill_ends_with_its_first_good_result_after_a_second
 @pytest.mark.parametrize(
     ("results", "wanted"),
     [
-        ((Result("ABORTED"), Result("ARRIVED")), "ARRIVED"),
+        ((Result("UNLOCKED"), Result("ARRIVED")), "UNLOCKED"),
         ((Result("ARRIVED"), Result("well", ResultKind.SUCCESS)), "well"),
         ((Result("bad", ResultKind.FAILURE), Result("LOST")), ""),
         ((), ""),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import queue
 
 import pytest
@@ -9,7 +10,8 @@ from runtime_models import AXES_FREE, RELEASE, SDK, Bench, flying_skill, flying_
 
 from alula.model.execution_state import ExecutionState
 from alula.model.expressions import And, Comparison, DataIs, Not
-from alula.model.model import Assignment, Data, Effect, Invariant, Precondition
+from alula.model.model import Assignment, Data, Effect, Invariant, Precondition, Result, ResultKind
+from alula.runtime.core.events import ExecutionEvent, event_record, read_event
 from alula.runtime.managers import services
 
 S = ExecutionState
@@ -120,3 +122,87 @@ def test_a_hook_that_stays_silent_is_answered_for_and_its_late_answer_is_dropped
     quick("and again")
     assert told.get(timeout=10.0) == "at once"
     assert told.empty()
+
+
+# --- in the events ------------------------------------------------------------------------------------------------------
+
+
+def last(bench: Bench) -> ExecutionEvent:
+    """Return the last event of an execution, as it is read again from its record."""
+    event = next(event for event in reversed(bench.events) if isinstance(event, ExecutionEvent))
+    told = read_event(json.loads(json.dumps(event_record(event))))
+    assert (told.unmet, told.result_kind) == (event.unmet, event.result_kind)
+    return told
+
+
+def test_a_refusal_tells_what_was_unmet_as_values_and_its_message_is_made_of_them():
+    bench = Bench(authority=False)
+    bench.run()
+    (unmet,) = last(bench).unmet
+    found = (unmet.name, unmet.condition, unmet.states, unmet.data)
+    assert found == ("sdk_authority", "sdk == AVAILABLE", {"sdk": "UNAVAILABLE"}, {})
+    assert (last(bench).result, last(bench).message) == (unmet.name, unmet.reason)
+    assert unmet == bench.engine.why("takeoff").unmet[0]
+
+
+def test_a_start_effect_that_is_no_transition_is_told_as_a_value():
+    bench = Bench(flying_skillset(flying_skill("takeoff", preconditions=(), start=FORBIDDEN)))
+    bench.run()
+    (unmet,) = last(bench).unmet
+    assert (unmet.name, unmet.condition, unmet.states) == ("start effect", "sdk -> UNAVAILABLE", {"sdk": "AVAILABLE"})
+    assert last(bench).message == unmet.reason
+    assert bench.engine.why("takeoff").unmet == (unmet,)
+
+
+def test_a_violation_tells_the_states_that_broke_the_invariant_and_not_those_after_its_effect():
+    free = Invariant("free", And((SDK, AXES_FREE)), RELEASE)
+    bench = Bench(flying_skillset(flying_skill("takeoff", invariants=(free,))))
+    bench.run()
+    (unmet,) = last(bench).unmet
+    assert (unmet.name, unmet.states) == ("free", {"sdk": "AVAILABLE", "axes": "USED"})
+    assert bench.engine.why("takeoff").unmet == (unmet,)
+    assert bench.states()["axes"] == "AVAILABLE"
+    assert last(bench).message == f"{unmet.reason}, after axes AVAILABLE -> USED (takeoff {last(bench).id} take_control)"
+
+
+def test_a_value_that_broke_an_invariant_is_told_and_one_that_is_not_fresh_is_none():
+    charged = Invariant("charged", DataIs("battery", ("level",), Comparison.GE, 20, "%"), RELEASE)
+    model = flying_skillset(flying_skill("takeoff", invariants=(charged,)), data=(Data("battery", "Battery"),))
+    for value, found in ((type("Battery", (), {"level": 0.1}), 0.1), (None, None)):
+        bench = Bench(model)
+        bench.engine.update_data("battery", type("Battery", (), {"level": 0.5}))
+        bench.run()
+        bench.engine.update_data("battery", value)
+        assert last(bench).state is S.RESOURCE_INVARIANT_VIOLATED
+        assert [one.data for one in last(bench).unmet] == [{"battery.level": found}]
+
+
+def test_an_end_by_a_result_tells_its_kind_and_no_other_state_does():
+    results = (Result("UNLOCKED", ResultKind.SUCCESS), Result("DONE", ResultKind.FAILURE), Result("ARRIVED"))
+    told = {}
+    for result in results:
+        bench = Bench(flying_skillset(flying_skill("takeoff", results=results)))
+        bench.run().terminate(result.name)
+        told[result.name] = [(one.state.value, one.result_kind) for one in bench.events if isinstance(one, ExecutionEvent)]
+        assert last(bench).failed == (result.kind is ResultKind.FAILURE)
+    begun = [("REQUESTED", None), ("RUNNING", None)]
+    assert told == {result.name: [*begun, ("TERMINATED", result.kind)] for result in results}
+
+
+def test_a_record_that_does_not_say_them_is_read_without():
+    bench = Bench()
+    bench.run().terminate("DONE")
+    record = event_record(bench.events[-1])
+    older = read_event({name: value for name, value in record.items() if name not in {"result_kind", "unmet"}})
+    assert (older.result_kind, older.unmet, older.failed) == (None, (), False)
+
+
+WRONG = [{"unmet": [{"name": "a"}]}, {"unmet": 3}, {"unmet": [3]}, {"result_kind": "good"}, {"result_kind": ["success"]}]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_record_with_what_is_no_kind_and_not_unmet_is_refused(wrong):
+    bench = Bench()
+    bench.run().terminate("DONE")
+    with pytest.raises(ValueError, match=r"no condition|not iterable|not subscriptable|is not a valid ResultKind"):
+        read_event({**event_record(bench.events[-1]), **wrong})

@@ -73,7 +73,9 @@ def failing_flight() -> Log:
     log.change(-3.0, "perception.zed_status", "UNKNOWN", "OK")
     log.change(-3.0, "perception.lidar_status", "UNKNOWN", "OK")
     log.change(30.25, "perception.zed_status", "OK", "BROKEN")
-    log.skill(30.25, "perception.zed_depthmap", "z1", "RESOURCE_INVARIANT_VIOLATED", result="zed_works", message="zed_status is BROKEN")
+    unmet = {"name": "zed_works", "condition": "zed_status == OK", "reason": "", "states": {"zed_status": "BROKEN"}, "data": {}}
+    violated = {"result": "zed_works", "message": "zed_status is BROKEN", "unmet": [unmet]}
+    log.skill(30.25, "perception.zed_depthmap", "z1", "RESOURCE_INVARIANT_VIOLATED", **violated)
     log.skill(30.4, "perception.lidar_depthmap", "l1", "REQUESTED")
     log.skill(30.45, "perception.lidar_depthmap", "l1", "RUNNING")
     begin_s = 30.5

@@ -162,7 +162,7 @@ function foldExecution(run, t, value) {
   }
   const execution = run.executions.get(key);
   if (execution.end !== null) return; // the first end counts
-  Object.assign(execution, { state: value.state, result: value.result || execution.result, message: value.message || execution.message });
+  Object.assign(execution, { state: value.state, result: value.result || execution.result, result_kind: value.result_kind, message: value.message || execution.message });
   if (value.state === "RUNNING" && execution.running === null) execution.running = t;
   if (TERMINAL.has(value.state)) Object.assign(execution, { end: t, outputs: value.outputs ?? {} });
   if (value.state === "RUNNING") moment(run, t, "skill", `${value.skillset}.${value.skill} runs`);
@@ -239,20 +239,19 @@ const outgrown = (run, end) => run.end - end > 0.002 * (run.end - run.begin);
 
 // --- what follows from it ------------------------------------------------------------------------------------------------
 
-// The paper's notation does not tell good results from bad ones; these names say it by themselves.
-const FAILURE_WORDS = /BLOCKED|ABORT|FAIL|ERROR|LOST|TIMEOUT|REFUSED|DRIFT|UNREACH|STUCK|REJECT|INVALID/;
 const ENDINGS = {
   running: { words: "runs", mark: "…" },
   success: { words: "ended by itself", mark: "✓" },
+  ended: { words: "ended, success unknown", mark: "·" },
   interrupted: { words: "was interrupted", mark: "◦" },
   violated: { words: "invariant violated", mark: "✗" },
   failure: { words: "failed or was refused", mark: "!" },
 };
 
-/** How an execution ended, in one of the five words above. */
-function endingOf({ state, result }) {
+/** How an execution ended, in one of the six words above. */
+function endingOf({ state, result_kind: kind }) {
   if (!TERMINAL.has(state)) return "running";
-  if (state === "TERMINATED") return FAILURE_WORDS.test(result.toUpperCase()) ? "failure" : "success";
+  if (state === "TERMINATED") return kind === "success" || kind === "failure" ? kind : "ended";
   return { RESOURCE_INVARIANT_VIOLATED: "violated", INTERRUPTED: "interrupted" }[state] ?? "failure";
 }
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alula.model.execution_state import ExecutionState as S
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
-from alula.runtime.mock.behaviour import UNHAPPY_WORDS
-
-_UNMET = frozenset({S.RESOURCE_INVARIANT_VIOLATED, S.NOT_READY})
-_BAD_ENDS = _UNMET | {S.NOT_VALIDATED, S.FAILED}
 
 
 @dataclass(frozen=True)
@@ -22,8 +17,9 @@ class SkillFailure:
         at: its place in the run's events.
         end: the event of its end.
         asked_s: when it was asked for, seconds of mission clock.
-        behind: the places of the changes that it follows from, the newest first: a condition on resources was not met, and its message
-            names their states; of an invariant, the change that violated it. Empty where something else ended the execution.
+        behind: the places of the changes that it follows from, the newest first: of the resources whose states were not as a condition
+            needs them; of an invariant, the change that violated it. Empty where something else ended the execution, and where the record
+            does not say what was unmet.
     """
 
     at: int
@@ -44,21 +40,14 @@ def skill_failures(events: Sequence[EngineEvent]) -> list[SkillFailure]:
             continue
         key = (event.skillset, event.id)
         asked_s.setdefault(key, event.stamp_s)
-        if ended_badly(event):
+        if event.failed:
             places = {(resource, to_state): place for resource, (to_state, place) in own.items()}
-            behind = sorted({places[named] for named in _states_named(event) if named in places}, reverse=True)
+            behind = sorted({places[found] for found in _states_found(event) if found in places}, reverse=True)
             newest = 1 if event.state is S.RESOURCE_INVARIANT_VIOLATED else None  # what it was violated by
             found.append(SkillFailure(at, event, asked_s[key], tuple(behind[:newest])))
     return found
 
 
-def _states_named(event: ExecutionEvent) -> list[tuple[str, str]]:
-    """Return the resources and states that did not meet a condition, as the managers' messages name them: ``zed_status is BROKEN``."""
-    return re.findall(r"(\w+) is (\w+)", event.message) if event.state in _UNMET else []
-
-
-def ended_badly(event: ExecutionEvent) -> bool:
-    """Tell whether an event is the end of an execution that failed; of results, a name that says so counts."""
-    if event.state is S.TERMINATED:
-        return any(word in event.result.upper() for word in UNHAPPY_WORDS)
-    return event.state in _BAD_ENDS
+def _states_found(event: ExecutionEvent) -> list[tuple[str, str]]:
+    """Return the resources that unmet conditions ask, each with the state that it was in."""
+    return [found for one in event.unmet for found in one.states.items()]

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from alula.common.record import REPORTS, Entry
 from alula.model.execution_state import ExecutionState
+from alula.records.kinds import with_kinds
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 
 ENDS = frozenset(state.value for state in ExecutionState if state.terminal)
@@ -13,6 +14,8 @@ ENDS = frozenset(state.value for state in ExecutionState if state.terminal)
 
 def with_told_ends(events: Sequence[EngineEvent], entries: Iterable[Entry]) -> list[EngineEvent]:
     """Return a run's events, and the ends that no event tells but the reports to the mission do, in the order of time.
+
+    Kinds of results that are not told are those of the robot's model.
 
     Args:
         events: of all skillsets.
@@ -29,7 +32,7 @@ def with_told_ends(events: Sequence[EngineEvent], entries: Iterable[Entry]) -> l
         if begun is not None and entry.value.get("state") in ENDS:
             del open_[begun.skillset, begun.id]
             ends.append(_end(begun, entry))
-    return sorted([*events, *ends], key=lambda event: event.stamp_ns) if ends else list(events)
+    return with_kinds(sorted([*events, *ends], key=lambda event: event.stamp_ns) if ends else events)
 
 
 def _end(begun: ExecutionEvent, entry: Entry) -> ExecutionEvent:

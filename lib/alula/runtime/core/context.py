@@ -153,6 +153,7 @@ class ExecutionContext:
 
     def _entered(self, execution: Execution) -> ExecutionEvent:
         self.sequence += 1
+        terminated = execution.state is ExecutionState.TERMINATED
         return ExecutionEvent(
             sequence=self.sequence,
             stamp_ns=self._clock_ns(),
@@ -164,6 +165,8 @@ class ExecutionContext:
             inputs=execution.inputs,
             outputs=dict(execution.outputs),
             skillset=self._skillset.name,
+            result_kind=self._skillset.skill(execution.skill).kind_of(execution.result) if terminated else None,
+            unmet=execution.unmet,
         )
 
 
@@ -171,6 +174,7 @@ def _set_state(execution: Execution, entered: Entered) -> None:
     """Write the state last: a reader that sees the end of the execution sees its reason."""
     execution.result = entered.result
     execution.message = entered.message
+    execution.unmet = entered.unmet
     execution.state = entered.state
 
 

@@ -7,16 +7,24 @@ from dataclasses import dataclass
 from typing import Any
 
 from alula.model.execution_state import ExecutionState
+from alula.model.model import ResultKind
+from alula.model.unmet import Unmet
 from alula.runtime.plain import to_plain
 
 NANOSECONDS = 1e9
 EXECUTION = "EXECUTION"
 TRANSITION = "TRANSITION"
+_FAILED = frozenset(
+    {ExecutionState.NOT_VALIDATED, ExecutionState.NOT_READY, ExecutionState.RESOURCE_INVARIANT_VIOLATED, ExecutionState.FAILED}
+)
 
 
 @dataclass(frozen=True)
 class ExecutionEvent:
-    """An execution entered ``state``; ``result`` is as in ``Execution``. ``stamp_ns`` is mission clock."""
+    """An execution entered ``state``; ``result`` and ``unmet`` are as in ``Execution``. ``stamp_ns`` is mission clock.
+
+    ``result_kind`` is that of the result when TERMINATED (see ``Skill.kind_of``), else None; also where a record does not say it.
+    """
 
     sequence: int
     stamp_ns: int
@@ -28,11 +36,18 @@ class ExecutionEvent:
     inputs: object
     outputs: Mapping[str, object]
     skillset: str = ""
+    result_kind: ResultKind | None = None
+    unmet: tuple[Unmet, ...] = ()
 
     @property
     def stamp_s(self) -> float:
         """Seconds of mission clock."""
         return self.stamp_ns / NANOSECONDS
+
+    @property
+    def failed(self) -> bool:
+        """Tell whether it is the end of an execution that failed: by a failure of the model, a violation, a refusal or an error."""
+        return self.result_kind is ResultKind.FAILURE if self.state is ExecutionState.TERMINATED else self.state in _FAILED
 
 
 @dataclass(frozen=True)
@@ -66,10 +81,40 @@ def event_record(event: EngineEvent) -> dict[str, object]:
     record: dict[str, object] = {"stamp_s": event.stamp_s, "sequence": event.sequence, "skillset": event.skillset}
     if isinstance(event, ExecutionEvent):
         record |= {"kind": EXECUTION, "skill": event.skill, "id": event.id, "state": event.state.value}
-        record |= {"result": event.result, "message": event.message, "inputs": to_plain(event.inputs)}
+        record |= {"result": event.result, "result_kind": kind_record(event.result_kind), "unmet": unmet_record(event.unmet)}
+        record |= {"message": event.message, "inputs": to_plain(event.inputs)}
         return {**record, "outputs": to_plain(event.outputs) if event.state.terminal else {}}
     record |= {"kind": TRANSITION, "resource": event.resource, "from_state": event.from_state, "to_state": event.to_state}
     return {**record, "cause": event.cause}
+
+
+def kind_record(kind: ResultKind | None) -> str:
+    """Return the kind of a result in a record, "" for none."""
+    return "" if kind is None else kind.value
+
+
+def read_kind(record: object) -> ResultKind | None:
+    """Return the kind of a result, None where a record does not say it; raises ValueError."""
+    return ResultKind(record) if record else None
+
+
+def unmet_record(unmet: Sequence[Unmet]) -> list[dict[str, object]]:
+    """Return what was unmet as ``json`` can write it: objects with the fields of ``Unmet``."""
+    return [to_plain(one) for one in unmet]
+
+
+def read_unmet(record: Any) -> tuple[Unmet, ...]:
+    """Return what was unmet; raises KeyError, TypeError or ValueError."""
+    return tuple(
+        Unmet(
+            name=str(one["name"]),
+            condition=str(one["condition"]),
+            reason=str(one["reason"]),
+            states={name: str(state) for name, state in dict(one["states"]).items()},
+            data=dict(one["data"]),
+        )
+        for one in record or ()
+    )
 
 
 def read_event(record: Mapping[str, Any]) -> EngineEvent:
@@ -105,6 +150,8 @@ def _execution_of(record: Mapping[str, Any], sequence: int, stamp_ns: int, skill
         inputs=record.get("inputs") or {},
         outputs=record.get("outputs") or {},
         skillset=skillset,
+        result_kind=read_kind(record.get("result_kind")),
+        unmet=read_unmet(record.get("unmet")),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from alula.model.execution_state import ExecutionState
+from alula.model.unmet import Unmet
 
 
 class Controller(Protocol):
@@ -32,7 +33,8 @@ class Execution:
     """One execution of a skill. Its attributes are written by the engine only, and read from any thread.
 
     ``result`` is the result's name in the model when TERMINATED, the precondition's when NOT_READY, the invariant's when
-    RESOURCE_INVARIANT_VIOLATED, else empty.
+    RESOURCE_INVARIANT_VIOLATED, else empty. ``unmet`` is what was not as the skill needs it when it was refused as NOT_READY or ended by
+    an invariant.
     """
 
     def __init__(self, controller: Controller, execution_id: str, skill: str, inputs: object) -> None:
@@ -43,6 +45,7 @@ class Execution:
         self.state = ExecutionState.REQUESTED
         self.result = ""
         self.message = ""
+        self.unmet: tuple[Unmet, ...] = ()
         self.outputs: dict[str, object] = {}
         self.progress = 0.0
 

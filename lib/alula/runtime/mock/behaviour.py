@@ -19,8 +19,6 @@ Value = Formula | float | str | bool | Callable[..., object]
 """A constant, a formula, or (in tests) a function of the names, ``f(names) -> value``."""
 
 DEFAULT_DELAY_S = 1.0
-UNHAPPY_WORDS = ("ABORT", "BLOCK", "DRIFT", "ERROR", "FAIL", "INVALID", "LOST", "REFUSE", "REJECT", "STUCK", "TIMEOUT", "UNLOCK", "UNREACH")
-"""The paper's notation does not tell success from failure; a result with such a word is not what a mock does by itself."""
 
 Place = tuple[str, str]
 """Skillset and name of a resource, a skill or a data."""
@@ -166,13 +164,11 @@ class Behaviour:
 
 
 def default_script(skill: Skill) -> Script:
-    """Return what a mock does without a rule: the first result that means success, after a second; else it runs until it is stopped.
+    """Return what a mock does without a rule: the first result that is a success, after a second; else it runs until it is stopped.
 
     The progress rises evenly; of a skill that does not end by itself it is 1 at once.
     """
-    wanted = [result.name for result in skill.results if result.kind is ResultKind.SUCCESS]
-    plain = [result.name for result in skill.results if result.kind is ResultKind.PLAIN]
-    wanted += [name for name in plain if not any(word in name.upper() for word in UNHAPPY_WORDS)]
+    wanted = [result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.SUCCESS]
     return Script(
         delay=DEFAULT_DELAY_S,
         ending=Ending(results=((wanted[0], 1.0),)) if wanted else NEVER,

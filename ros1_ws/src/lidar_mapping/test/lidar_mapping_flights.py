@@ -166,6 +166,16 @@ class Following:
         return np.sqrt(np.trace(self.covariance[:, :3, :3], axis1=1, axis2=2))
 
     @property
+    def height_m(self) -> float:
+        """The largest error of the height."""
+        return float(np.abs(self.off_m[:, 2]).max())
+
+    @property
+    def tilt_deg(self) -> float:
+        """The root mean square of the attitude's error but for the heading."""
+        return math.degrees(math.sqrt(np.mean(np.sum(self.turned_rad[:, :2] ** 2, axis=1))))
+
+    @property
     def heading(self) -> tuple[float, float]:
         """The root mean square of the heading's error, degrees, and the mean square in units of the stated variance."""
         squared = self.turned_rad[:, 2] ** 2
@@ -175,7 +185,8 @@ class Following:
         heading_deg, heading_nees = self.heading
         return (
             f"way {self.way_m[-1]:5.1f} end {self.distance_m[-1]:.3f} rms {np.sqrt(np.mean(self.distance_m**2)):.3f} "
-            f"max {self.distance_m.max():.3f} sigma end {self.sigma_m[-1]:.3f} max {self.sigma_m.max():.3f} "
+            f"max {self.distance_m.max():.3f} height {self.height_m:.3f} tilt {self.tilt_deg:.2f} "
+            f"sigma end {self.sigma_m[-1]:.3f} max {self.sigma_m.max():.3f} "
             f"nees {self.nees[5:].mean():5.2f} ratio {self.ratio[5:].mean():5.2f} heading {heading_deg:.2f} nees {heading_nees:5.2f} "
             f"map {self.map_rmse_m:.4f} loops {self.slam.loops} "
             f"rejected {self.slam.count.rejected} cpu {1e3 * self.cpu_s.mean():.0f} ms p95 {1e3 * np.percentile(self.cpu_s, 95):.0f}"

@@ -77,16 +77,17 @@ class Path:
         near = (range_m < self._reach_m) & (np.abs(seen[:, 0]) <= self._across * range_m)
         return Sweep(round(start_s * NS), seen[near].astype(np.float32), times[near].astype(np.float32))
 
-    def autopilot(self, end_s, *, drift=0.0, jump_m=0.0, jump_s=np.inf, turned=lambda _t: np.zeros(3)):
+    def autopilot(self, end_s, *, drift=0.0, jump_m=0.0, jump_s=np.inf, raised=lambda _t: 0.0, turned=lambda _t: np.zeros(3)):
         """What the autopilot tells of the last sweep's time: the pose, its position wrong by ``drift`` of the way from the start.
 
-        Its attitude is wrong by the rotation vector ``turned(t)``, map frame, radians.
+        Its height is wrong by ``raised(t)``. Its attitude is wrong by the rotation vector ``turned(t)``, map frame, radians.
         """
         poses = PoseBuffer(keep_s=60.0)
         for t in np.arange(max(0.0, end_s - 0.12), end_s + 0.03, 0.02):  # a sweep's time, and a pose before and after
             pose = self.pose(t)
             start = self.position(0.0)
             given = start + (1.0 + drift) * (pose[:3, 3] - start) + (jump_m if t >= jump_s else 0.0) * np.array([1.0, 0.0, 0.0])
+            given[2] += raised(t)
             attitude = Rotation.from_rotvec(turned(t)) * Rotation.from_matrix(pose[:3, :3])
             poses.add(round(t * NS), tuple(given), attitude.as_quat())
         return poses

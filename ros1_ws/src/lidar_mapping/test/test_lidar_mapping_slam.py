@@ -88,6 +88,55 @@ def test_the_autopilots_slow_error_of_attitude_does_not_bend_the_map(kind) -> No
     assert np.sqrt(np.mean(off_the_yard(points[points[:, 2] > 1.7]) ** 2)) < 0.02
 
 
+def straight(t):
+    """Along the yard from rest, 1 m/s, with half a metre to both sides."""
+    way = t - 1.0 + np.exp(-t) if t > 0.0 else 0.0
+    return np.array([way - 9.0, 0.5 * np.sin(way / 3.0), 2.0])
+
+
+def off_level(slam, *, tilt_deg=0.0, raised=lambda _t: 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Follow the straight path for 16 m; return by how much the height, metres, and the pitch, degrees, are off with each sweep.
+
+    The autopilot's pitch is off by ``tilt_deg``, and the accelerometer's bias says the same.
+    """
+    path, rng = Path(straight, across_deg=17.0), np.random.default_rng(7)
+    leaning, pull = np.radians([0.0, tilt_deg, 0.0]), np.array([-9.81 * np.sin(np.radians(tilt_deg)), 0.0, 0.0])
+    off = []
+    for k in range(170):
+        end_s = (k + 1) / 10
+        readings = [replace(each, specific_force=each.specific_force + pull) for each in path.readings(k / 10, end_s, rng)]
+        slam.add(
+            path.sweep(k / 10, seed=k, count=2500), readings, path.autopilot(end_s, raised=raised, turned=lambda _t: leaning), np.eye(4)
+        )
+        pose = slam.pose()[0]
+        turn = Rotation.from_matrix(pose[:3, :3] @ path.pose(end_s)[:3, :3].T)
+        off.append((pose[2, 3] - path.position(end_s)[2], turn.as_rotvec(degrees=True)[1]))
+    height_m, pitch_deg = np.array(off).T
+    return height_m, pitch_deg
+
+
+@pytest.mark.parametrize("tilt_deg", [0.5, -0.5])
+def test_a_tilt_that_autopilot_and_accelerometer_agree_upon_does_not_tilt_the_map(tilt_deg) -> None:
+    slam = Slam(SlamSettings())
+    height_m, pitch_deg = off_level(slam, tilt_deg=tilt_deg)
+    assert np.abs(height_m).max() < 0.05, "0.11 and more without the autopilot's height"
+    assert abs(pitch_deg[-1]) < 0.2
+    ground = slam.map.points[slam.map.points[:, 2] < 0.3]
+    assert abs(np.polyfit(ground[:, 0], ground[:, 2], 1)[0]) < np.radians(0.15)
+
+
+@pytest.mark.parametrize("height", ["wavering", "drifting", "jumping"])
+def test_what_is_wrong_with_the_autopilots_height_does_not_bend_the_map(height) -> None:
+    kinds = {
+        "wavering": lambda t: 0.02 * np.sin(3.0 * t),
+        "drifting": lambda t: 0.03 * np.sin(t / 20.0),
+        "jumping": lambda t: float(t > 8.0),
+    }
+    height_m, pitch_deg = off_level(Slam(SlamSettings()), raised=kinds[height])
+    assert np.abs(height_m).max() < 0.06
+    assert np.abs(pitch_deg).max() < 0.3
+
+
 def test_the_autopilots_drift_is_learned_where_surfaces_hold_the_scan() -> None:
     slam = Slam(SlamSettings())
     fly(Path(leg), slam, 12.0, count=2500, drift=0.05)
@@ -152,6 +201,20 @@ def test_a_loop_is_closed_and_the_correction_carried_on_to_the_map() -> None:
     assert slam.loops > before
     pose, _ = slam.pose()
     assert pose[:3, 3] == pytest.approx(path.position(28.0), abs=0.15)
+
+
+def test_of_a_sensor_of_many_beams_some_points_are_used_other_ones_each_time() -> None:
+    path, slam, used = Path(lap), Slam(SlamSettings(most_points=2000)), []
+    for k in range(10):
+        sweep = path.sweep(k / 10, seed=1)
+        assert len(sweep.points) > 4000
+        slam.add(sweep, path.readings(k / 10, k / 10 + 0.1, np.random.default_rng(k)), path.autopilot(k / 10 + 0.1), np.eye(4))
+        used.append(slam._thinned(sweep).points)
+    assert [len(points) for points in used] == pytest.approx([2000] * 10, rel=0.1)
+    assert not np.array_equal(used[0][:50], used[1][:50])
+    assert np.linalg.norm(slam.pose()[0][:3, 3] - path.position(1.0)) < 0.05
+    few = path.sweep(1.0, seed=1, count=1500)
+    assert slam._thinned(few) is few
 
 
 def test_a_corridor_makes_the_position_uncertain_along_it_and_is_survived() -> None:

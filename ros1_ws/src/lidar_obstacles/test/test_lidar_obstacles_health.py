@@ -91,6 +91,62 @@ def test_a_broken_lidar_is_broken_from_the_first_sweep_on_and_for_as_long(name) 
     assert findings[-1].ok
 
 
+def gated(points, begin_m, end_m) -> np.ndarray:
+    ranges = np.linalg.norm(points, axis=1)
+    return points[(ranges >= begin_m) & (ranges <= end_m)]
+
+
+def yard(seed) -> np.ndarray:
+    """Return a sweep of 32 beams over ground 1.7 m below, with walls at 25 m and boxes at 4 and 9 m."""
+    azimuth, elevation = np.tile(np.linspace(-np.pi, np.pi, 900, endpoint=False), 32), np.repeat(np.radians(np.linspace(-30, 10, 32)), 900)
+    ray = np.column_stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    with np.errstate(divide="ignore"):
+        to_ground = np.where(ray[:, 2] < 0, -1.7 / ray[:, 2], np.inf)
+        to_walls = np.where(ray[:, :2] > 0, 25.0, -25.0) / ray[:, :2]
+    ranges = np.minimum(to_ground, to_walls.min(axis=1))
+    for bearing_rad, away_m in ((0.5, 4.0), (-1.2, 9.0)):
+        ranges = np.where(np.abs(azimuth - bearing_rad) < 0.5 / away_m, np.minimum(ranges, away_m), ranges)
+    ranges = ranges + np.random.default_rng(seed).normal(0, 0.02, len(ray))
+    return (ray * ranges[:, None]).astype(np.float32)
+
+
+def judge_flight(sweeps, metres_a_sweep=0.0) -> list:
+    judge, found = CloudJudge(LidarSettings().cloud), []
+    for k, points in enumerate(sweeps):
+        sweep = Sweep(NS + k * NS // 10, points, np.zeros(len(points), np.float32))
+        found.append(judge.finding(sweep, self_m=1.0, position_m=np.array([metres_a_sweep * k, 0.0, 1.7])))
+    return found
+
+
+GATES = {"nearer than": (6.0, 1e3), "beyond": (0.0, 15.0)}
+
+
+@pytest.mark.parametrize("name", GATES)
+def test_ranges_that_have_no_returns_any_more_are_missed_until_they_are_back(name) -> None:
+    good = [yard(k) for k in range(4)]
+    found = judge_flight([*good, *(gated(yard(4 + k), *GATES[name]) for k in range(10)), *(yard(20 + k) for k in range(3))])
+    assert all(finding.ok for finding in found[:4])
+    assert {finding.verdict for finding in found[4:14]} == {Verdict.BROKEN}
+    assert {finding.fault for finding in found[4:14]} <= {FaultKind.RANGE, FaultKind.RETURNS, FaultKind.SECTOR}
+    assert all(finding.ok for finding in found[14:])
+
+
+def rain(points, share, seed) -> np.ndarray:
+    """Return the sweep with a share of its returns from drops, anywhere between 1 m and the surface, or 10 m."""
+    rng = np.random.default_rng(seed)
+    ranges = np.linalg.norm(points, axis=1)
+    drops = np.where(rng.random(len(points)) < share, 1.0 + rng.random(len(points)) * np.clip(ranges - 1.0, 0.0, 9.0), ranges)
+    return (points * (drops / ranges)[:, None]).astype(np.float32)
+
+
+def test_rain_is_told_and_ends() -> None:
+    found = judge_all([*(room(k) for k in range(5)), *(rain(room(k % 8), 0.02, k) for k in range(15)), *(room(k % 8) for k in range(15))])
+    assert all(finding.ok for finding in found[:5])
+    assert {(finding.verdict, finding.fault) for finding in found[14:20]} == {(Verdict.UNKNOWN, FaultKind.RANGE)}
+    assert "of the returns stand alone in the air: rain, dust or snow" in found[19].reason
+    assert all(finding.ok for finding in found[30:])
+
+
 def test_surfaces_that_become_rough_on_the_way_are_no_noise_of_the_sensor() -> None:
     meadow = [scattered(room(k), 0.3 * k / 60) for k in range(60)]
     assert all(finding.ok for finding in judge_all(meadow))

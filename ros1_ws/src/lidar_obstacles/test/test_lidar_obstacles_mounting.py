@@ -22,8 +22,12 @@ TURNED = {
 OVERTURNED = {"rolled": np.diag([1.0, -1.0, -1.0]), "pitched": np.diag([-1.0, 1.0, -1.0]), "mirrored": np.diag([1.0, 1.0, -1.0])}
 
 
-def fly(way, *, mount=UP, turned=None, rate_hz=10.0) -> list[Finding]:
-    """Return the findings of sweeps along a way of (x, y, yaw) in a yard, 1.5 m above the ground; the data are ``turned`` in base_link."""
+def fly(way, *, mount=UP, turned=None, rate_hz=10.0, repeat_from=None) -> list[Finding]:
+    """Return the findings of sweeps along a way of (x, y, yaw) in a yard, 1.5 m above the ground; the data are ``turned`` in base_link.
+
+    From sweep ``repeat_from`` on the sensor repeats what it saw, in another order and with noise of 1 cm.
+    """
+    last = None
     poses, check, findings, rng = PoseBuffer(keep_s=1e6), MountCheck(), [], np.random.default_rng(1)
     for k, (x, y, yaw) in enumerate(way):
         stamp_ns = NS + int(k / rate_hz * NS)
@@ -37,6 +41,10 @@ def fly(way, *, mount=UP, turned=None, rate_hz=10.0) -> list[Finding]:
         points = RAYS[seen] * ranges[seen, None]
         if turned is not None:
             points = points @ (mount[:3, :3].T @ turned @ mount[:3, :3]).T
+        if repeat_from is not None and k >= repeat_from and last is not None:
+            points = rng.permutation(last) + rng.normal(0.0, 0.01, last.shape)
+        else:
+            last = points
         sweep = Sweep(stamp_ns, points.astype(np.float32), np.zeros(len(points), np.float32))
         findings.append(check.finding(sweep, mount, poses, self_m=1.0))
     return findings
@@ -78,3 +86,17 @@ def test_without_poses_nothing_is_said() -> None:
     poses = PoseBuffer()
     poses.add(NS, (0.0, 0.0, 1.5), (0.0, 0.0, 0.0, 1.0))
     assert check.finding(nothing, UP, poses, self_m=1.0).ok
+
+
+@pytest.mark.parametrize("mount", [UP, ACROSS], ids=["level", "across"])
+def test_a_sensor_that_repeats_what_it_saw_is_frozen_when_motion_shows_it(mount) -> None:
+    findings = fly(FORTH + [(3.77 + 0.13 * k, 2.03 - 0.2 * k, 0.0) for k in range(30)], mount=mount, repeat_from=5)
+    first = next(k for k, finding in enumerate(findings) if not finding.ok)
+    assert {(finding.verdict, finding.fault) for finding in findings[first:]} == {(Verdict.BROKEN, FaultKind.FROZEN)}
+    assert first <= 30  # 4 m
+    assert "do not change with the vehicle's own motion" in findings[first].reason
+
+
+def test_what_the_motion_does_not_tell_apart_is_told_together() -> None:
+    findings = fly([(0.0, 0.13 * k, 0.0) for k in range(30)], turned=TURNED["turned by 180 degrees"])
+    assert findings[-1].reason == "by the vehicle's own motion the LiDAR is turned by 180 degrees or mirrored"

@@ -48,3 +48,29 @@ def test_a_lost_control_link_takes_the_control_alone_and_is_written_down(ros_mas
     assert 0.9 < ends - begins < 1.5
     for each in (video, control, talker):
         each.close()
+
+
+def test_every_flow_crosses_and_the_autopilots_answer_comes_back(ros_master, start_node):
+    base = next(port for port in iter(free_port, None) if port < 60_000)
+    listeners = {port: udp_socket(base + port) for port in (1, 3, 5, 8)}
+    talker = udp_socket(0)
+    start_node([str(NODE), f"_base_port:={base}"])
+
+    def arrives(sender, to: int, at: int, data: bytes) -> tuple[str, int]:
+        """Send until it arrives: the node opens its ports in its own time."""
+
+        def comes() -> bool:
+            sender.sendto(data, ("127.0.0.1", to))
+            return bool(select.select([listeners[at]], [], [], 0.1)[0])
+
+        until(comes, f"{data!r} at +{at}", PATIENCE_S)
+        got, source = listeners[at].recvfrom(100)
+        assert got == data
+        return source
+
+    arrives(talker, base, 1, b"video")
+    arrives(talker, base + 2, 3, b"report")
+    autopilots_peer = arrives(talker, base + 4, 5, b"control")
+    arrives(listeners[5], autopilots_peer[1], 8, b"telemetry")
+    for each in (talker, *listeners.values()):
+        each.close()

@@ -189,6 +189,24 @@ def test_the_first_correction_and_a_far_one_are_taken_at_once_and_told():
     assert localization.correction.yaw_rad == pytest.approx(0.3)
 
 
+def raised(localization, height_m, now_s, *, flying=True):
+    """Tell a map that is so much higher than the autopilot says; return what is made of it after 10 s."""
+    for count in range(201):
+        told(localization, about_vertical(0.0, Vec3(0.0, 0.0, height_m)), now_s + count * STEP_S)
+        localization.step(ZERO, now_s + count * STEP_S, flying=flying)
+    return localization.correction.shift_m.z
+
+
+def test_a_map_that_slowly_leaves_the_measured_height_is_followed_within_bounds():
+    localization = begun()
+    most_m = Settings().map_height_m
+    assert raised(localization, 0.5 * most_m, 1.0) == pytest.approx(0.5 * most_m)
+    for count in range(1, 30):  # on and on, at last by metres
+        assert raised(localization, 0.5 * most_m + 0.1 * count, 20.0 * count) <= most_m + 1e-9
+    assert raised(localization, -3.0, 1000.0) == pytest.approx(most_m - 3.0 - 0.5 * most_m - 2.9), "another origin is followed"
+    assert raised(localization, -3.0, 2000.0, flying=False) == -3.0, "on the ground the map's height counts"
+
+
 def test_switched_off_it_returns_to_the_autopilots_position_evenly():
     localization = begun()
     told(localization, about_vertical(0.0, Vec3(0.5, 0.0, 0.0)), 1.0)

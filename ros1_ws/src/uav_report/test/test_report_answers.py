@@ -37,8 +37,9 @@ def flight(*breaks: tuple[str, float], scenario: str = "mapping") -> Log:
     for number, (sensor, at_s) in enumerate(breaks):
         log.change(at_s, f"perception.{sensor}_status", "OK", "BROKEN")
         if sensor == running and sensor not in [before for before, _ in breaks[:number]]:
-            message = f"{sensor}_ok: {sensor}_status is BROKEN, after {sensor}_status OK -> BROKEN (extern)"
-            log.skill(at_s, f"perception.{sensor}_depthmap", "1", "RESOURCE_INVARIANT_VIOLATED", result=f"{sensor}_ok", message=message)
+            found = {"name": f"{sensor}_ok", "condition": "", "reason": "", "states": {f"{sensor}_status": "BROKEN"}, "data": {}}
+            violated = {"result": f"{sensor}_ok", "unmet": [found]}
+            log.skill(at_s, f"perception.{sensor}_depthmap", "1", "RESOURCE_INVARIANT_VIOLATED", **violated)
     return log
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from uav_simulator_ardupilot import InThread, Peer, packet, pwm_of
 
 from uav_simulator.ardupilot.motors import HexaX, thrusts_n
-from uav_simulator.ardupilot.protocol import BodyState, MotorPacket, answer, parse_packet
+from uav_simulator.ardupilot.protocol import BodyState, MotorPacket, answer, options, parse_packet
 from uav_simulator.ardupilot.vehicle import ArduPilotVehicle
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.errors import ConfigError, SimulatorError
@@ -68,6 +68,21 @@ def test_the_answer_is_one_line_of_json_between_newlines():
         b'\n{"timestamp":0.0025,"imu":{"gyro":[0.1,0.2,0.3],"accel_body":[0.0,0.0,-9.8]},'
         b'"position":[1.0,2.0,-3.0],"velocity":[0.5,0.0,0.0],"quaternion":[1.0,0.0,0.0,0.0]}\n'
     )
+
+
+@pytest.mark.parametrize(
+    ("port", "instance", "told"),
+    [
+        (9002, None, "-I0"),
+        (9012, None, "-I1"),
+        (9012, 1, "-I1"),
+        (9012, 0, "-I0 --sim-port-out 9012"),
+        (9500, None, "-I49 --sim-port-out 9500"),
+        (8000, None, "-I0 --sim-port-out 8000"),
+    ],
+)
+def test_ardupilot_is_told_where_the_body_is(port, instance, told):
+    assert options(port, instance) == f"--model JSON:127.0.0.1 {told}"
 
 
 # --- motors ------------------------------------------------------------------------------------------------------------------

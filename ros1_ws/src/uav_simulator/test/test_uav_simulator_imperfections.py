@@ -59,6 +59,32 @@ def test_the_position_jumps_as_often_and_as_far_as_asked():
     assert steps.max() == pytest.approx(0.5, abs=0.01)
 
 
+def test_the_heading_wanders_there_and_back():
+    off_deg = [math.degrees(flown(Imperfections(yaw_walk_deg=20.0), way_m=way_m)[0].yaw_error_rad) for way_m in (5.0, 50.0, 95.0)]
+    assert abs(off_deg[0]) < 1.5
+    assert abs(off_deg[1]) == pytest.approx(20.0, abs=1.0)
+    assert abs(off_deg[2]) < 1.5
+
+
+def test_roll_and_pitch_are_off_by_a_constant_and_a_slow_walk():
+    estimates = [flown(Imperfections(tilt_bias_deg=2.0), seed=seed, way_m=1.0)[0] for seed in range(12)]
+    off_deg = np.degrees([estimate.euler[:2] for estimate in estimates])
+    assert np.abs(off_deg) == pytest.approx(2.0, abs=0.01)
+    assert {tuple(signs) for signs in np.sign(off_deg)} == {(-1, -1), (-1, 1), (1, -1), (1, 1)}
+    walked = np.degrees([flown(Imperfections(tilt_walk_deg=1.0), seed=seed, way_m=60.0)[0].euler[:2] for seed in range(12)])
+    assert walked.std() == pytest.approx(1.0, rel=0.4)
+    assert np.degrees(flown(PRESETS["off"])[0].euler[:2]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_height_is_noisy_and_drifts():
+    _, drifting = flown(Imperfections(height_drift_m=0.2), way_m=300.0)
+    assert drifting[:, 2].std() == pytest.approx(0.2, rel=0.6)
+    assert np.abs(np.diff(drifting[:, 2])).max() < 0.03
+    _, noisy = flown(Imperfections(height_noise_m=0.2), way_m=60.0)
+    assert noisy[:, 2].std() == pytest.approx(0.2, rel=0.2)
+    assert np.abs(noisy[:, 2].reshape(-1, 500).mean(axis=1)).max() < 0.2, "over 10 s it is nothing"
+
+
 def test_standing_still_is_no_way():
     _, errors = flown(Imperfections(position_drift=0.05), speed_m_s=0.1, way_m=4.0)
     assert np.linalg.norm(errors[-1]) < 0.03

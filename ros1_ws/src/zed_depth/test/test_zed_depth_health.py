@@ -12,6 +12,7 @@ import pytest
 from perception_core import NS, FaultKind, Verdict
 from perception_core.testing import wall_pair
 from zed_depth import StereoPair, StereoRig, ZedSettings
+from zed_depth.fixed_columns import fixed_columns_finding
 
 ROOT = Path(__file__).resolve().parents[4]
 DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data")) / "stereo_motorcycle"
@@ -176,6 +177,121 @@ def test_a_broken_rig_is_known_within_half_a_second(scene, name) -> None:
     assert all(finding.ok for finding in after)
 
 
+def gained(image, gain) -> np.ndarray:
+    return np.clip(image.astype(float) * gain, 0, 255)
+
+
+def compressed(image, quality) -> np.ndarray:
+    written = cv2.imencode(".jpg", np.clip(image, 0, 255).astype(np.uint8), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return cv2.imdecode(written, cv2.IMREAD_GRAYSCALE)
+
+
+def dead(image) -> np.ndarray:
+    return np.where(np.arange(image.shape[1]) % 8 == 0, 0, image)
+
+
+def lower(image, other) -> np.ndarray:
+    """Return the image with its lower half from another one."""
+    return np.where(np.arange(image.shape[0])[:, None] < image.shape[0] // 2, image, other)
+
+
+def earlier(image) -> np.ndarray:
+    """Return what the camera saw before the vehicle turned a little."""
+    return np.roll(image, (3, 25), axis=(0, 1))
+
+
+# name: what becomes of the pair, with a seed for each; the sentence depends on the scene
+MISFITS = {
+    "right exposure doubled": lambda a, b, s: (noisy(a, s), noisy(gained(b, 2.2), s + 1)),
+    "rows 2 px off": lambda a, b, s: (noisy(a, s), noisy(shifted(b, 2), s + 1)),
+    "noise of 40 grey levels": lambda a, b, s: (noisy(a, s, 40), noisy(b, s + 1, 40)),
+    "every 8th column of one image dead": lambda a, b, s: (noisy(a, s), dead(noisy(b, s + 1))),
+    "every 8th column of both dead": lambda a, b, s: (dead(noisy(a, s)), dead(noisy(b, s + 1))),
+    "compressed to blocks": lambda a, b, s: (compressed(noisy(a, s), 3), compressed(noisy(b, s + 1), 3)),
+    "the lower halves black": lambda a, b, s: (lower(noisy(a, s), 0), lower(noisy(b, s + 1), 0)),
+    "the lower half of one black": lambda a, b, s: (noisy(a, s), lower(noisy(b, s + 1), 0)),
+}
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", MISFITS)
+@pytest.mark.parametrize("since_check", [0, 2])
+def test_whatever_makes_the_images_differ_is_broken_and_no_pair_of_it_is_believed(scene, name, since_check) -> None:
+    rig = scene.rig()
+    good = 5 + since_check
+    assert all(believed(rig, k, *scene.good(k)) for k in range(good))
+    for k in range(8):
+        left, right = (np.ascontiguousarray(image, dtype=np.uint8) for image in MISFITS[name](scene.left, scene.right, 300 + 2 * k))
+        pair = StereoPair((good + k) * NS // 10, left, right)
+        found = rig.finding(pair)
+        assert not found.ok or rig.depth(pair).doubt, k
+        if k > 0:
+            assert found.verdict is BROKEN, k
+    after = [believed(rig, 20 + k, *scene.good(k)) for k in range(6)]  # the noise is measured anew within five
+    assert after[-2:] == [True, True]
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_half_of_one_image_that_is_old_is_never_believed(scene) -> None:
+    rig = scene.rig()
+    assert all(believed(rig, k, *scene.good(k)) for k in range(5))
+    for k in range(5, 12):
+        left, right = scene.good(k)
+        assert not believed(rig, k, left, np.ascontiguousarray(lower(right, earlier(right)))), k
+
+
+def smooth_wall() -> Scene:
+    """Return a scene without the wall's finest texture, in which a seam would be lost."""
+    small = (image[:68, :120] for image in wall_pair(2.4, seed=1))
+    return Scene(*(cv2.resize(image, (480, 272), interpolation=cv2.INTER_CUBIC) for image in small), 240.0)
+
+
+@pytest.mark.parametrize("scene", [pytest.param(smooth_wall(), id="wall"), SCENES[1]])
+def test_images_that_are_displaced_by_some_bytes_are_known_by_their_seam(scene) -> None:
+    displaced = [np.roll(image.reshape(-1), 100).reshape(image.shape) for image in scene.good(0)]
+    assert fixed_columns_finding(*scene.good(0)).ok
+    found = fixed_columns_finding(*displaced)
+    assert (found.verdict, found.fault) == (BROKEN, FaultKind.FORMAT)
+    assert "both images have a step in column 100" in found.reason
+
+
+def far_and_near(shift_px) -> tuple[np.ndarray, np.ndarray]:
+    """Return a pair whose upper third is far away, at 0.6 px, the right camera turned aside by some pixels."""
+    (left, far), (_, near) = wall_pair(0.6, seed=1), wall_pair(9.5, seed=1)
+    right = np.where(np.arange(270)[:, None] < 90, far, near)
+    moved = np.array([[1.0, 0.0, shift_px], [0.0, 1.0, 0.0]])
+    return left, cv2.warpAffine(right, moved, (480, 270), borderMode=cv2.BORDER_REPLICATE)
+
+
+@pytest.mark.parametrize("shift_px", [2.0, 4.0, 8.0])
+def test_a_camera_that_is_turned_aside_is_known_by_what_is_beyond_infinity(shift_px) -> None:
+    left, right = far_and_near(0.0)
+    rig = rig_for(left, 240.0)
+    assert all(rig.finding(StereoPair(k * NS // 2, noisy(left, k), noisy(right, 50 + k))).ok for k in range(4))
+    knocked = far_and_near(shift_px)[1]
+    found = [rig.finding(StereoPair(k * NS // 2, noisy(left, k), noisy(knocked, 50 + k))) for k in range(4, 8)]
+    assert {(finding.verdict, finding.fault) for finding in found} == {(BROKEN, FaultKind.CALIBRATION)}
+    assert "turned aside against each other" in found[-1].reason
+
+
+def test_what_the_images_tell_is_known_without_depths_being_asked_for() -> None:
+    left, right = wall_pair(9.5, seed=1)
+    rig = rig_for(left, 240.0)
+    assert rig.finding(StereoPair(0, left, right)).ok
+    noise = [StereoPair((1 + k) * NS // 10, noisy(left, k, 40), noisy(right, 90 + k, 40)) for k in range(6)]
+    assert [rig.finding(pair).ok for pair in noise][4:] == [False, False]
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (1920, 1080)])
+def test_a_blur_of_3_px_of_the_matched_image_is_known_in_large_images(width, height) -> None:
+    fine = [cv2.resize(image, (width, height), interpolation=cv2.INTER_CUBIC) for image in wall_pair(9.5, seed=1)]
+    rig = rig_for(fine[0], width / 2.0)
+    assert rig.finding(StereoPair(0, noisy(fine[0], 1), noisy(fine[1], 2))).ok
+    soft = [cv2.GaussianBlur(image, (0, 0), 3.0 * round(width / 640)) for image in fine]
+    found = rig.finding(StereoPair(NS // 2, noisy(soft[0], 3), noisy(soft[1], 4)))
+    assert (found.verdict, found.fault) == (BROKEN, FaultKind.BLUR)
+
+
 def tiled_pair(disparity_px: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the left and right image (270, 480) of a wall of equal tiles, a little aslant: each corner looks like all others."""
     tile = np.full((88, 88), 170, np.float32)
@@ -284,14 +400,15 @@ def test_without_camera_info_nothing_is_known_and_wrong_info_is_told() -> None:
     assert "the camera is not calibrated" in rig.finding(StereoPair(2 * NS, noisy(left, 3), noisy(right, 4))).reason
 
 
-def test_a_pair_without_any_depth_is_unknown() -> None:
+def test_pairs_without_any_depth_are_unknown_until_there_is_one_again() -> None:
     left, right = wall_pair(9.5, seed=1)
     rig = rig_for(left, 240.0)
-    sky = (noisy(np.full_like(left, 190), 1), noisy(np.full_like(left, 190), 2))
+    sky = np.repeat(np.linspace(170.0, 200.0, left.shape[0])[:, None], left.shape[1], axis=1)  # light, but nothing to match
     assert rig.finding(StereoPair(0, left, right)).ok
-    assert np.isfinite(rig.depth(StereoPair(0, *sky)).metres).mean() < 0.002
-    finding = rig.finding(StereoPair(NS // 10, noisy(left, 3), noisy(right, 4)))
-    assert (finding.verdict, finding.reason) == (UNKNOWN, finding.reason)
-    assert "of the image has a depth" in finding.reason
-    rig.rest()
-    assert rig.finding(StereoPair(NS // 5, noisy(left, 5), noisy(right, 6))).ok
+    assert np.isfinite(rig.depth(StereoPair(0, noisy(sky, 1), noisy(sky, 2))).metres).mean() < 0.002
+    for k in range(1, 4):
+        finding = rig.finding(StereoPair(k * NS // 10, noisy(sky, 10 + k), noisy(sky, 20 + k)))
+        assert finding.verdict is UNKNOWN
+        assert "of the image has a depth" in finding.reason or "too little texture" in finding.reason
+    assert rig.finding(StereoPair(4 * NS // 10, noisy(left, 3), noisy(right, 4))).ok
+    assert rig.finding(StereoPair(5 * NS // 10, noisy(left, 5), noisy(right, 6))).ok

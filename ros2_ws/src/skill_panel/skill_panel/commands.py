@@ -167,7 +167,7 @@ def events(clients: Clients, options: argparse.Namespace, out: Out) -> int:
     """Show every event from now on, until Ctrl-C."""
     over = threading.Event()
     if threading.current_thread() is threading.main_thread():
-        on_end_signal(over.set)
+        on_end_signal(lambda _: over.set())
     forget = [c.on_event(lambda event: _tell(event_record(event), out)) for n, c in clients.items() if options.skillset in {None, n}]
     while not over.wait(LOOK_S):
         pass

@@ -1,15 +1,21 @@
-"""What the data manager gives to conditions."""
+"""What the data manager gives to conditions, and events as messages."""
 
 from __future__ import annotations
 
+import pytest
 import skillset_interfaces.msg
 import skillset_interfaces.srv
+from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
 from alula.model.conditions import holds
+from alula.model.execution_state import ExecutionState
 from alula.model.expressions import Comparison, DataIs
+from alula.model.model import ResultKind
+from alula.model.unmet import Unmet
 from alula.runtime.codecs import Codecs
-from alula.runtime.middleware import Topic
+from alula.runtime.core.events import ExecutionEvent
+from alula.runtime.middleware import EVENTS, PublishedEvent, Topic
 from alula.runtime.views import Sample
 from skillset_ros2.convert import message_class
 
@@ -28,3 +34,21 @@ def test_a_message_is_given_as_it_is():
     codec = CODECS.topic(Topic("/battery", type_name="std_msgs/Float64", outside=True))
     assert codec.decode(message).value is message
     assert codec.encode("skillset", Sample(message, None)) is message
+
+
+UNMET = Unmet("seen", "eyes == Open and fps > 3.0", "seen: eyes is Shut", {"eyes": "Shut"}, {"fps": None, "level": 0.5})
+ENDS = [
+    (ExecutionState.RUNNING, None, ()),
+    *((ExecutionState.TERMINATED, kind, ()) for kind in ResultKind),
+    (ExecutionState.NOT_READY, None, (UNMET,)),
+    (ExecutionState.RESOURCE_INVARIANT_VIOLATED, None, (UNMET, UNMET)),
+]
+
+
+@pytest.mark.parametrize(("state", "kind", "unmet"), ENDS)
+def test_an_event_says_as_a_message_what_it_was(state, kind, unmet):
+    event = ExecutionEvent(3, 1_500_000_000, "go", "1", state, "NAME", "in words", {"speed": 1.0}, {}, "rover", kind, unmet)
+    codec = CODECS.topic(EVENTS)
+    told = PublishedEvent("a life", event)
+    sent = deserialize_message(serialize_message(codec.encode("rover", told)), skillset_interfaces.msg.Event)
+    assert codec.decode(sent) == told

@@ -14,10 +14,12 @@ from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import plan_of
+from alula.model.model import ResultKind
 from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent
-from alula.runtime.mock import load_behaviour
+from alula.runtime.mock import Behaviour, load_behaviour
 from uav_missions.inspection import plan
+from uav_missions.mapping import plan as mapping_plan
 from uav_missions.route import inputs_of, route_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
@@ -45,6 +47,17 @@ def ends(mission: MockedMission) -> list[tuple[str, str, str]]:
 
 def on_ground(mission: MockedMission) -> bool:
     return mission.state("navigation", "flight_status") == "ON_GROUND"
+
+
+@pytest.mark.parametrize("plan_of_mission", [plan, mapping_plan])
+def test_leaves_take_for_success_what_the_models_call_so(plan_of_mission):
+    mission = MockedMission(robot_skillsets(), Behaviour(), plan_of_mission(INPUTS))
+    models = {skillset.name: skillset for skillset in robot_skillsets()}
+    assert len(mission._leaves) > 5
+    for leaf, _ in mission._leaves:
+        skill = models[leaf.client.skillset].skill(leaf.skill)
+        successes = {one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS}
+        assert (leaf.skill_name, leaf._success) == (leaf.skill_name, successes)
 
 
 def test_the_scenario_names_this_mission():

@@ -16,7 +16,7 @@ from alula_testing.traces.stage import Client, MakeStage, Stage
 
 Trace = dict[str, Any]
 _EVENT_FIELDS = {
-    "EXECUTION": ("skill", "id", "state", "result", "message", "inputs", "outputs"),
+    "EXECUTION": ("skill", "id", "state", "result", "message", "inputs", "outputs", "result_kind", "unmet"),
     "TRANSITION": ("resource", "from_state", "to_state", "cause"),
 }
 _CURTAIN = ("homepoint_status", {"VALID": "INVALID", "INVALID": "VALID"})

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 class GroundSettings:
     """Private parameters of /ground_station; ports are UDP on loopback."""
 
-    video_port: int = 42001  # of this node: where RTP arrives from the radio
-    report_port: int = 42002  # of the radio: where reports go
-    control_port: int = 42004  # of the radio: where the telepilot's MAVLink goes
-    telemetry_port: int = 42008  # of this node: where the autopilot's MAVLink arrives from the radio
-    player_port: int = 42006  # where the RTP that is the drone's is passed on to any player
+    video_port: int = 20001  # of this node: where RTP arrives from the radio
+    report_port: int = 20002  # of the radio: where reports go
+    control_port: int = 20004  # of the radio: where the telepilot's MAVLink goes
+    telemetry_port: int = 20008  # of this node: where the autopilot's MAVLink arrives from the radio
+    player_port: int = 20006  # where the RTP that is the drone's is passed on to any player
     key: str = "alula"  # shared with the drone
     reference: str = ""  # topic of the camera that the drone films with, to compare with; only a simulation has it here
     width: int = 640

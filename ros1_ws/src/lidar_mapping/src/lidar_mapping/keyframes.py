@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 NEIGHBOUR_KEYFRAMES = 3
+MOST_CENTRES = 15_000  # of patches: a LiDAR of 16 beams has fewer in a keyframe; to tell more planes takes longer than a sweep
 
 
 @dataclass
@@ -54,7 +55,8 @@ class Keyframes:
         fresh = downsample(points, self._voxel_m)
         around = np.vstack([fresh, *(frame.points_in_map() for frame in self.all[-NEIGHBOUR_KEYFRAMES:])])
         back: Floats = np.asarray(np.linalg.inv(pose), dtype=np.float64)
-        patches = flat_patches(downsample(fresh, PATCH_M), downsample(around, PATCH_M)).moved(back)
+        centres = downsample(fresh, PATCH_M)
+        patches = flat_patches(centres[:: len(centres) // MOST_CENTRES + 1], downsample(around, PATCH_M)).moved(back)
         inside = (fresh @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
         frame = Keyframe(stamp_ns, pose, inside, patches)
         self.all.append(frame)

@@ -11,6 +11,7 @@ from lidar_mapping.inertial import (
     ATTITUDE,
     AUTOPILOT,
     DRIFT,
+    GRAVITY,
     HEADING,
     POSITION,
     TERMS,
@@ -125,15 +126,20 @@ class LidarInertialOdometry:
         return self.filter.state
 
     def move(self, correction: Floats) -> None:
-        """Follow the map when it is corrected; ``correction`` (4, 4) is T_corrected_before at the vehicle."""
+        """Follow the map when it is corrected; ``correction`` (4, 4) is T_corrected_before at the vehicle.
+
+        A map that was tilted has passed a part of the weight for the accelerometer's bias: what it measures stays the same.
+        """
         state, turn = self.filter.state, correction[:3, :3]
         position = turn @ state.position + correction[:3, 3]
         error = rotation_vector(rotation_matrix(state.autopilot_error) @ turn.T)
+        rotation = turn @ state.rotation
         moved = replace(
             state,
-            rotation=turn @ state.rotation,
+            rotation=rotation,
             velocity=turn @ state.velocity,
             position=position,
+            accel_bias=state.accel_bias - (state.rotation - rotation).T @ GRAVITY,
             autopilot_error=error,
             autopilot_drift=turn @ state.autopilot_drift,
         )
@@ -170,7 +176,7 @@ class LidarInertialOdometry:
         """Register from where the autopilot's motion leads; where that fits badly, from other starts too, and take the best.
 
         The others are one's own motion, none at all since the last sweep (what the autopilot said before may have misled that, too), and
-        any motion, without the autopilot's attitude either. The last one has to fit clearly better: it gives up what is known.
+        any motion, without the autopilot's attitude either. Each has to fit clearly better: along a bare wall anything fits about as well.
         """
         if autopilot is None:
             return self._register(points)
@@ -187,7 +193,7 @@ class LidarInertialOdometry:
             self.filter.state = start
             self._listen_to(autopilot, velocity_m_s)
             found = self._register(points)
-            if found.fitness >= best.fitness:
+            if found.fitness >= best.fitness + CLEARLY * best.believed:
                 best, back_to_best = found, self.filter.keep()
             if best.believed and best.fitness > self._settings.good_fitness:
                 back_to_best()

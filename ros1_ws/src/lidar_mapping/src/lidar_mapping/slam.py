@@ -32,12 +32,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SlamSettings:
-    """Metres, seconds. The map is lost after ``lost_s`` without a believed scan, or when the position is not known to ``lost_m``."""
+    """Metres, seconds. Of a sweep ``most_points`` are used, by chance: a sensor of 16 beams has fewer, one of 64 four times as many.
+
+    The map is lost after ``lost_s`` without a believed scan, or when the position is not known to ``lost_m``.
+    """
 
     voxel_m: float = 0.1
     max_voxels: int = 1_000_000
     self_m: float = 1.2
     max_range_m: float = 25.0
+    most_points: int = 30_000
     lost_s: float = 2.0
     lost_m: float = 0.75
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
@@ -67,6 +71,7 @@ class Slam:
         self._odometry: LidarInertialOdometry | None = None
         self._lost_since_ns: int | None = None
         self._readings: deque[ImuReading] = deque(maxlen=KEPT)
+        self._chance = np.random.default_rng(0)
 
     @property
     def loops(self) -> int:
@@ -150,11 +155,18 @@ class Slam:
         if self._odometry is None:
             self._start(sweep, poses, velocity)
         assert self._odometry is not None  # noqa: S101 -- just started
-        near = sweep.within(self._settings.self_m, self._settings.max_range_m)
+        near = self._thinned(sweep.within(self._settings.self_m, self._settings.max_range_m))
         step = self._odometry.add(near, self._readings, T_base_lidar, AutopilotMotion(ends.rotation[1], velocity))
         self._readings.clear()
         self._take(step, ends.matrix(1))
         return step.registration
+
+    def _thinned(self, sweep: Sweep) -> Sweep:
+        """Return the sweep with about as many points as are used; every fourth one would be of the same beams each time."""
+        count = len(sweep.points)
+        return (
+            sweep if count <= self._settings.most_points else sweep.select(self._chance.random(count) < self._settings.most_points / count)
+        )
 
     def _start(self, sweep: Sweep, poses: PoseBuffer, velocity: Floats) -> None:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
@@ -169,17 +181,17 @@ class Slam:
             self._lost_since_ns = None
             self.map.insert(step.points)
             if step.keyframe is not None:
-                self._close_loops(T_odom_base)
+                self._settle(T_odom_base)
         else:
             self.count.rejected += 1
             self._lost_since_ns = self._lost_since_ns or self._odometry.filter.stamp_ns
         self.T_map_odom = self._odometry.state.matrix @ np.linalg.inv(T_odom_base)
 
-    def _close_loops(self, T_odom_base: Floats) -> None:  # noqa: N803
-        """Let the graph look for a loop; what it corrects is carried on to the map and the vehicle."""
+    def _settle(self, T_odom_base: Floats) -> None:  # noqa: N803
+        """Let the graph settle and look for loops; what it corrects is carried on to the map and the vehicle."""
         assert self._odometry is not None  # noqa: S101 -- called by add only
         before = self.keyframes.all[-1].pose
-        if not self._graph.add(self.keyframes, T_odom_base[:3, 3]):
+        if not self._graph.add(self.keyframes, T_odom_base):
             return
         self._odometry.move(self.keyframes.all[-1].pose @ np.linalg.inv(before))
         self.map = VoxelMap(voxel_m=self._settings.voxel_m, max_voxels=self._settings.max_voxels)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lidar_obstacles.range_noise import RangeNoise
+from lidar_obstacles.range_gates import RangeGates
+from lidar_obstacles.range_noise import Neighbours, RangeNoise, Specks
 from lidar_obstacles.range_steps import RangeSteps, Seen
 from perception_core import FINE, NS, FaultKind, Finding, Sweep, broken, unsure
 
@@ -68,7 +69,11 @@ class CloudJudge:
         self._lost: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._blind: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
         self._lost_at_m: Floats | None = None
+        self._looks = 0
+        self._last: tuple[int, Floats | None] = 0, None
         self._noise = RangeNoise(limits.max_noise_m)
+        self._specks = Specks()
+        self._gates = RangeGates()
         self._steps = RangeSteps(limits.max_speed_m_s)
         self._gone_ns: NDArray[np.int64] = np.full(SECTORS, LONG_AGO_NS, dtype=np.int64)
         self.gone: NDArray[np.bool_] = np.zeros(SECTORS, dtype=np.bool_)
@@ -87,6 +92,7 @@ class CloudJudge:
         seen = Seen.of(sample, ranges)
         outside = seen.select(seen.ranges_m > self_m)
         sectors = _sectors(seen, stride, self_m)
+        moved_m = self._moved_m(sweep.stamp_ns, position_m)
         if self._left_behind(position_m):
             self._forget()
         before = self._lately()
@@ -98,7 +104,9 @@ class CloudJudge:
             return broken(FaultKind.RANGE, far)
         if _frozen(sample, previous, returned):
             return broken(FaultKind.FROZEN, "the sweep is the same as the one before")
-        noise_m = self._noise.risen_m(sweep, self_m=self_m)
+        self._looks += 1
+        neighbours = Neighbours.of(sweep, self._looks, self_m=self_m)
+        noise_m = self._noise.risen_m(neighbours)
         if noise_m:
             self._lost_at_m = position_m if self._lost_at_m is None else self._lost_at_m
             return broken(FaultKind.RANGE, f"the ranges scatter by {noise_m:.2f} m where they are smoothest")
@@ -107,12 +115,26 @@ class CloudJudge:
         if off_m:
             became = f"{abs(off_m):.1f} m {'longer' if off_m > 0 else 'shorter'}"
             return broken(FaultKind.RANGE, f"all ranges became at least {became} from one sweep to the next")
+        lost = self._gates.lost(outside.ranges_m, stride, least_m=least_m, moved_m=moved_m)
         finding = self._against_the_past(sectors, before, stride, sweep.stamp_ns)
+        if lost and finding.ok:
+            finding = broken(FaultKind.RANGE, f"no returns any more {lost}")
         if finding.ok:
             self._lost_at_m = None
         elif self._lost_at_m is None:
             self._lost_at_m = position_m
+        specks = self._specks.share(neighbours)
+        if finding.ok and specks:
+            return unsure(FaultKind.RANGE, f"{specks:.1%} of the returns stand alone in the air: rain, dust or snow")
         return finding
+
+    def _moved_m(self, stamp_ns: int, position_m: Floats | None) -> float:
+        """Return how far the vehicle may have come since the sweep before: by its position (3,), else by its greatest speed."""
+        then_ns, then_m = self._last
+        self._last = stamp_ns, position_m
+        if position_m is not None and then_m is not None:
+            return float(np.linalg.norm(position_m - then_m))
+        return self._limits.max_speed_m_s * abs(stamp_ns - then_ns) / NS
 
     def _left_behind(self, position_m: Floats | None) -> bool:
         """Return whether the vehicle has gone away from where the fault began; at a position (3,) that is not known it has not."""
@@ -125,6 +147,7 @@ class CloudJudge:
         self._lost[:] = False
         self._recent.clear()
         self._noise.forget()
+        self._gates.forget()
         self._lost_at_m = None
 
     def _lately(self) -> Floats:

@@ -2,7 +2,8 @@
 
 A sweep of a mirrored, turned or overturned sensor looks like any other; how it changes with the vehicle's own motion does not. Small planes
 are fitted to the sweeps that are looked at. The walls among them are held against those of a look before, by the vehicle's poses: with the
-mount as it is told, and as if it were mirrored, or turned by quarters. An overturned sensor moves rightly as long as it flies level, but
+mount as it is told, as if it were mirrored, or turned by quarters, and as if the vehicle had not moved: a sensor that repeats what it saw,
+noise, another order of the points and all, sees nothing move. An overturned sensor moves rightly as long as it flies level, but
 has level surfaces above it and none below.
 """
 
@@ -35,17 +36,19 @@ FITS_M, FITS_COSINE = 0.2, 0.9
 PAIRS = 15  # of walls; with fewer nothing is said
 FITTING = ((0.7, 0.2), (0.4, 0.3))  # shares of the pairs that fit with the sensor turned, and by how much they are greater than as told
 """Where motion and walls do not tell, all shares are alike; among trees fewer fit."""
+ALIKE = 0.01  # by which two shares may differ that tell nothing apart: on a way straight to a wall, turned back and mirrored are the same
 LOOKS = 2  # in a row that say the same
 ABOVE_M, BELOW_M = 0.5, 0.05  # the sensor: level planes that count
 LEVEL_PLANES, RARELY, FADING = 6.0, 0.2, 0.9  # of planes above, that many and the others rarer; by look
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 MIRROR = np.diag([1.0, -1.0, 1.0])
+FROZEN = "frozen"
 OTHERS = {
-    "mirrored": MIRROR,
     "turned by 180 degrees": QUARTER @ QUARTER,
     "turned by 90 degrees to the left": QUARTER,
     "turned by 90 degrees to the right": QUARTER.T,
+    "mirrored": MIRROR,
     "mirrored and turned by 180 degrees": QUARTER @ QUARTER @ MIRROR,
     "mirrored and turned by 90 degrees to the left": QUARTER @ MIRROR,
     "mirrored and turned by 90 degrees to the right": QUARTER.T @ MIRROR,
@@ -68,6 +71,11 @@ class _Look:
         rotations = self.rotations @ turn
         return np.einsum("nij,nj->ni", rotations, self.places) + self.origins, np.einsum("nij,nj->ni", rotations, self.normals)
 
+    def unmoved(self) -> _Look:
+        """Return the planes as they are seen from the vehicle, wherever it is."""
+        unturned = np.broadcast_to(np.eye(3), self.rotations.shape)
+        return _Look(self.stamp_ns, self.places, self.normals, unturned, np.zeros_like(self.origins))
+
     def walls(self) -> _Look:
         """Return only the planes that are upright."""
         kept = np.abs(np.einsum("nj,nj->n", self.rotations[:, 2], self.normals)) < UPRIGHT
@@ -87,7 +95,8 @@ class MountCheck:
         self._before: tuple[Floats, _Look] | None = None
         self._looked_ns = -(10**12)
         self._looks = 0
-        self._suspected, self._times = "", 0
+        self._suspected: set[str] = set()
+        self._times = 0
         self._above, self._below = 0.0, 0.0
 
     def finding(self, sweep: Sweep, T_base_lidar: Floats, poses: PoseBuffer, *, self_m: float) -> Finding:  # noqa: N803 -- T_target_source
@@ -99,7 +108,7 @@ class MountCheck:
         except PoseUnavailableError:
             return FINE
         if self._times >= LOOKS:
-            return broken(FaultKind.CALIBRATION, f"by the vehicle's own motion the LiDAR is {self._suspected}")
+            return self._found()
         if self._overturned:
             return unsure(FaultKind.CALIBRATION, "level surfaces above the LiDAR and none below: is it upside down?")
         return FINE
@@ -117,7 +126,7 @@ class MountCheck:
         if since_s < SOON_S:
             return False
         moved_m, turned_rad = self._motion(pose)
-        soon = self._looks < FIRST_LOOKS or self._suspected != "" or not self._upright
+        soon = self._looks < FIRST_LOOKS or bool(self._suspected) or not self._upright
         told = moved_m >= MOVED_M or not self._upright
         return bool(turned_rad >= TURNED_RAD or (told and (soon or since_s >= LATER_S)))
 
@@ -149,15 +158,24 @@ class MountCheck:
             return
         found = self._times >= LOOKS
         if as_told > 1.0 - FITTING[0][1] and not found:
-            self._suspected, self._times = "", 0
+            self._suspected, self._times = set(), 0
             return
         shares = {name: _fitting(before, walls, turn) or 0.0 for name, turn in OTHERS.items()}
-        best = max(shares, key=lambda name: (shares[name], name == self._suspected))
-        if any(shares[best] >= max(share, as_told + better) for share, better in FITTING):
-            self._times = self._times + 1 if best == self._suspected else 1
-            self._suspected = best
-        elif not found or as_told >= shares[self._suspected] + FITTING[0][1]:
-            self._suspected, self._times = "", 0
+        shares[FROZEN] = _fitting(before.unmoved(), walls.unmoved(), np.eye(3)) or 0.0
+        best = max(shares.values())
+        if any(best >= max(share, as_told + better) for share, better in FITTING):
+            alike = {name for name, share in shares.items() if share >= best - ALIKE}
+            self._times = self._times + 1 if alike & self._suspected else 1
+            self._suspected = alike & self._suspected or alike
+        elif not found or as_told >= max(shares[name] for name in self._suspected) + FITTING[0][1]:
+            self._suspected, self._times = set(), 0
+
+    def _found(self) -> Finding:
+        """Return what the walls tell, once they have said it often enough: all that it may be, where the motion does not tell it apart."""
+        if self._suspected == {FROZEN}:
+            return broken(FaultKind.FROZEN, "the sweeps do not change with the vehicle's own motion: the LiDAR repeats what it saw")
+        names = [name for name in (*OTHERS, FROZEN) if name in self._suspected]
+        return broken(FaultKind.CALIBRATION, f"by the vehicle's own motion the LiDAR is {' or '.join(names)}")
 
 
 def _fitting(before: _Look, now: _Look, turn: Floats) -> float | None:

@@ -36,8 +36,6 @@ def udp_socket(port: int) -> socket.socket:
 class MissionLoop(Generic[Item]):
     """Calls ``on_datagram(which socket, data)``, ``on_item(item)`` and ``on_tick()``, one at a time, until ROS shuts down.
 
-    ``others``: sockets that are there already; they count on behind those of the ports.
-
     ``now_ns`` is the mission clock: simulated where there is one, else the ROS clock at 50 Hz. After each tick ``~done`` tells its
     time, so that a simulator can wait for this loop.
     """
@@ -46,12 +44,11 @@ class MissionLoop(Generic[Item]):
         self,
         ports: Sequence[int],
         *,
-        others: Sequence[socket.socket] = (),
         on_tick: Callable[[], None],
         on_datagram: OnDatagram | None = None,
         on_item: Callable[[Item], None] | None = None,
     ) -> None:
-        self.sockets = [*(udp_socket(port) for port in ports), *others]
+        self.sockets = [udp_socket(port) for port in ports]
         self._on_tick, self._on_datagram, self._on_item = on_tick, on_datagram, on_item
         self._items: deque[Item] = deque()
         self._now_ns = self._ticked_ns = 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from pathlib import Path
 from typing import TextIO
@@ -14,19 +13,16 @@ from uav_msgs.msg import GuidanceState
 
 from alula.common.faults import FaultError, parse_faults
 from perception_core.ros import read_settings
-from radio_link import netem
 from radio_link.conditions import Quality
-from radio_link.kernel import KernelChannel, KernelError, checked_namespaces
 from radio_link.laws import LAWS, LinkBudget, Point, condition_by_law
 from radio_link.loop import NS, MissionLoop
-from radio_link.netem import Direction
-from radio_link.radio import FAULTS, Place, Radio, Situation, by_zones, emulated
+from radio_link.radio import FAULTS, Place, Radio, Situation, by_zones
 from radio_link.settings import RadioSettings
 from radio_link.vehicle import Vehicle
 from uav_simulator.errors import ConfigError
 from uav_simulator.world.config import WorldConfig, load_world
 
-VIDEO, REPORT, CONTROL, TELEMETRY = FLOWS = 0, 1, 2, 3
+VIDEO, REPORT, CONTROL, TELEMETRY = 0, 1, 2, 3
 """The flows, in the order of the sockets that take them; telemetry is what the autopilot answers to the control link."""
 STATE_PERIOD_NS = NS // 2
 
@@ -61,13 +57,10 @@ def _least_bps(quality: Quality) -> float:
 class RadioLinkNode:
     """Wires the radio to sockets, the mission clock, and what simulator or guidance know of the vehicle."""
 
-    def __init__(self, settings: RadioSettings, kernel: netem.Radio | None = None) -> None:
-        """``kernel``: the namespaces by which the kernel is the radio; raises KernelError where it can't be."""
+    def __init__(self, settings: RadioSettings) -> None:
         base = settings.base_port
         self._to = {VIDEO: base + 1, REPORT: base + 3, CONTROL: settings.control_to or base + 5, TELEMETRY: base + 8}
-        make_way = emulated(settings.seed) if kernel is None else lambda name, now: KernelChannel(kernel, Direction(name), now)
-        self._radio = Radio(make_place(settings), parse_faults(settings.faults, FAULTS), make_way=make_way)
-        self._kernel_ways = [way for way in (self._radio.down, self._radio.up) if isinstance(way, KernelChannel)]
+        self._radio = Radio(make_place(settings), parse_faults(settings.faults, FAULTS), seed=settings.seed)
         self._vehicle = Vehicle()
         self._told: tuple[Situation, bool] | None = None
         self._state_due_ns = 0
@@ -78,7 +71,6 @@ class RadioLinkNode:
         self._guidance = rospy.Subscriber("/uav_guidance/state", GuidanceState, self._on_guidance, queue_size=1)
         self._loop: MissionLoop[None] = MissionLoop(
             [base, base + 2, base + 4, 0],
-            others=[way.socket for way in self._kernel_ways],
             on_tick=self._on_tick,
             on_datagram=self._on_datagram,
         )
@@ -86,8 +78,6 @@ class RadioLinkNode:
     def run(self) -> None:
         """Work until ROS shuts down."""
         self._loop.run()
-        for way in self._kernel_ways:
-            way.close()
 
     def _on_pose(self, message: PoseStamped) -> None:
         p = message.pose.position
@@ -101,10 +91,6 @@ class RadioLinkNode:
         self._vehicle.guided((p.x, p.y, p.z), message.landed_state, message.header.stamp.to_sec())
 
     def _on_datagram(self, flow: int, data: bytes) -> None:
-        if flow not in FLOWS:
-            self._kernel_ways[flow - len(FLOWS)].arrived()
-            self._deliver(data)
-            return
         if flow in {CONTROL, TELEMETRY} and self._radio.control_lost:
             return
         channel = self._radio.down if flow in {VIDEO, TELEMETRY} else self._radio.up
@@ -162,10 +148,7 @@ def main() -> None:
     """Run the node until ROS shuts down; a wrong parameter ends it with one line."""
     rospy.init_node("radio_link")
     try:
-        settings = read_settings(RadioSettings())
-        kernel = netem.Radio(settings.base_port) if settings.netem else None
-        with contextlib.nullcontext() if kernel is None else checked_namespaces(kernel):
-            RadioLinkNode(settings, kernel).run()
-    except (ConfigError, FaultError, KernelError, ValueError, OSError) as error:
+        RadioLinkNode(read_settings(RadioSettings())).run()
+    except (ConfigError, FaultError, ValueError, OSError) as error:
         rospy.logfatal(str(error))
         raise SystemExit(2) from error

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from alula.common.faults import FaultRequest
-from radio_link.channel import Channel, Condition
+from radio_link.channel import Channel
 from radio_link.conditions import PRESETS, Both, Quality
 from radio_link.laws import Point
 from uav_simulator.world.radio import RadioZone, radio_zone_at
@@ -43,43 +42,17 @@ def by_zones(zones: Iterable[RadioZone]) -> Place:
     return look
 
 
-class Way(Protocol):
-    """One direction: a ``Channel``, or the kernel's own."""
-
-    condition: Condition
-    sent: int
-    delivered: int
-    lost: int
-    dropped: int
-
-    def send(self, data: bytes, now_ns: int) -> None:
-        """Take a datagram."""
-
-    def due(self, now_ns: int) -> list[bytes]:
-        """Return what has arrived."""
-
-
-MakeWay = Callable[[str, Condition], Way]
-"""Makes the way "down" or "up"."""
-
-
-def emulated(seed: int) -> MakeWay:
-    """Return what makes ways that are emulated here, packet by packet."""
-    return lambda name, condition: Channel(condition, 2 * seed + (name == "up"))
-
-
 class Radio:
     """Carries datagrams of numbered flows. ``place``: how good the radio is at the vehicle's place, None while that is not known.
 
     Times of faults count from lift-off on the mission clock.
     """
 
-    def __init__(self, place: Place, faults: Sequence[FaultRequest] = (), *, make_way: MakeWay | None = None) -> None:
+    def __init__(self, place: Place, faults: Sequence[FaultRequest] = (), *, seed: int = 0) -> None:
         self._place = place
         self._faults = tuple(faults)
         self.situation = place(None)
-        make = make_way or emulated(0)
-        self.down, self.up = make("down", self.situation.both.down), make("up", self.situation.both.up)
+        self.down, self.up = Channel(self.situation.both.down, 2 * seed), Channel(self.situation.both.up, 2 * seed + 1)
         self.control_lost = False
 
     def look(self, point: Point | None, since_lift_off_s: float | None) -> None:

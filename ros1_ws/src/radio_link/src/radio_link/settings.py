@@ -14,7 +14,7 @@ class RadioSettings:
     goes to the ground (+8). A player has +6 and, for RTCP, +7.
     """
 
-    base_port: int = 42000
+    base_port: int = 20000
     control_to: int = 0  # UDP port of the autopilot for its ground station; 0: base_port + 5
     world: str = ""  # world file with radio_zones; empty: good everywhere
     law: str = "zones"  # or free_space, two_ray, obstructed: then distance and obstruction decide, not the zones
@@ -22,6 +22,5 @@ class RadioSettings:
     station_north_m: float = -2.0
     station_height_m: float = 2.0
     faults: str = ""  # as radio@40-55,control@60: seconds after lift-off
-    netem: bool = False  # the kernel is the radio, by network namespaces, tbf and netem, in real time; needs root
-    seed: int = 0  # of the chance of the emulation here; the kernel has its own
+    seed: int = 0  # of the chance of the emulation
     log_path: str = ""  # file for a line of JSON whenever the radio changes; empty: none

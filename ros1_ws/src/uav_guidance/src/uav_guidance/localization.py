@@ -81,6 +81,8 @@ class Localization:
         self._sound_since_s: float | None = None
         self._begun = False
         self._stepped_s: float | None = None
+        self._above_m = self._level_m = 0.0
+        """The map's height above the autopilot's, as told last, and what of it is no slow change."""
 
     def tune(self, settings: Settings) -> None:
         """Go on with other settings."""
@@ -117,11 +119,12 @@ class Localization:
         It jumps to the first transform, which a guidance started again in flight hears, and to one that is farther off than
         ``map_jump_m`` or ``map_jump_rad``: then a loop was closed, or the autopilot counts from another origin. To follow that slowly
         would keep the vehicle off its places for long, and move one that holds its place. The caller begins again from where the vehicle
-        is, so that no setpoint jumps.
+        is, so that no setpoint jumps. In flight a height that changes slowly is followed up to ``map_height_m``: the autopilot's, a
+        barometer's, does not grow wrong with the way, and a map that is not level must not lead the vehicle to the ground.
         """
         passed_s = 0.0 if self._stepped_s is None else min(max(now_s - self._stepped_s, 0.0), LONGEST_STEP_S)
         self._stepped_s = now_s
-        wanted = self._wanted(place_odom_m)
+        wanted = self._wanted(place_odom_m, flying=flying)
         if wanted is None:
             return False
         here = self.correction.to_map(place_odom_m)
@@ -141,7 +144,18 @@ class Localization:
             log.warning("the vehicle's place in map jumps by %.2f m and %.1f degrees", shift.norm, math.degrees(abs(turn)))
         return flying
 
-    def _wanted(self, place_odom_m: Vec3) -> Correction | None:
+    def _wanted(self, place_odom_m: Vec3, *, flying: bool) -> Correction | None:
         if not self._settings.follow_map:
             return NO_CORRECTION
-        return None if self._newest is None else self._newest.level_at(place_odom_m)
+        if self._newest is None:
+            return None
+        told = self._newest.level_at(place_odom_m)
+        above_m, before_m = told.shift_m.z, self._above_m
+        self._above_m = above_m
+        if not (flying and self._begun):
+            self._level_m = above_m
+        elif abs(above_m - before_m) > self._settings.map_jump_m:
+            self._level_m += above_m - before_m
+        most_m = self._settings.map_height_m
+        bounded_m = min(max(above_m, self._level_m - most_m), self._level_m + most_m)
+        return Correction(told.yaw_rad, Vec3(told.shift_m.x, told.shift_m.y, bounded_m))

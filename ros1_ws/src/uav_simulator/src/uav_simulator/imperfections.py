@@ -20,6 +20,16 @@ class Imperfections:
     """Error of the autopilot's position, metres a metre flown, in a direction that depends on the seed."""
     yaw_drift_deg: float = 0.0
     """Error of the autopilot's heading, degrees every 100 m flown."""
+    yaw_walk_deg: float = 0.0
+    """The autopilot's heading wanders in the air, from right to off by so much and back, once in 100 s."""
+    tilt_bias_deg: float = 0.0
+    """Error of the autopilot's roll and pitch, each with a sign that depends on the seed."""
+    tilt_walk_deg: float = 0.0
+    """Standard deviation of what comes on top of it, slowly (30 s)."""
+    height_noise_m: float = 0.0
+    """Standard deviation of the autopilot's height, within half a second: the barometer's noise."""
+    height_drift_m: float = 0.0
+    """Standard deviation of the autopilot's height, slowly (60 s): the weather."""
     position_jump_m: float = 0.0
     """The autopilot's position jumps by so much, each time in another direction, ..."""
     jump_every_s: float = 20.0
@@ -45,6 +55,11 @@ PRESETS = {
     "realistic": Imperfections(
         position_drift=0.01,
         yaw_drift_deg=1.0,
+        yaw_walk_deg=2.3,
+        tilt_bias_deg=0.17,
+        tilt_walk_deg=0.03,
+        height_noise_m=0.005,
+        height_drift_m=0.01,
         position_jump_m=0.1,
         jump_every_s=30.0,
         pixel_noise=3.0,

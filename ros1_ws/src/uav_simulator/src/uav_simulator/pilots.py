@@ -6,6 +6,7 @@ import logging
 import time
 from typing import Protocol
 
+from uav_simulator.ardupilot.protocol import options
 from uav_simulator.ardupilot.vehicle import ArduPilotVehicle
 from uav_simulator.autopilot.link_server import LinkServer
 from uav_simulator.autopilot.params import parse_parameters
@@ -78,7 +79,7 @@ class ArduPilotPilot:
     def __init__(self, settings: Settings, home: Vec3) -> None:
         self.flown = ArduPilotVehicle(seed=settings.seed, home=home, port=settings.ardupilot_port)
         self.ports = {"ardupilot_port": self.flown.port}
-        log.info("the body waits for ArduPilot on UDP 127.0.0.1:%d (--model JSON:127.0.0.1)", self.flown.port)
+        log.info("the body waits for ArduPilot on UDP 127.0.0.1:%d (%s)", self.flown.port, options(self.flown.port))
 
     def serve(self, wait_s: float = 0.0) -> None:
         """Wait: packets are taken by the vehicle's tick alone, for each of them moves the body."""

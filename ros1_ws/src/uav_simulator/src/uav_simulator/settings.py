@@ -22,7 +22,7 @@ class Settings:
     # The body's autopilot: simulated (the simulator's own autopilot), ardupilot (its JSON interface), or followed:URL (it is where the
     # autopilot at a MAVLink connection says, on that one's clock).
     vehicle: str = "simulated"
-    ardupilot_port: int = 9002  # UDP on loopback, where ArduPilot's motor outputs come
+    ardupilot_port: int = 9002  # UDP on loopback, where ArduPilot's motor outputs come: 9002 + 10 x its instance
     imperfections: str = "off"  # off, realistic, or NAME=VALUE,... as in imperfections.py
     mavlink_port: int = 5760  # TCP on loopback, for the companion; 0: any free one, which the parameter then tells
     gcs_port: int = -1  # UDP on loopback, for a ground station; 0: any free one, which the parameter then tells; -1: one is made up

@@ -14,8 +14,8 @@ class StreamSettings:
     source_width: int = 640  # asked of a device
     source_height: int = 360
     source_fps: float = 20.0
-    video_port: int = 42000  # of the radio: where RTP goes
-    report_port: int = 42003  # of this node: where the ground station's reports arrive
+    video_port: int = 20000  # of the radio: where RTP goes
+    report_port: int = 20003  # of this node: where the ground station's reports arrive
     key: str = "alula"  # shared with the ground station
     enabled: bool = False
     video_path: str = ""  # folder for sent.mkv and sent.jsonl; empty: nothing is recorded

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 THUMB = 8  # pixels of the image averaged into one: noise of 8 grey levels has 1 there, content keeps its contrast
 SATURATED = 250
 STRIDE = 3
+EMPTY_ROWS = 0.15  # of the image, of one grey level each: margins of a rectified image may be; a sky is white where it is
 SHARPNESS_FELL = 0.6  # from image to image of a good camera it falls to 0.9 at most
 
 
@@ -66,6 +67,7 @@ class ImageJudge:
         thumb = np.asarray(cv2.resize(image[: rows * THUMB, : columns * THUMB], (columns, rows), interpolation=cv2.INTER_AREA))
         mean, contrast = float(thumb.mean()), float(thumb.std())
         saturated = np.count_nonzero(sample >= SATURATED) / sample.size
+        empty = float(np.mean((sample.max(axis=1) == sample.min(axis=1)) & (sample[:, 0] < SATURATED)))
         told = f"mean {mean:.0f}, contrast {contrast:.1f} of 255"
         if saturated > limits.max_saturated:
             return broken(FaultKind.EXPOSURE, f"{side} image is overexposed: {saturated:.0%} of it is white")
@@ -80,6 +82,8 @@ class ImageJudge:
         if contrast < limits.min_contrast:
             self._blank.add(side)
             return broken(FaultKind.EXPOSURE, f"{side} image is blank ({told})")
+        if empty > EMPTY_ROWS:
+            return broken(FaultKind.FORMAT, f"a part of the {side} image is missing: {empty:.0%} of its rows have one grey level only")
         return FINE
 
 

@@ -12,6 +12,8 @@ from perception_core import FINE, NS, FaultKind, Finding, broken, first_trouble,
 from zed_depth.calibration import CalibrationError, InfoLike, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
 from zed_depth.depth_scale import ScaleJudge
+from zed_depth.fixed_columns import fixed_columns_finding
+from zed_depth.image_fit import fit_of
 from zed_depth.image_health import SHARPNESS_FELL, ImageJudge
 from zed_depth.stereo import DisparityRange, StereoMatcher, depth_of
 from zed_depth.view_health import ViewLimits, view_of
@@ -52,6 +54,7 @@ class StereoRig:
     Both images are held against each other every ``view_period_s``, which takes as long as half a matching. A fault in between shows by
     what each pair tells at little cost: images that lost their sharpness are held against each other at once; where fewer pixels have a
     depth or a parallax than in the pair before, the pair is in doubt, and so are those after it until both images were found to fit again.
+    Where depths are measured, each pair is judged by whether its images fit each other at them, else a pair of every ``view_period_s`` is.
     ``camera_pose`` tells the left camera's pose, without which the scale of the depths can't be judged.
     """
 
@@ -62,13 +65,16 @@ class StereoRig:
         self._images = ImageJudge(settings.images)
         self._infos: dict[str, InfoLike] = {}
         self._lock = Lock()
+        self._matching = Lock()
         self._calibration: StereoCalibration | None = None
         self._info_finding = unsure(FaultKind.INFO, "no camera_info of both sides yet")
         self._matcher: tuple[StereoGeometry, StereoMatcher] | None = None
         self._view = FINE
         self._view_ns: int | None = None
         self._sharpness: float | None = None  # of the images that were last held against each other
-        self._valid = FINE
+        self._valid = FINE  # of the last pair of which the depth was asked for
+        self._fit = FINE  # of the last pair that was matched
+        self._matched_ns: int | None = None
         self._shares: dict[str, float] = {}  # of the pixels with a depth and with a parallax, in the last pair that was not in doubt
         self._doubted_ns: int | None = None  # the first pair in doubt
 
@@ -92,23 +98,26 @@ class StereoRig:
         except CalibrationError as error:
             finding = broken(FaultKind.INFO, str(error))
         with self._lock:
-            self._calibration, self._info_finding, self._view_ns, self._valid = calibration, finding, None, FINE
+            self._calibration, self._info_finding, self._view_ns = calibration, finding, None
+            self._valid, self._fit, self._matched_ns = FINE, FINE, None
             self._shares, self._doubted_ns = {}, None
         self._scale = ScaleJudge(self._settings.scale)
 
     def finding(self, pair: StereoPair) -> Finding:
         """Return what this pair tells of the rig; call it once for each pair, in order."""
-        images = self._images.finding(pair)
+        images = first_trouble(self._images.finding(pair), fixed_columns_finding(pair.left, pair.right))
         with self._lock:
-            calibration, info, valid = self._calibration, self._info_finding, self._valid
+            calibration, info = self._calibration, self._info_finding
         if calibration is None or not images.ok:
             self._view_ns = None  # what comes after the trouble is looked at at once
             return first_trouble(info, images)
-        if self._due(pair):
-            try:
-                prepared = calibration.prepared(pair.left, pair.right)
-            except CalibrationError as error:
-                return broken(FaultKind.INFO, str(error))
+        try:
+            if self._match_due(pair):
+                self._matched(calibration, pair)
+            prepared = calibration.prepared(pair.left, pair.right) if self._due(pair) else None
+        except CalibrationError as error:
+            return broken(FaultKind.INFO, str(error))
+        if prepared is not None:
             view = view_of(*prepared, offset_px=calibration.geometry.offset_px, limits=self._view_limits())
             self._view = view.finding
             if view.landmarks is not None:
@@ -116,7 +125,8 @@ class StereoRig:
             self._sharpness = self._images.sharpness
             with self._lock:
                 self._view_ns = pair.stamp_ns
-        return first_trouble(self._view, self._scale.finding, valid)
+        with self._lock:
+            return first_trouble(self._view, self._scale.finding, self._fit, self._valid)
 
     def _view_limits(self) -> ViewLimits:
         """Return the limits; once found off, the rows must be clearly right again, or what is at the limit would flap."""
@@ -134,25 +144,48 @@ class StereoRig:
             return True
         return not 0 <= pair.stamp_ns - checked_ns < self._settings.view_period_s * NS
 
+    def _match_due(self, pair: StereoPair) -> bool:
+        """Return whether this pair must be matched to be judged: nothing else measures depths, or the last ones were not good."""
+        with self._lock:
+            matched_ns, ok = self._matched_ns, self._fit.ok and self._valid.ok
+        return matched_ns is None or not ok or not 0 <= pair.stamp_ns - matched_ns < self._settings.view_period_s * NS
+
     def depth(self, pair: StereoPair) -> Depth:
         """Measure the depth of a pair; raise CalibrationError."""
         with self._lock:
             calibration = self._calibration
         if calibration is None:
             raise CalibrationError(self._info_finding.reason)
-        matcher = self._matcher_for(calibration.geometry)
-        images = calibration.prepared(pair.left, pair.right)
-        disparity = matcher.disparity(*images)
-        if calibration.unseen is not None:
-            disparity[calibration.unseen] = np.nan
+        depth = self._matched(calibration, pair)
+        disparity = depth.disparity_px
         share = np.count_nonzero(np.isfinite(disparity)) / disparity.size
-        finding = FINE if share >= self._settings.min_valid else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
         parallax = disparity > calibration.geometry.offset_px + self._settings.view.min_parallax_px
         nearer = np.count_nonzero(parallax) / disparity.size
         with self._lock:
-            self._valid = finding
+            self._valid = self._valid_finding(disparity)
             doubt = self._doubt({"depth": share, "parallax": nearer}, pair.stamp_ns)
-        return Depth(depth_of(disparity, calibration.geometry), calibration.geometry, disparity, images, doubt)
+        return replace(depth, doubt=depth.doubt or doubt)
+
+    def _valid_finding(self, disparity: NDArray[np.float32]) -> Finding:
+        share = np.count_nonzero(np.isfinite(disparity)) / disparity.size
+        enough = share >= self._settings.min_valid
+        return FINE if enough else unsure(FaultKind.VIEW, f"only {share:.1%} of the image has a depth")
+
+    def _matched(self, calibration: StereoCalibration, pair: StereoPair) -> Depth:
+        """Match a pair, and judge whether its images fit; raise CalibrationError."""
+        geometry, images = calibration.geometry, calibration.prepared(pair.left, pair.right)
+        with self._matching:
+            matcher = self._matcher_for(geometry)
+            disparity = matcher.disparity(*images)
+            noise = matcher.noise
+        if calibration.unseen is not None:
+            disparity[calibration.unseen] = np.nan
+        fit = fit_of(disparity, *images, last_px=matcher.search.last, noise=noise)
+        with self._lock:
+            self._fit, self._matched_ns = fit.finding, pair.stamp_ns
+            if not self._valid.ok:
+                self._valid = self._valid_finding(disparity)
+        return Depth(depth_of(disparity, geometry), geometry, disparity, images, fit.finding.reason or fit.doubt)
 
     def _doubt(self, shares: dict[str, float], stamp_ns: int) -> str:
         """Return why a pair with these shares of pixels is in doubt, or an empty text; with the lock held."""

@@ -92,7 +92,8 @@ class StereoMatcher:
         self.search = search
         self._sgbm = sgbm(settings, search, settings.speckle_px)
         self._coarse = self._coarse_for(0)
-        self._noise = 0.0
+        self.noise = 0.0
+        """Deviation of the left images' noise, grey levels."""
         self._pairs = 0
 
     def _coarse_for(self, width: int) -> tuple[int, int, cv2.StereoSGBM]:
@@ -135,9 +136,9 @@ class StereoMatcher:
     def _textured(self, image: Gray) -> Gray:
         """Return 255 where there is enough texture around a pixel to be matched, else 0, (h, w)."""
         if self._pairs % NOISE_EVERY == 0:
-            self._noise = noise_level(image)
+            self.noise = noise_level(image)
         self._pairs += 1
-        least = min(self._settings.texture_per_noise * self._noise, self._settings.enough_texture)
+        least = min(self._settings.texture_per_noise * self.noise, self._settings.enough_texture)
         # The difference spans two pixels.
         difference = np.zeros_like(image)
         cv2.absdiff(image[:, 2:], image[:, :-2], dst=difference[:, 1:-1])

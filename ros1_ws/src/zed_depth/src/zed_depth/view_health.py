@@ -9,7 +9,7 @@ coarse disparity image puts them, which the smoothness of surfaces keeps from be
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import cv2
@@ -30,6 +30,7 @@ FEW_FEATURES = 60
 ENOUGH_FEATURES = 120
 ENOUGH_MATCHES = 20
 AGREE_PX = 2.0
+FEW_MISTAKEN = 3  # features that may be mistaken for others in the same row
 FIRST_GUESS_SHARE = 0.03  # of the height: by as much the rows of a camera that is off may differ over the image
 FITS = 4
 EDGE_PX = 9
@@ -39,12 +40,18 @@ STRONGEST = 99.5  # percentile of the gradient: the edges that are looked at
 
 @dataclass(frozen=True)
 class ViewLimits:
-    """Pixels of the image that is matched, and shares (0..1); measured on real images, see docs/perception.md."""
+    """Pixels of the image that is matched, and shares (0..1); measured on real images, see docs/perception.md.
+
+    Of the features ``max_negative`` have a negative disparity where the cameras are swapped, ``max_beyond`` one of less than -``beyond_px``
+    where one of them is turned aside: what is far away seems to be beyond infinity.
+    """
 
     max_vertical_px: float = 0.8
     min_agreeing: float = 0.25
     min_followed: float = 0.3
     max_negative: float = 0.5
+    max_beyond: float = 0.05
+    beyond_px: float = 0.7
     min_parallax_px: float = 0.5
     max_edge_px: float = 6.0
 
@@ -80,13 +87,15 @@ def view_of(left: Gray, right: Gray, *, offset_px: float, limits: ViewLimits) ->
     gain = _gain(left, right, matches, fit.agree)
     # A feature is followed by its light: as bright as in the left image.
     sure = refine(left, brighter(right, 1.0 / gain), matches, fit.agree)
+    matched_px = disparity_px = matches.disparity_px[fit.agree] - offset_px
     if len(sure.vertical_px) >= ENOUGH_MATCHES:
-        fit = replace(fit_rows(sure, first_guess_px), agree=fit.agree)
+        fit = fit_rows(sure, first_guess_px)
+        disparity_px = sure.disparity_px[fit.agree] - offset_px if np.any(fit.agree) else matched_px
     # A lens that is partly covered leaves few features, which may seem to be turned: it is looked for first.
     trouble = (
         covered_finding(left, right, offset_px, gain)
         or _rows_finding(fit, left.shape, limits)
-        or _disparity_finding(matches.disparity_px[fit.agree] - offset_px, limits)
+        or _disparity_finding(matched_px, disparity_px, limits)
     )
     return View(FINE, Landmarks(left, sure.places, sure.disparity_px)) if trouble is None else View(trouble)
 
@@ -165,11 +174,16 @@ def _rows_finding(fit: RowFit, shape: tuple[int, ...], limits: ViewLimits) -> Fi
     return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair") if troubles[told] > limits.max_vertical_px else None
 
 
-def _disparity_finding(disparity_px: Floats, limits: ViewLimits) -> Finding | None:
-    negative = float(np.mean(disparity_px < -1.0))
+def _disparity_finding(matched_px: Floats, refined_px: Floats, limits: ViewLimits) -> Finding | None:
+    """Judge disparities of matched features (N,), and of those that are known to a fraction of a pixel (M,), from infinity on."""
+    negative = float(np.mean(matched_px < -1.0))
     if negative > limits.max_negative:
         return broken(FaultKind.CALIBRATION, f"left and right are swapped: {negative:.0%} of the features have a negative disparity")
-    if float(np.percentile(np.abs(disparity_px), 95.0)) < limits.min_parallax_px:
+    beyond = np.count_nonzero(refined_px < -limits.beyond_px)
+    if beyond > max(FEW_MISTAKEN, limits.max_beyond * len(refined_px)):
+        told = f"the cameras are turned aside against each other: {beyond} of {len(refined_px)} features seem to be beyond infinity"
+        return broken(FaultKind.CALIBRATION, f"{told}: calibrate the pair")
+    if float(np.percentile(np.abs(matched_px), 95.0)) < limits.min_parallax_px:
         return unsure(FaultKind.VIEW, "no parallax: everything is far away, or both cameras show the same")
     return None
 

@@ -12,8 +12,21 @@ from dataclasses import dataclass
 
 from uav_simulator.frames import Quat, Vec3
 
+PORT, PORTS_OF_INSTANCE = 9002, 10
+"""UDP port where ArduPilot's simulator looks for the body, and by how much it is above for each further instance of it on a machine."""
 OUTPUTS_OF_MAGIC = {18458: 16, 29569: 32}
 _HEAD = struct.Struct("<HHI")
+
+
+def options(port: int, instance: int | None = None) -> str:
+    """Return the options by which ArduPilot's simulator looks for the body at a port; ``instance``: the one that its other ports say.
+
+    Its command line (AP_HAL_SITL, SITL_cmdline.cpp): ``-I N`` puts every port 10 N above; ``--sim-port-out`` names this one.
+    """
+    number, rest = divmod(port - PORT, PORTS_OF_INSTANCE)
+    own = max(number, 0) if instance is None else instance
+    other = "" if rest == 0 and number == own else f" --sim-port-out {port}"
+    return f"--model JSON:127.0.0.1 -I{own}{other}"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import time
 from dataclasses import dataclass
 
 from uav_simulator.ardupilot.motors import HexaX, thrusts_n
-from uav_simulator.ardupilot.protocol import BodyState, MotorPacket, answer, parse_packet
+from uav_simulator.ardupilot.protocol import PORT, BodyState, MotorPacket, answer, options, parse_packet
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.contacts import CRUISE_HEIGHT_M
 from uav_simulator.errors import SimulatorError
@@ -25,7 +25,6 @@ from uav_simulator.vehicle.noise import Wind
 from uav_simulator.vehicle.quaternion import rotate, rotation_vector
 from uav_simulator.vehicle.rigid_body import ZERO, RigidBody
 
-PORT = 9002  # where ArduPilot's simulator looks for the body
 BUFFER = 4096
 WAIT_S = 0.1  # wall clock that one call of `tick` waits for a packet
 GROUND_DECEL_M_S2 = 60.0  # a softer landing than the accelerometers' range of 16 g
@@ -126,7 +125,7 @@ class ArduPilotVehicle:
     def _tell_silence(self) -> None:
         if time.monotonic() >= self._tell_wall_s:
             self._tell_wall_s += SILENCE_S
-            log.warning("no motor outputs on UDP port %d for %g s: is ArduPilot running with --model JSON:127.0.0.1?", self.port, SILENCE_S)
+            log.warning("no motor outputs on UDP port %d for %g s: does ArduPilot run with %s?", self.port, SILENCE_S, options(self.port))
 
     def _take(self, received: _Received, dt_s: float) -> bool:
         """Make the packet's step and answer; one that comes twice gets its answer again. Return whether there was a step."""

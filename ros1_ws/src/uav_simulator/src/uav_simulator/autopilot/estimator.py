@@ -17,6 +17,7 @@ LOCATED_AFTER_S = 42.0  # of power: GPS fix, origin, position
 PERFECT = Imperfections()
 HOVER_M_S = 0.2  # slower is no travel
 BEARING_RAD_SQRT_M = 0.05  # how fast the drift changes its direction
+YAW_WALK_S = 100.0  # there and back
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Estimate:
 
 
 class Drift:
-    """An error of position and heading that grows with the way flown and jumps now and then; zero before the first flight."""
+    """An error of position and heading that grows with the way flown, wanders and jumps now and then; zero before the first flight."""
 
     def __init__(self, imperfections: Imperfections, seed: int) -> None:
         self._imperfections = imperfections
@@ -51,7 +52,14 @@ class Drift:
         self._last: Vec3 | None = None
         self._jump_due_s = imperfections.jump_every_s
         self.offset: Vec3 = (0.0, 0.0, 0.0)
-        self.yaw_rad = 0.0
+        self._flown_s = 0.0
+        self._turned_rad = 0.0
+
+    @property
+    def yaw_rad(self) -> float:
+        """The heading's error."""
+        walk_rad = math.radians(self._imperfections.yaw_walk_deg) * math.sin(math.pi * self._flown_s / YAW_WALK_S) ** 2
+        return self._turned_rad + self._turn_sign * walk_rad
 
     def step(self, body: RigidBody, dt_s: float) -> None:
         """Go on with the body."""
@@ -64,7 +72,8 @@ class Drift:
         limits = self._imperfections
         self._bearing_rad += self._random.gauss(0.0, BEARING_RAD_SQRT_M) * math.sqrt(way_m)
         self._move(limits.position_drift * way_m, self._bearing_rad)
-        self.yaw_rad += self._turn_sign * math.radians(limits.yaw_drift_deg) * way_m / 100.0
+        self._flown_s += dt_s
+        self._turned_rad += self._turn_sign * math.radians(limits.yaw_drift_deg) * way_m / 100.0
         self._jump_due_s -= dt_s
         if limits.position_jump_m > 0.0 and self._jump_due_s <= 0.0:
             self._jump_due_s += max(limits.jump_every_s, 1.0)
@@ -75,11 +84,41 @@ class Drift:
         self.offset = (x + length_m * math.cos(bearing_rad), y + length_m * math.sin(bearing_rad), z)
 
 
+class Leaning:
+    """An error of roll and pitch, about the body's axes: a constant, as from an accelerometer's bias, and a slow walk."""
+
+    def __init__(self, imperfections: Imperfections, seed: int) -> None:
+        chance = random.Random(f"ekf tilt {seed}")  # noqa: S311 - repeatable on purpose
+        bias_rad, walk_rad = math.radians(imperfections.tilt_bias_deg), math.radians(imperfections.tilt_walk_deg)
+        self._bias_rad = (chance.choice((-bias_rad, bias_rad)), chance.choice((-bias_rad, bias_rad)))
+        self._walk = SlowNoise(sigma=walk_rad, tau_s=30.0, limit=3.0 * walk_rad, seed=f"ekf tilt walk {seed}")
+
+    def step(self, dt_s: float) -> Quat:
+        """Return the turn from the body to where the autopilot takes it to be."""
+        walk = self._walk.step(dt_s)
+        x, y = (0.5 * (bias + moved) for bias, moved in zip(self._bias_rad, walk, strict=False))
+        return math.sqrt(1.0 - x * x - y * y), x, y, 0.0
+
+
+class Barometer:
+    """An error of height: noise, and a slow drift."""
+
+    def __init__(self, imperfections: Imperfections, seed: int) -> None:
+        noise_m, drift_m = imperfections.height_noise_m, imperfections.height_drift_m
+        self._noise = SlowNoise(sigma=noise_m, tau_s=0.5, limit=3.0 * noise_m, seed=f"ekf height noise {seed}")
+        self._drift = SlowNoise(sigma=drift_m, tau_s=60.0, limit=3.0 * drift_m, seed=f"ekf height drift {seed}")
+
+    def step(self, dt_s: float) -> float:
+        """Return the error, metres."""
+        return self._noise.step(dt_s)[2] + self._drift.step(dt_s)[2]
+
+
 class Estimator:
-    """Adds the errors; without any drift each axis stays within 1.7 cm, so the position within 3 cm."""
+    """Adds the errors; without imperfections each axis stays within 1.7 cm, so the position within 3 cm."""
 
     def __init__(self, seed: int, imperfections: Imperfections = PERFECT) -> None:
-        self._drift = Drift(imperfections, seed)
+        self._drift, self._leaning = Drift(imperfections, seed), Leaning(imperfections, seed)
+        self._barometer = Barometer(imperfections, seed)
         self._position = SlowNoise(sigma=0.007, tau_s=20.0, limit=0.017, seed=f"ekf position {seed}")
         self._velocity = SlowNoise(sigma=0.01, tau_s=2.0, limit=0.03, seed=f"ekf velocity {seed}")
         self._yaw = SlowNoise(sigma=math.radians(0.3), tau_s=30.0, limit=math.radians(1.0), seed=f"ekf yaw {seed}")
@@ -88,14 +127,15 @@ class Estimator:
         """Return the estimate of a body's state."""
         dp, dv = self._position.step(dt_s), self._velocity.step(dt_s)
         self._drift.step(body, dt_s)
+        up_m = self._barometer.step(dt_s)
         yaw, drift = self._yaw.step(dt_s)[0] + self._drift.yaw_rad, self._drift.offset
         if body.on_ground:
             dv = (0.0, 0.0, 0.0)  # zero-velocity updates hold the filter while the vehicle stands
         p, v = body.position, body.velocity
         return Estimate(
-            position=(p[0] + dp[0] + drift[0], p[1] + dp[1] + drift[1], p[2] + dp[2] + drift[2]),
+            position=(p[0] + dp[0] + drift[0], p[1] + dp[1] + drift[1], p[2] + dp[2] + drift[2] + up_m),
             velocity=(v[0] + dv[0], v[1] + dv[1], v[2] + dv[2]),
-            attitude=multiply(from_yaw(yaw), body.attitude),
+            attitude=multiply(multiply(from_yaw(yaw), body.attitude), self._leaning.step(dt_s)),
             rates=body.rates,
             yaw_error_rad=yaw,
         )
