@@ -160,7 +160,7 @@ def test_it_is_said_for_what_a_run_waits(tmp_path: Path) -> None:
 
 
 def test_each_wait_is_shown_once_and_remembered_until_it_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("alula.report.waits.LOOK_S", 0.0)
+    monkeypatch.setattr("alula_flight.waits.LOOK_S", 0.0)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.bind(("127.0.0.1", 0))
         url = f"tcp:127.0.0.1:{server.getsockname()[1]}"

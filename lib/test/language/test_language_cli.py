@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -84,8 +85,12 @@ def test_as_a_program(tmp_path):
     assert done.returncode == 1
     assert "did you mean `skill`?" in done.stdout
     assert done.stderr == ""
-    done = subprocess.run([sys.executable, "-m", "alula.commands.check"], capture_output=True, text=True, check=False)
+    nowhere = {**os.environ, "ALULA_ROBOT": ""}
+    done = subprocess.run(
+        [sys.executable, "-m", "alula.commands.check"], cwd=tmp_path, env=nowhere, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 2
+    assert "robot.yaml" in done.stderr
 
 
 UAV = """
