@@ -19,8 +19,9 @@ from alula.campaign.running import run
 from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
+from alula.common.robots import RobotError
 from alula.common.runs import runs_folder
-from alula.common.scenarios import load_scenario, scenario_names
+from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
 from alula.records.causes.fault_file import reaches_of_robot
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
@@ -95,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.flights)} flights are in {out / ROWS}\n")
         run(campaign, table, out, Teller(len(campaign.flights), len(table.rows)), given.dask)
         coverage = finish(table, out, f"Campaign {given.file.stem}")
-    except AnalysisError as error:
+    except (AnalysisError, RobotError, ScenarioError) as error:
         sys.stderr.write(f"alula campaign: {error}\n")
         return CANNOT_START
     except OSError as error:
