@@ -23,6 +23,7 @@ def world_lines(world: str, part: RosPart, root: Path) -> Iterator[str]:
     """Yield what a robot has in a world."""
     yield f"robot_packages{world}={':'.join(place(path, root) for path in part.packages)}"
     yield f"robot_python{world}={place(part.python, root) if part.python else ''}"
+    yield f"robot_underlays{world}=({' '.join(place(path, root) for path in part.underlays)})"
     yield f"robot_debian{world}={shlex.quote(' '.join(part.debian))}"
 
 

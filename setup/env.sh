@@ -2,6 +2,7 @@
 # ALULA_ROOT must be set. It is the robot's where its overlay has been built, else Alula's alone.
 # The caller's ROS_MASTER_URI, ROS_DOMAIN_ID, ROS_LOG_DIR and display settings are kept.
 unset PYTHONHOME AMENT_PREFIX_PATH COLCON_PREFIX_PATH CMAKE_PREFIX_PATH PYTHONPATH LD_LIBRARY_PATH ROS_PACKAGE_PATH ROS_ROOT ROS_DISTRO VIRTUAL_ENV
+unset ALULA_UNDERLAYS ALULA_UNDERLAY_PYTHON ALULA_UNDERLAY_LIBRARIES ALULA_UNDERLAY_PACKAGES
 . "$ALULA_ROOT/setup/places.sh"
 export PYTHONUNBUFFERED=1 PYTHONNOUSERSITE=1
 # Numeric libraries: many small processes share few cores, a pool of threads in each only makes them wait for one another.
@@ -12,23 +13,25 @@ robot_packages1=""
 if [ -n "$ALULA_ROBOT_STATE" ] && [ -x "$ALULA_ROBOT_STATE/venv$1/bin/python3" ]; then
   _robot=$ALULA_ROBOT_STATE
   . "$_robot/robot.env"
+  [ ! -f "$_robot/underlays$1.env" ] || . "$_robot/underlays$1.env"
 fi
+_below="${ALULA_UNDERLAYS:+$ALULA_UNDERLAYS:}"
 export PATH="${_robot:+$_robot/venv$1/bin:}$ALULA_STATE/venv$1/bin:$_path"
 case "$1" in
   1)
     export ROS_VERSION=1 ROS_PYTHON_VERSION=3 ROS_ETC_DIR=/etc/ros
-    export ROS_PACKAGE_PATH="${robot_packages1:+$robot_packages1:}$ALULA_STATE/ros1/src:/usr/share"
-    export CMAKE_PREFIX_PATH="${_robot:+$_robot/ros1/devel:}$ALULA_STATE/ros1/devel:/usr"
+    export ROS_PACKAGE_PATH="${robot_packages1:+$robot_packages1:}$ALULA_STATE/ros1/src:${ALULA_UNDERLAY_PACKAGES:+$ALULA_UNDERLAY_PACKAGES:}/usr/share"
+    export CMAKE_PREFIX_PATH="${_robot:+$_robot/ros1/devel:}$ALULA_STATE/ros1/devel:$_below/usr"
     export ROS_MASTER_URI="${ROS_MASTER_URI:-http://127.0.0.1:11311}"
     # Loopback, unless the caller has given this machine a name: roscpp takes no peers by name beside a loopback address.
     [ -n "${ROS_HOSTNAME:-}" ] || export ROS_IP="${ROS_IP:-127.0.0.1}"
     ;;
   2)
     export ROS_VERSION=2 ROS_DISTRO=jazzy ROS_PYTHON_VERSION=3
-    export AMENT_PREFIX_PATH="${_robot:+$_robot/ros2/install:}$ALULA_STATE/ros2/install:$ALULA_STATE/venv2"
+    export AMENT_PREFIX_PATH="${_robot:+$_robot/ros2/install:}$ALULA_STATE/ros2/install:$_below$ALULA_STATE/venv2"
     export CMAKE_PREFIX_PATH="$AMENT_PREFIX_PATH"
     # The wheels would start Python a second time to set the loader's path, and look for their libraries in the robot's environment.
-    export LD_LIBRARY_PATH="${_robot:+$_robot/ros2/install/lib:}$ALULA_STATE/ros2/install/lib:$ALULA_STATE/venv2/lib"
+    export LD_LIBRARY_PATH="${_robot:+$_robot/ros2/install/lib:}$ALULA_STATE/ros2/install/lib:${ALULA_UNDERLAY_LIBRARIES:+$ALULA_UNDERLAY_LIBRARIES:}$ALULA_STATE/venv2/lib"
     for _libraries in "$ALULA_STATE"/venv2/lib/python3*/site-packages/ros_*.libs; do
       [ ! -d "$_libraries" ] || LD_LIBRARY_PATH="$LD_LIBRARY_PATH:$_libraries"
     done
@@ -41,4 +44,4 @@ case "$1" in
     ;;
   *) echo "env.sh: the world is 1 or 2, not '$1'" >&2; return 2 ;;
 esac
-unset _path _robot _libraries robot_packages1
+unset _path _robot _below _libraries ${!robot_@}

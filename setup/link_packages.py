@@ -46,7 +46,8 @@ def robots_lines(world: str) -> list[str]:
     workspace, generated = robots_workspace(world), Path(os.environ["ALULA_ROBOT_STATE"]) / "generated"
     # Managers run over rospy, too.
     managers = [package.folder for name, package in find_packages([generated]).items() if world == "1" and name.endswith("_managers")]
-    places = [built(workspace, world), *sources(workspace), *managers]
+    below = [Path(place) for place in os.environ.get("ALULA_UNDERLAY_PYTHON", "").split(os.pathsep) if place]
+    places = [built(workspace, world), *sources(workspace), *managers, *below]
     return [*(str(place.resolve()) for place in places), f"import site; site.addsitedir({str(site_packages(STATE, world))!r})"]
 
 

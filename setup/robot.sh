@@ -6,25 +6,35 @@ ALULA_ROOT="$(cd "$(dirname "$(readlink -f "$0")")/.." && pwd)"
 . "$ALULA_ROOT/setup/places.sh"
 exec 1>&2
 state=$ALULA_ROBOT_STATE what="the robot $ALULA_ROBOT"
-steps="robot apt venv1 venv2 generated ros1 ros2"
+steps="robot underlays apt venv1 venv2 generated ros1 ros2"
 # usage: robot.sh [--quiet] [--only STEP[,STEP]...]
 quiet=0 only=${steps// /,}
 while [ $# -gt 0 ]; do
   case "$1" in
     --quiet) quiet=1 ;;
-    --only) only="robot,$2"; shift ;;
+    --only) only="robot,underlays,$2"; shift ;;
   esac
   shift
 done
 . "$ALULA_ROOT/setup/steps.sh"
 said() { [ ! -f "$state/robot.env" ] || . "$state/robot.env"; }   # what robot.yaml says, for the steps below
-robot_name="" robot_skillsets="" robot_packages1="" robot_packages2="" robot_python1="" robot_python2="" robot_debian1="" robot_debian2=""
+robot_name="" robot_skillsets="" robot_packages1="" robot_packages2="" robot_python1="" robot_python2="" robot_underlays1=() robot_underlays2=() robot_debian1="" robot_debian2=""
 said
 
 title_robot="what robot.yaml says"
 key_robot() { digest "$ALULA_ROBOT/robot.yaml" "$ALULA_ROOT/lib/alula/common/robots.py" "$ALULA_ROOT/setup/describe_robot.py"; }
 make_robot() {
   clean "$ALULA_STATE/venv2/bin/python3" "$ALULA_ROOT/setup/describe_robot.py" >"$state/robot.env.new" && mv "$state/robot.env.new" "$state/robot.env"
+}
+
+title_underlays="what lies below Alula"
+key_underlays() {
+  echo "${robot_underlays1[*]} / ${robot_underlays2[*]}"
+  digest "$ALULA_ROOT/setup/underlays.sh"
+  local folder; for folder in "${robot_underlays1[@]}" "${robot_underlays2[@]}"; do tree_digest "$folder"; done
+}
+make_underlays() {
+  "$ALULA_ROOT/setup/underlays.sh" "${robot_underlays1[@]}" >"$state/underlays1.env" && "$ALULA_ROOT/setup/underlays.sh" "${robot_underlays2[@]}" >"$state/underlays2.env"
 }
 
 missing_packages() { [ -z "$robot_debian1$robot_debian2" ] || missing_of $robot_debian1 $robot_debian2; }
@@ -37,11 +47,11 @@ make_environment() { # WORLD PINS OPTIONS...
   local world=$1 pins=$2; shift 2
   [ -n "$pins" ] || rm -rf "$state/venv$world"
   make_venv "$state/venv$world" --without-pip "$@" &&
-    clean "$ALULA_STATE/venv$world/bin/python3" "$ALULA_ROOT/setup/link_packages.py" robot "$world" &&
+    ( . "$state/underlays$world.env" && clean "$ALULA_STATE/venv$world/bin/python3" "$ALULA_ROOT/setup/link_packages.py" robot "$world" ) &&
     { [ -z "$pins" ] || clean "$state/venv$world/bin/python3" "$ALULA_ROOT/setup/sync_packages.py" "$pins"; }
 }
 key_environment() { # WORLD PINS
-  echo "$(cat "$ALULA_STATE/stamps/venv$1" 2>/dev/null)-$(digest "${2:-/dev/null}" "$ALULA_ROOT"/setup/link_packages.py)-$state"
+  echo "$(cat "$ALULA_STATE/stamps/venv$1" "$state/underlays$1.env" 2>/dev/null)-$(digest "${2:-/dev/null}" "$ALULA_ROOT"/setup/link_packages.py)-$state"
 }
 title_venv1="the robot's Python packages of the ROS 1 world"
 key_venv1() { key_environment 1 "$robot_python1"; }
@@ -83,6 +93,7 @@ fi
 begin
 run robot
 said
+run underlays
 check_rights
 run apt
 together venv1 venv2 generated

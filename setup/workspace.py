@@ -132,7 +132,8 @@ def robots_workspace(world: str) -> Workspace:
     found |= {name: package for name, package in generated.items() if world == "2" or name.endswith("_interfaces")}
     own = {name: package for name, package in found.items() if name not in below.packages}
     prefix = below.folder / ("devel" if world == "1" else "install")
-    return Workspace(state / f"ros{world}", own, below.packages, (prefix, *below.prefixes))
+    underlays = [Path(place) for place in os.environ.get("ALULA_UNDERLAYS", "").split(os.pathsep) if place]
+    return Workspace(state / f"ros{world}", own, below.packages, (prefix, *underlays, *below.prefixes))
 
 
 WORKSPACES = {"alula": alulas_workspace, "robot": robots_workspace}

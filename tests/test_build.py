@@ -142,3 +142,52 @@ def test_robots_packages_are_found_as_colcon_and_catkin_find_them_but_for_alulas
     built = workspace.robots_workspace("2")
     assert set(built.packages) == {"camera", "laser"}
     assert set(built.below) == {"skillset_interfaces", "tf2_msgs", "ros_bridge", "ros_bridge_native", "skillset_ros2", "skill_panel"}
+
+
+SETUP_PY = """from setuptools import setup
+setup(name="{name}", version="0.1.0", packages=["{name}"], data_files=[
+    ("share/ament_index/resource_index/packages", ["resource/{name}"]), ("share/{name}", ["package.xml"])])
+"""
+
+
+def python_package(folder: Path) -> None:
+    """Make a ROS 2 package with one module."""
+    name = folder.name
+    for place in (name, "resource"):
+        (folder / place).mkdir(parents=True)
+    (folder / name / "__init__.py").write_text("RATE_HZ = 30\n")
+    (folder / "resource" / name).touch()
+    (folder / "setup.py").write_text(SETUP_PY.format(name=name))
+    (folder / "package.xml").write_text(
+        f'<package format="3"><name>{name}</name><version>0.1.0</version><description>A driver.</description>'
+        '<maintainer email="alula@alula-robotics.org">Alula</maintainer><license>Apache-2.0</license>'
+        "<export><build_type>ament_python</build_type></export></package>"
+    )
+
+
+@pytest.mark.timeout(0)  # builds three packages: as long as the machine needs
+def test_workspaces_of_others_lie_below_a_robot_that_names_them(tmp_path):
+    message_package(tmp_path / "drivers1/src/driver_msgs", "int32 number\n")
+    python_package(tmp_path / "drivers2/src/driver")
+    robot = tmp_path / "robot"
+    message_package(robot / "ros1_ws/src/robot_msgs", "driver_msgs/M below\n", "driver_msgs")
+    (robot / "robot.yaml").write_text("name: upper\nros1: {underlays: [../drivers1]}\nros2: {underlays: [../drivers2]}\n")
+    venv2 = Path(os.environ["ALULA_STATE"]) / "venv2"
+
+    def run(path: str, *command: str, place: Path = robot, **more: str) -> str:
+        environment = {"PATH": path, "HOME": str(tmp_path), "ALULA_STATE": os.environ["ALULA_STATE"], **more}
+        done = subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+        return done.stdout.strip()
+
+    plain = "/usr/bin:/bin"
+    run(plain, "catkin_make", "-DPYTHON_EXECUTABLE=/usr/bin/python3", place=tmp_path / "drivers1", CMAKE_PREFIX_PATH="/usr")
+    run(f"{venv2}/bin:{plain}", "colcon", "build", place=tmp_path / "drivers2", AMENT_PREFIX_PATH=str(venv2), ROS_VERSION="2")
+    run(plain, str(ALULA_ROOT / "alula"), "setup")
+    named = {"ALULA_ROBOT": str(robot)}
+    ask1 = "import rospkg; from robot_msgs.msg import M; print(M._slot_types[0], rospkg.RosPack().get_path('driver_msgs'))"
+    said = run(plain, f"{ALULA_ROOT}/setup/in_ros1", "python3", "-c", ask1, **named)
+    assert said == f"driver_msgs/M {tmp_path}/drivers1/src/driver_msgs"
+    ask2 = "import driver, ament_index_python as a, rclpy; print(driver.RATE_HZ, a.get_package_share_directory('driver'))"
+    said = run(plain, f"{ALULA_ROOT}/setup/in_ros2", "python3", "-c", ask2, **named)
+    assert said == f"30 {tmp_path}/drivers2/install/driver/share/driver"
