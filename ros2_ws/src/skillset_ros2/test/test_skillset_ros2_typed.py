@@ -45,8 +45,8 @@ def test_a_users_script_is_checked_by_types(tmp_path):
         pytest.skip("mypy is not installed here")
     (tmp_path / "mypy.ini").write_text(SETTINGS)
     (tmp_path / "wrong.py").write_text(WRONG)
-    wanted = ("uav_client", "_managers", "alula.runtime", "alula.language")
-    paths = [path for path in sys.path if Path(path).name.endswith(wanted) and Path(path).is_dir()]
+    wanted = ("uav_client", "_managers", "/lib", "/skillset_ros2")
+    paths = [path for path in sys.path if path.endswith(wanted) and Path(path).is_dir()]
     environment = {**os.environ, "MYPYPATH": os.pathsep.join(paths)}
     command = [
         mypy,

@@ -36,7 +36,17 @@ class Mission:
         self.out = out
         out.mkdir()
         (out / "wanted.json").write_text(json.dumps(ROUTE))
-        command = [sys.executable, "-m", "uav_missions", "--scenario", "mapping", "--out", str(out), "--route", str(out / "wanted.json")]
+        command = [
+            sys.executable,
+            "-m",
+            "skillset_ros2.mission",
+            "--scenario",
+            "mapping",
+            "--out",
+            str(out),
+            "--world",
+            str(out / "wanted.json"),
+        ]
         self._ticked_s, self._heard_at_s = math.inf, 0.0
         self._heartbeat = rig.caller.create_subscription(Header, "/mission/heartbeat", self._hear, 10)
         rig.followers.append(self._heard_s)
@@ -207,7 +217,8 @@ def test_a_mission_that_is_told_to_end_before_the_start_does_not_start(whole_rig
 
 
 def test_an_unreadable_route_can_not_start(tmp_path):
-    command = [sys.executable, "-m", "uav_missions", "--out", str(tmp_path / "run"), "--route", str(tmp_path / "nowhere.yaml")]
+    words = ["--scenario", "mapping", "--out", str(tmp_path / "run"), "--world", str(tmp_path / "nowhere.yaml")]
+    command = [sys.executable, "-m", "skillset_ros2.mission", *words]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30.0, check=False)
     assert done.returncode == 2
     assert "nowhere.yaml" in done.stderr
