@@ -7,10 +7,10 @@ import logging
 import os
 import signal
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.common.signals import StopEvent
 from ros_bridge import discovery_options
 from ros_bridge.config_file import load_config
 from ros_bridge.errors import BridgeError, ConfigError, NoMasterError
@@ -67,7 +67,7 @@ def main(arguments: list[str]) -> int:
     """Run the bridge until SIGINT or SIGTERM; return 0, 1 when a type or the data plane is missing, 2 for bad options or no master."""
     set_up_logging()
     options = parse_arguments(arguments)
-    stop = threading.Event()
+    stop = StopEvent()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:

@@ -1,11 +1,23 @@
-"""Ctrl-C, once and twice."""
+"""Ctrl-C, once and twice, and an event that a signal's handler may set."""
 
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class StopEvent(threading.Event):
+    """An event that a signal's handler may set, also while the main thread waits for it, or is about to be told of another signal.
+
+    The lock of a plain event is not its thread's own: a handler that sets it while the main thread holds it waits for ever.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._cond = threading.Condition(threading.RLock())
 
 
 class Interrupts:

@@ -23,6 +23,7 @@ from rclpy.utilities import remove_ros_args
 
 from alula.common.faults import FaultError, FaultRequest, parse_fault
 from alula.common.robots import BEHAVIOUR, RobotError, find_robot
+from alula.common.signals import StopEvent
 from alula.language.errors import LanguageError
 from alula.language.load import load_robot
 from alula.language.robot import Robot
@@ -141,7 +142,7 @@ def run(cast: Cast, behaviours: Sequence[Path], known: Sequence[Skillset], optio
     behaviour = load_behaviour([*behaviours, *options.behaviour], known)
     faults = read_faults(options.fail)
     rclpy.init(args=list(words), signal_handler_options=SignalHandlerOptions.NO)
-    stop = threading.Event()
+    stop = StopEvent()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:

@@ -21,6 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from alula.common.shared_memory import sweep_shared_memory
+from alula.common.signals import StopEvent
 from alula.model.model import Skillset
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.hook_processes import RemoteHooks, pipe_address
@@ -62,7 +63,7 @@ def run_skillset(
     ROS: ``--ros-args -p use_sim_time:=true``. Exits with 2 when they are wrong. ``again``: what else the command line of a part needs.
     """
     options, words = _options(skillset, sys.argv[1:] if arguments is None else arguments)
-    stop = threading.Event()
+    stop = StopEvent()
 
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
         stop.set()

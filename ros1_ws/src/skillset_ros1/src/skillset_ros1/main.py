@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import signal
 import sys
-import threading
 from types import FrameType, ModuleType
 
 import rosgraph
 import rospy
 
+from alula.common.signals import StopEvent
 from alula.model.model import Skillset
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.managers import DataBindings
@@ -27,7 +27,7 @@ def run_skillset(
     Exits with 2 when managers of the skillset are there already.
     The command line is rospy's: ``__ns:=/robot1 __name:=...`` and remappings.
     """
-    stop = threading.Event()
+    stop = StopEvent()
 
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
         stop.set()

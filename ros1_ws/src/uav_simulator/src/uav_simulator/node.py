@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import queue
 import signal
-import threading
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from tf2_msgs.msg import TFMessage
 from uav_msgs.srv import SetSensor, SetSensorRequest, SetSensorResponse
 
 from alula.common.faults import FaultError, parse_faults
+from alula.common.signals import StopEvent
 from uav_simulator import ros_messages
 from uav_simulator.drivers import Drivers
 from uav_simulator.errors import ConfigError, SimulatorError
@@ -78,7 +78,7 @@ class SimulatorNode:
         self._last_state = self._simulation.state
         self._left_out: list[str] = []
         self._late_told_s = -LATE_TOLD_S
-        self._stopping = threading.Event()
+        self._stopping = StopEvent()
         for name, port in self._pilot.ports.items():
             rospy.set_param(f"~{name}", port)
         rospy.Service("/sim/set_sensor", SetSensor, self._on_set_sensor)
