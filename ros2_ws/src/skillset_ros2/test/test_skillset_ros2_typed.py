@@ -23,7 +23,7 @@ SCRIPT = Path(__file__).with_name("skillset_ros2_user_script.py")
 SETTINGS = """[mypy]
 strict = true
 follow_imports_for_stubs = true
-[mypy-rclpy.*,*_msgs.*,*_interfaces.*,yaml.*,unique_identifier_msgs.*,action_msgs.*]
+[mypy-rclpy.*,geometry_msgs.*,std_msgs.*,uav_msgs.*,skillset_interfaces.*,*_interfaces.*,yaml.*,unique_identifier_msgs.*,action_msgs.*]
 ignore_missing_imports = true
 follow_imports = skip
 disallow_subclassing_any = false
