@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from alula_testing.stories import EXAMPLES
+from alula_testing.counterexamples import EXAMPLES
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 
@@ -103,7 +103,7 @@ def test_skillset_with_a_syntax_error_shows_where(tmp_path: Path) -> None:
     assert "^" in said
 
 
-def test_a_story_of_any_model_plays(tmp_path: Path) -> None:
+def test_a_counterexample_of_any_model_plays(tmp_path: Path) -> None:
     model = tmp_path / "lamp.rl"
     model.write_text(EXAMPLES["ALU503"], encoding="utf-8")
     done = alula("check", "--play", "1", "--json", str(model))

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from alula.language.stories import Story
-from alula_testing.live_story import from_line, to_line
+from alula.language.counterexamples import Counterexample
+from alula_testing.counterexamples import MODELS, counterexamples
+from alula_testing.live_counterexample import from_line, to_line
 from alula_testing.misbehaviours import MISBEHAVIOURS
-from alula_testing.stories import MODELS, stories
 from alula_testing.traces import Behaviour, Script, Step, play
 from alula_testing.traces.stage_none import NoneStage
 
@@ -111,34 +111,34 @@ def test_clients_have_the_same_public_interface_in_all_worlds():
     assert {"start", "trigger", "read_data", "input_types", "interrupt_all", "on_event"} <= set(found["none"])
 
 
-STORY_PLAYERS = {"ros1": "alula_testing.story_world_ros1", "ros2": "alula_testing.story_world_ros2"}
-STORIES_S = 600.0
+PLAYERS = {"ros1": "alula_testing.counterexample_world_ros1", "ros2": "alula_testing.counterexample_world_ros2"}
+PLAYS_S = 600.0
 
 
-def lines_of_stories(folder: Path) -> Iterator[tuple[str, Story, str]]:
-    """Yield the story of each finding of the models, as a player reads it; and one that is not so."""
+def lines_of_counterexamples(folder: Path) -> Iterator[tuple[str, Counterexample, str]]:
+    """Yield the counterexample of each finding of the models, as a player reads it; and one that is not so."""
     for name, text in MODELS.items():
-        skillset, findings = stories(folder / "model.rl", text)
+        skillset, findings = counterexamples(folder / "model.rl", text)
         for finding in findings:
-            yield f"{name} {finding.code}", finding.story, to_line(skillset, finding.story)
-    *steps, last = finding.story.steps
+            yield f"{name} {finding.code}", finding.counterexample, to_line(skillset, finding.counterexample)
+    *steps, last = finding.counterexample.steps
     wrong = replace(last, states=tuple((resource, "Nowhere") for resource, _ in last.states))
-    yield "wrong", (story := Story((*steps, wrong))), to_line(skillset, story)
+    yield "wrong", (counterexample := Counterexample((*steps, wrong))), to_line(skillset, counterexample)
 
 
-@pytest.mark.parametrize("world", STORY_PLAYERS)
-def test_each_story_of_the_proofs_comes_to_its_end_in_managers_over_a_ros(world, tmp_path):
-    played = list(lines_of_stories(tmp_path))
+@pytest.mark.parametrize("world", PLAYERS)
+def test_each_counterexample_of_the_proofs_comes_to_its_end_in_managers_over_a_ros(world, tmp_path):
+    played = list(lines_of_counterexamples(tmp_path))
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_"))}
-    command = [str(ALULA_ROOT / "setup" / f"in_{world}"), "python", "-m", STORY_PLAYERS[world]]
+    command = [str(ALULA_ROOT / "setup" / f"in_{world}"), "python", "-m", PLAYERS[world]]
     lines = "".join(line for _, _, line in played)
-    done = subprocess.run(command, input=lines, stdout=subprocess.PIPE, text=True, env=environment, timeout=STORIES_S, check=True)
+    done = subprocess.run(command, input=lines, stdout=subprocess.PIPE, text=True, env=environment, timeout=PLAYS_S, check=True)
     answers = done.stdout.splitlines()
     assert len(answers) == len(played) > 20
-    *found, (_, wrong) = [(name, from_line(story, line)) for (name, story, _), line in zip(played, answers, strict=True)]
+    *found, (_, wrong) = [(name, from_line(counterexample, line)) for (name, counterexample, _), line in zip(played, answers, strict=True)]
     assert {name: steps[-1].differences for name, steps in found if any(step.differences for step in steps)} == {}
-    assert [len(steps) for _, steps in found] == [len(story.steps) for _, story, _ in played[:-1]]
-    assert "Nowhere in the story" in wrong[-1].differences[0]
+    assert [len(steps) for _, steps in found] == [len(counterexample.steps) for _, counterexample, _ in played[:-1]]
+    assert "Nowhere in the counterexample" in wrong[-1].differences[0]
 
 
 TAKEOFF = {"height": 3, "speed": 1}

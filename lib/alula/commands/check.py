@@ -81,7 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
     parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
-    parser.add_argument("--play", type=int, metavar="N", help="play the story with this number in running managers (see `--play 1 --help`)")
+    parser.add_argument("--play", type=int, metavar="N", help="play counterexample N in running managers (see `--play 1 --help`)")
     parser.add_argument("--strict", action="store_true", help="make errors of warnings")
     parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
     return parser
@@ -110,14 +110,14 @@ def _tell(what: str, progress: str) -> None:
     sys.stderr.write(f"alula check: {what}: proving: {progress}\n")
 
 
-def stories_of(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> list[tuple[Skillset, Diagnostic]]:
-    """Prove the files; return each finding that tells a story, in the order of the output, with its skillset."""
+def counterexamples_of(files: Sequence[ModelFile], timeout_s: float, *, closed_world: bool) -> list[tuple[Skillset, Diagnostic]]:
+    """Prove the files; return each finding that has a counterexample with steps, in the order of the output, with its skillset."""
     _prove(files, timeout_s, closed_world=closed_world)
     return [
         (max((one for one in file.skillsets if one.span.line <= finding.span.line), key=lambda one: one.span.line), finding)
         for file in files
         for finding in file.findings
-        if finding.story.steps
+        if finding.counterexample.steps
     ]
 
 
@@ -159,15 +159,15 @@ def _as_json(files: Sequence[ModelFile], code: int) -> str:
 
 def _as_text(files: Sequence[ModelFile]) -> str:
     parts: list[str] = []
-    stories = 0
+    number = 0
     for file in files:
         errors = sum(finding.severity is Severity.ERROR for finding in file.findings)
         warnings = len(file.findings) - errors
         counts = [f"{n} {word}{'s' if n > 1 else ''}" for n, word in ((errors, "error"), (warnings, "warning")) if n]
         for finding in file.findings:
-            stories += bool(finding.story.steps)
-            story = f"      = story {stories}: `--play {stories}` plays it in running managers\n" if finding.story.steps else ""
-            parts.append(f"{finding.render()}\n{story}")
+            number += bool(finding.counterexample.steps)
+            playable = f"      = counterexample {number}: `--play {number}` plays it in running managers\n"
+            parts.append(f"{finding.render()}\n{playable if finding.counterexample.steps else ''}")
         parts.append(f"{file.path}: {', '.join(counts) or 'ok'}")
     return "\n".join(parts)
 

@@ -1,6 +1,6 @@
-"""`./alula check --play N FILE...`: play the Nth story that `check` tells in running managers, in virtual time.
+"""`./alula check --play N FILE...`: play the Nth counterexample of `check` in running managers, in virtual time.
 
-Ends with 0 when the managers come to the story's end, 1 when they come out otherwise, 2 when there is no such story.
+Exit code 0: the managers do what the counterexample says; 1: they do something else; 2: there is no such counterexample.
 """
 
 from __future__ import annotations
@@ -10,23 +10,23 @@ import json
 import sys
 from collections.abc import Sequence
 
-from alula.commands.check import stories_of
+from alula.commands.check import counterexamples_of
 from alula.language.models import check_files, models_in
 from alula.prove.limits import DEFAULT_TIME_S
-from alula.runtime.story_play import PlayedStep, play
+from alula.runtime.counterexample_play import PlayedStep, play
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Play a story; return the exit code."""
+    """Play a counterexample; return the exit code."""
     options = _parser().parse_args(arguments)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
     files = check_files(list(paths), sys.stdin.buffer)
-    stories = stories_of(files, options.time, closed_world=options.closed_world)
-    if not 1 <= options.play <= len(stories):
-        sys.stderr.write(f"alula check: there is no story {options.play}; these models have {len(stories) or 'none'}\n")
+    counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world)
+    if not 1 <= options.play <= len(counterexamples):
+        sys.stderr.write(f"alula check: there is no counterexample {options.play}; these models have {len(counterexamples) or 'none'}\n")
         return 2
-    skillset, finding = stories[options.play - 1]
-    played = play(skillset, finding.story)
+    skillset, finding = counterexamples[options.play - 1]
+    played = play(skillset, finding.counterexample)
     agrees = not played[-1].differences
     title = f"{finding.span}: {finding.code}: {finding.message}"
     sys.stdout.write(_as_json(title, played, agrees=agrees) if options.json else _as_text(title, played, agrees=agrees))
@@ -34,9 +34,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="alula check --play", description="Play a story of the proofs in running managers.")
+    parser = argparse.ArgumentParser(prog="alula check --play", description="Play a counterexample of the proofs in running managers.")
     parser.add_argument("files", nargs="+", metavar="FILE", help="models, as for `alula check`")
-    parser.add_argument("--play", type=int, required=True, metavar="N", help="the story with this number in what `alula check` prints")
+    parser.add_argument(
+        "--play", type=int, required=True, metavar="N", help="the number of the counterexample in the output of `alula check`"
+    )
     parser.add_argument("--time", type=float, default=DEFAULT_TIME_S, metavar="SECONDS", help="how long the proofs of a file may take")
     parser.add_argument("--closed-world", action="store_true", help="as for `alula check`")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -48,7 +50,7 @@ def _as_text(title: str, played: Sequence[PlayedStep], *, agrees: bool) -> str:
     for number, one in enumerate(played, 1):
         lines.append(f"  {number}. {one.step.text}")
         lines += [f"       but {difference}" for difference in one.differences]
-    lines.append("the managers come to the same end" if agrees else "the managers come out otherwise")
+    lines.append("the managers do the same" if agrees else "the managers do something else")
     return "\n".join(lines) + "\n"
 
 

@@ -154,7 +154,7 @@ def _diagnostic(file: ModelFile, finding: Diagnostic) -> lsp.Diagnostic:
     parts = [finding.message]
     if finding.expected:
         parts.append(f"expected {', '.join(finding.expected)}")
-    parts += finding.counterexample
+    parts += finding.counterexample_lines
     if finding.hint:
         parts.append(finding.hint)
     severity = _SEVERITY[finding.severity]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from alula.language.stories import NO_STORY, Story
+from alula.language.counterexamples import NO_COUNTEREXAMPLE, Counterexample
 from alula.model.span import NOWHERE, Span
 
 
@@ -22,7 +22,7 @@ class Diagnostic:
     """One finding.
 
     ``expected`` lists what the parser could have gone on with; ``source_line`` is the line that it is about.
-    ``example`` and ``story`` are a proof's counterexample: what must come together, and the run in which it does.
+    ``example``: conditions that must hold together for the finding; ``counterexample``: a run in which they do. Both are of proofs.
     ``for_generator``: a warning about a sound model that no code can be generated of; to the generator, it is an error.
     """
 
@@ -33,14 +33,14 @@ class Diagnostic:
     hint: str = ""
     expected: tuple[str, ...] = ()
     example: tuple[str, ...] = ()
-    story: Story = NO_STORY
+    counterexample: Counterexample = NO_COUNTEREXAMPLE
     for_generator: bool = False
     source_line: str = field(default="", compare=False)
 
     @property
-    def counterexample(self) -> tuple[str, ...]:
-        """The lines of example and story."""
-        return (*self.example, *self.story.lines)
+    def counterexample_lines(self) -> tuple[str, ...]:
+        """The lines of ``example``, then of ``counterexample``."""
+        return (*self.example, *self.counterexample.lines)
 
     def render(self) -> str:
         """Return the finding as text for people: place, code, message, the line with a caret, what was expected, hint."""
@@ -49,9 +49,9 @@ class Diagnostic:
             lines += _excerpt(self.span, self.source_line)
         if self.expected:
             lines.append(f"      = expected {'one of ' if len(self.expected) > 1 else ''}{', '.join(self.expected)}")
-        if self.counterexample:
+        if self.counterexample_lines:
             lines.append("      = counterexample:")
-            lines += [f"          {line}" for line in self.counterexample]
+            lines += [f"          {line}" for line in self.counterexample_lines]
         if self.hint:
             lines.append(f"      = hint: {self.hint}")
         return "\n".join(lines)
@@ -68,8 +68,8 @@ class Diagnostic:
             "end_column": self.span.end_column,
             "hint": self.hint,
             "expected": list(self.expected),
-            "counterexample": list(self.counterexample) or None,
-            "steps": [step.as_json() for step in self.story.steps] or None,
+            "counterexample": list(self.counterexample_lines) or None,
+            "steps": [step.as_json() for step in self.counterexample.steps] or None,
         }
 
 

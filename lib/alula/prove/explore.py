@@ -11,7 +11,7 @@ from alula.prove.steps import Key, Move, State, World
 
 @dataclass(frozen=True)
 class Edge:
-    """A step between two situations, by their numbers. ``move`` is without the details of the step: they are rebuilt for a story."""
+    """A step between two situations, by their numbers. ``move`` lacks the details of the step: a counterexample rebuilds them."""
 
     source: int
     target: int

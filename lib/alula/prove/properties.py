@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
+from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
-from alula.language.stories import Story
 from alula.model.expressions import And, Constant, Expression, Implies, Not, Or, ResourceIs, SkillRuns
 from alula.model.model import Property, PropertyKind
-from alula.prove import story
+from alula.prove import counterexample
 from alula.prove.explore import Edge, Graph
 from alula.prove.steps import State, World
 
@@ -60,16 +60,16 @@ def true_in(world: World, condition: Expression, state: State) -> bool:
             raise ValueError(f"a property can't ask data: {condition}")
 
 
-def failed(wanted: Property, what: str, run: Story) -> Diagnostic:
+def failed(wanted: Property, what: str, run: Counterexample) -> Diagnostic:
     """Return ALU531."""
     message = f"property `{wanted.name}` ({wanted.kind.value}{', assuming termination' if wanted.fair else ''}) does not hold: {what}"
-    return Diagnostic("ALU531", message, wanted.span, Severity.ERROR, story=run)
+    return Diagnostic("ALU531", message, wanted.span, Severity.ERROR, counterexample=run)
 
 
 def _found(graph: Graph, wanted: Property, number: int | None) -> Diagnostic | None:
     if number is None:
         return None
-    return failed(wanted, story.situation(graph.world, graph.states[number]), story.to(graph, number))
+    return failed(wanted, counterexample.situation(graph.world, graph.states[number]), counterexample.to(graph, number))
 
 
 # --- runs that never get there ----------------------------------------------------------------------------------------
@@ -83,7 +83,7 @@ def lasso(graph: Graph, wanted: Property, begins: list[int], goal: list[bool]) -
         if _goes_on(graph, component, goal) and (not wanted.fair or _fair(graph, component)):
             loop = _loop(graph, component, fair=wanted.fair)
             prefix = _way_to(graph, ways, loop[0].source if loop else component[0])
-            return failed(wanted, "a run never gets there", story.lasso(graph, prefix, loop))
+            return failed(wanted, "a run never gets there", counterexample.lasso(graph, prefix, loop))
     return None
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
-from alula.language.stories import Story
 from alula.model.model import Skill, Skillset
 from alula.model.span import Span
-from alula.prove import story
+from alula.prove import counterexample
 from alula.prove.explore import Graph
 from alula.prove.local import Suspect
 from alula.prove.steps import Key, State
@@ -20,26 +20,26 @@ NEVER_SEEN = "no reachable situation shows it"
 
 
 def decide(skillset: Skillset, graph: Graph, suspects: Iterable[Suspect]) -> list[Diagnostic]:
-    """Return the suspects with what the search says of them: an error with its story, or a warning that it never comes to that."""
-    stories = {fault: story.to(graph, number, move, fault) for fault, (number, move) in graph.faults.items()}
-    return judged(skillset, suspects, stories)
+    """Return the suspects with what the search says of them: an error with its counterexample, or a warning: it is out of reach."""
+    counterexamples = {fault: counterexample.to(graph, number, move, fault) for fault, (number, move) in graph.faults.items()}
+    return judged(skillset, suspects, counterexamples)
 
 
-def judged(skillset: Skillset, suspects: Iterable[Suspect], stories: Mapping[Key, Story]) -> list[Diagnostic]:
-    """Return the suspects and further faults; ``stories`` has those that are reached."""
+def judged(skillset: Skillset, suspects: Iterable[Suspect], counterexamples: Mapping[Key, Counterexample]) -> list[Diagnostic]:
+    """Return the suspects and further faults; ``counterexamples`` has those that are reached."""
     findings: list[Diagnostic] = []
     told: set[Key] = set()
     for suspect in suspects:
-        if suspect.key in stories:
+        if suspect.key in counterexamples:
             told.add(suspect.key)
-            findings.append(replace(suspect.finding, story=stories[suspect.key]))
+            findings.append(replace(suspect.finding, counterexample=counterexamples[suspect.key]))
         else:
             message = f"{suspect.finding.message}, but {NEVER_SEEN}"
             findings.append(replace(suspect.finding, message=message, severity=Severity.WARNING))
-    for fault, run in stories.items():
+    for fault, run in counterexamples.items():
         if fault not in told and fault[0] == "effect":
             message = f"the effect of {named(fault)} fails in a reachable situation"
-            findings.append(Diagnostic("ALU525", message, _place(skillset, fault), story=run))
+            findings.append(Diagnostic("ALU525", message, _place(skillset, fault), counterexample=run))
     return findings
 
 
@@ -80,20 +80,20 @@ def dead_skill(skill: Skill) -> Diagnostic:
     return Diagnostic("ALU522", message, skill.span, Severity.WARNING)
 
 
-def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Story) -> Diagnostic:
+def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Counterexample) -> Diagnostic:
     """Return ALU523."""
     first, second = pair
     holders = f"two executions of `{first}`" if first == second else f"`{first}` and `{second}`"
     message = f"{holders} can hold `{resource}` at once: each has taken it to `{state}`"
     hint = f"let a precondition ask that `{resource}` is free, and an invariant that it is still taken"
-    return Diagnostic("ALU523", message, skillset.skill(second).span, hint=hint, story=run)
+    return Diagnostic("ALU523", message, skillset.skill(second).span, hint=hint, counterexample=run)
 
 
-def lost(skillset: Skillset, names: list[str], run: Story) -> Diagnostic:
+def lost(skillset: Skillset, names: list[str], run: Counterexample) -> Diagnostic:
     """Return ALU524."""
     several = ", ".join(f"`{name}`" for name in names)
     message = f"{several} can come to a situation from which {'it' if len(names) == 1 else 'they'} can never start again"
-    return Diagnostic("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, story=run)
+    return Diagnostic("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, counterexample=run)
 
 
 def crowded(skillset: Skillset, names: set[str], copies: int) -> list[Diagnostic]:
@@ -128,7 +128,7 @@ def _held_twice(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
             key = (resource, first, second)
             if key not in findings:
                 value = taken[first][resource]
-                findings[key] = held_twice(skillset, resource, value, (first, second), story.to(graph, number))
+                findings[key] = held_twice(skillset, resource, value, (first, second), counterexample.to(graph, number))
     return list(findings.values())
 
 
@@ -166,7 +166,7 @@ def _lost_skills(skillset: Skillset, graph: Graph) -> list[Diagnostic]:
         if len(hopeful) < len(graph.states):
             number = next(n for n in range(len(graph.states)) if n not in hopeful)
             stuck.setdefault(number, []).append(skill.name)
-    return [lost(skillset, names, story.to(graph, number)) for number, names in sorted(stuck.items())]
+    return [lost(skillset, names, counterexample.to(graph, number)) for number, names in sorted(stuck.items())]
 
 
 # --- words ------------------------------------------------------------------------------------------------------------

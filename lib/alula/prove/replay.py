@@ -1,4 +1,4 @@
-"""Takes the steps of a story again on the skillset as it is written: with data, time, and executions that have numbers."""
+"""Takes the steps of a counterexample again on the skillset as it is written: with data, time, and executions that have numbers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from alula.language.stories import Ended, Execution, Path, StateChange, StepKind, StoryStep, Value, Values, messages
+from alula.language.counterexamples import CounterexampleStep, Ended, Execution, Path, StateChange, StepKind, Value, Values, messages
 from alula.model import semantics
 from alula.model.conditions import judge
 from alula.model.deadlines import nanoseconds, waits
@@ -34,7 +34,7 @@ class _NoValuesError(Exception):
 
 
 class Replay:
-    """Walks a way from the first state and keeps the steps of its story.
+    """Walks a way from the first state and keeps the steps of its counterexample.
 
     The search's executions have their place in its state for a name; here they are numbered by the starts of their skill.
     Steps are taken with data as long as values are found that take them as the search did, and as the search did from then on.
@@ -52,7 +52,7 @@ class Replay:
         self._with_data = True
         self._states: States = world.situation(first).states
         told = ", ".join(f"{name} == {state}" for name, state in self._states.items())
-        self.steps: list[StoryStep] = []
+        self.steps: list[CounterexampleStep] = []
         self._add(StepKind.INITIALLY, f"initially {told or 'nothing runs'}")
 
     def take(self, move: Move, fault: Key = (), *, loop: bool = False) -> None:
@@ -109,7 +109,7 @@ class Replay:
             self._tell(move, None, names)
             return
         step = self._step(move, names)
-        # A birth that data break ends at once; the search leaves that to a step of its own, which no story goes on to.
+        # A birth that data break ends at once; the search leaves that to a step of its own, which no counterexample goes on to.
         if broken is None and self._differs(move, step.situation):
             raise _NoValuesError
         self._tell(move, step, names)
@@ -290,7 +290,9 @@ class Replay:
         )
         states = tuple((self._situation if step is None else step.situation).states.items())
         running = tuple(self._execution(one) for one in self._running)
-        self.steps.append(StoryStep(kind, text, subject, execution, changes, ended, refused, data, time_s, states=states, running=running))
+        self.steps.append(
+            CounterexampleStep(kind, text, subject, execution, changes, ended, refused, data, time_s, states=states, running=running)
+        )
 
     def _execution(self, execution: Running) -> Execution:
         return Execution(execution.skill, int(execution.id.rpartition("-")[2]))
@@ -302,7 +304,7 @@ class Replay:
 
 
 def _renamed(step: Step, names: Mapping[str, Running]) -> Step:
-    """Return a step of the search with the executions of the story."""
+    """Return a step of the search with the executions of the counterexample."""
     happenings: list[Change | Entered] = []
     for one in step.happenings:
         if isinstance(one, Entered):

@@ -6,11 +6,11 @@ import itertools
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from alula.language.counterexamples import Counterexample
 from alula.language.errors import Diagnostic, Severity
-from alula.language.stories import Story
 from alula.model.expressions import Constant
 from alula.model.model import Property, PropertyKind, Skill, Skillset
-from alula.prove import reachable, story
+from alula.prove import counterexample, reachable
 from alula.prove.abstract import Abstraction
 from alula.prove.diagrams import Encoded
 from alula.prove.encoding import encode
@@ -52,7 +52,7 @@ class _Search:
 
     def findings(self, suspects: list[Suspect]) -> list[Diagnostic]:
         """Return the findings of all checks."""
-        findings = reachable.judged(self.skillset, suspects, self._stories({suspect.key for suspect in suspects}))
+        findings = reachable.judged(self.skillset, suspects, self._counterexamples({suspect.key for suspect in suspects}))
         findings += reachable.unreachable_states(self.skillset, [set(self._seen(r.name)) for r in self.skillset.resources])
         findings += [reachable.dead_skill(skill) for skill in self.skillset.skills if self._dead(skill)]
         findings += self._held_twice()
@@ -65,16 +65,16 @@ class _Search:
 
     # --- faults ---------------------------------------------------------------------------------------------------
 
-    def _stories(self, suspected: set[Key]) -> dict[Key, Story]:
-        """Return the story of each fault that is reached: of effects, and of what else is suspected."""
-        stories: dict[Key, Story] = {}
+    def _counterexamples(self, suspected: set[Key]) -> dict[Key, Counterexample]:
+        """Return the counterexample of each fault that is reached: of effects, and of what else is suspected."""
+        counterexamples: dict[Key, Counterexample] = {}
         for fault, goal in self._shown():
             if fault[0] != "effect" and fault not in suspected:
                 continue
             moves = self.walker.fault(fault, goal)
             if moves is not None:
-                stories[fault] = story.walked(self.world, self.world.initial(), moves, fault)
-        return stories
+                counterexamples[fault] = counterexample.walked(self.world, self.world.initial(), moves, fault)
+        return counterexamples
 
     def _shown(self) -> Iterator[tuple[Key, Any]]:
         """Yield each fault that is reached with the situations before its step."""
@@ -116,7 +116,7 @@ class _Search:
                 both = here & (self.model.runs(first, 2) if first == second else self.model.runs(first) & self.model.runs(second))
                 moves = self.walker.to(both)
                 if moves is not None:
-                    run = story.walked(self.world, self.world.initial(), moves)
+                    run = counterexample.walked(self.world, self.world.initial(), moves)
                     findings.append(reachable.held_twice(self.skillset, resource, state, (first, second), run))
         return findings
 
@@ -124,14 +124,14 @@ class _Search:
         """Return skills that can be lost; where all can go back to the beginning, what starts at all can start again."""
         if self.sets.narrowed(self.sets.reached & ~self.sets.can_come_to(self.sets.initial)) == self.sets.bdd.false:
             return []
-        groups: dict[Story, list[str]] = {}
+        groups: dict[Counterexample, list[str]] = {}
         for skill in self.skillset.skills:
             starts = self.model.startable[skill.name]
             if not self._reaches(starts):
                 continue
             moves = self.walker.to(self.sets.reached & ~self.sets.can_come_to(starts))
             if moves is not None:
-                groups.setdefault(story.walked(self.world, self.world.initial(), moves), []).append(skill.name)
+                groups.setdefault(counterexample.walked(self.world, self.world.initial(), moves), []).append(skill.name)
         return [reachable.lost(self.skillset, names, run) for run, names in groups.items()]
 
     # --- properties -----------------------------------------------------------------------------------------------
@@ -154,8 +154,8 @@ class _Search:
         moves = self.walker.to(bad)
         if moves is None:
             return _unsure(wanted)
-        run = story.walked(self.world, self.world.initial(), moves)
-        return failed(wanted, story.situation(self.world, self.walker.end(moves)), run)
+        run = counterexample.walked(self.world, self.world.initial(), moves)
+        return failed(wanted, counterexample.situation(self.world, self.walker.end(moves)), run)
 
     def _run(self, wanted: Property, begins: Any, goal: Any) -> Diagnostic | None:
         """Look for a run that avoids the goal for ever; a set that allows one is walked before it is believed."""

@@ -1,11 +1,11 @@
-"""Values of data that show a step: the search knows that there are some, a story has to name them."""
+"""Values of data that show a step: the search knows that there are some, a counterexample has to name them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from alula.language.stories import Path, Values
+from alula.language.counterexamples import Path, Values
 from alula.model.expressions import DataIs, Expression, Not, atoms
 from alula.model.model import Invariant, Skillset
 from alula.prove.limits import OutOfTimeError
@@ -23,7 +23,7 @@ class Wish:
 
 
 class Witness:
-    """Finds values for the wishes of a story, one step after another; values stay until something else is wished."""
+    """Finds values for the wishes of a counterexample, one step after another; values stay until something else is wished."""
 
     def __init__(self, skillset: Skillset, solver: Solver) -> None:
         self._skillset = skillset

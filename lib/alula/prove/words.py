@@ -1,10 +1,10 @@
-"""The words of a story: what was done, what it changed, what it ended, what failed."""
+"""The words of a counterexample: what was done, what it changed, what it ended, what failed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from alula.language.stories import Path, Value
+from alula.language.counterexamples import Path, Value
 from alula.model.execution_state import ExecutionState
 from alula.model.situation import Change, Entered, Running, Step
 from alula.prove.steps import Key, Move

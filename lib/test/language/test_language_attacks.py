@@ -9,8 +9,8 @@ import os
 import pytest
 
 from alula.commands import check
+from alula.language.counterexamples import Execution, StepKind
 from alula.language.models import check_files
-from alula.language.stories import Execution, StepKind
 from alula.prove import prove
 
 BOTH = pytest.mark.parametrize("most", [2000, 0], ids=["one by one", "as sets"])
@@ -55,13 +55,13 @@ skillset uav {
 def test_what_only_an_untaken_arrow_leads_to_is_an_error(most, tmp_path):
     errors = [f for f in proved(tmp_path, GOTO, most=most) if f.severity.value == "error"]
     assert [f.code for f in errors] == ["ALU510", "ALU531"]
-    assert errors[0].counterexample == (
+    assert errors[0].counterexample_lines == (
         "authority == None",
         "1. initially authority == Pilot",
         "2. from outside: authority Pilot -> None",
         "3. goto starts; `in_control` of goto is false and ends it",
     )
-    assert errors[0].story.steps[1].kind is StepKind.OUTSIDE
+    assert errors[0].counterexample.steps[1].kind is StepKind.OUTSIDE
     assert "`--closed-world`" in errors[0].hint
     assert "`pilot`" in errors[1].message
 
@@ -190,7 +190,7 @@ def test_names_are_defined_once(tmp_path):
     assert checked(tmp_path, f"type A\n{use}", f"type A\n{use}") == [[], [("ALU404", 2)]]
 
 
-# --- stories ----------------------------------------------------------------------------------------------------------
+# --- counterexamples ----------------------------------------------------------------------------------------------------------
 
 FAILING = """
 skillset s {
@@ -215,11 +215,11 @@ skillset s {
 def test_an_end_that_fails_tells_whose_effect_is_applied(most, tmp_path):
     (finding,) = proved(tmp_path, FAILING, most=most)
     assert finding.code == "ALU513"
-    assert finding.counterexample[-1] == (
+    assert finding.counterexample_lines[-1] == (
         "3. lower ends with done; the effect of `done` of lower is no transition from here, so it ends as FAILED"
         " with the effect of its interruption: gear Moving -> Down"
     )
-    last = finding.story.steps[-1]
+    last = finding.counterexample.steps[-1]
     assert (last.ended[0].state, last.subject) == ("FAILED", ("lower", "done"))
 
 
@@ -236,10 +236,10 @@ skillset s {
 
 
 @BOTH
-def test_a_story_names_the_values_that_decide(most, tmp_path):
+def test_a_counterexample_names_the_values_that_decide(most, tmp_path):
     (finding,) = proved(tmp_path, RECOVERS, most=most)
     assert finding.code == "ALU510"
-    first, low, between, start = finding.story.steps
+    first, low, between, start = finding.counterexample.steps
     assert (first.kind, low.kind, between.kind, start.kind) == (StepKind.INITIALLY, StepKind.DATA, StepKind.DATA, StepKind.START)
     ((path, value),) = low.data
     assert path == ("fps",)
@@ -271,7 +271,7 @@ skillset s {
 @BOTH
 def test_executions_of_one_skill_are_told_apart(most, tmp_path):
     finding = next(f for f in proved(tmp_path, TWICE, most=most) if f.code == "ALU531")
-    numbers = [(step.execution.number, step.text) for step in finding.story.steps[1:]]
+    numbers = [(step.execution.number, step.text) for step in finding.counterexample.steps[1:]]
     assert [number for number, _ in numbers] in ([1, 1, 2, 2], [1, 2, 1, 2], [1, 2, 2, 1])
     assert any("(execution 2)" in text for _, text in numbers) or [number for number, _ in numbers] == [1, 1, 2, 2]
 

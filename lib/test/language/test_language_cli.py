@@ -126,7 +126,7 @@ skillset uav {
 """
 
 
-def test_a_proof_that_fails_is_told_with_its_place_its_line_and_its_story(tmp_path, capsys):
+def test_a_proof_that_fails_is_told_with_its_place_its_line_and_its_counterexample(tmp_path, capsys):
     path = tmp_path / "uav.rl"
     path.write_text(UAV)
     assert main([str(path), "--json"]) == 1

@@ -75,7 +75,7 @@ def test_both_searches_find_the_same(skillset):
 @settings(max_examples=80, **QUIET)
 @given(sparse_skillsets() | skillsets(properties=True, most_resources=2) | skillsets(properties=True, most_resources=2, timed=True))
 def test_a_bound_of_what_can_be_reached_finds_the_same_as_all_that_can_be(skillset):
-    """Where sets are too large: the same findings, with the same stories; and the bound has every situation."""
+    """Where sets are too large: the same findings, with the same counterexamples; and the bound has every situation."""
     _certain, suspects = local_checks(skillset, ANY_TIME)
     # Each search has a solver of its own: which values show a step depends on what the solver was asked before.
     exactly = by_sets(skillset, without_data(skillset, ANY_TIME), suspects, ANY_TIME, copies=2)
@@ -106,16 +106,16 @@ def test_sparse_models_are_found_alike_one_by_one_and_as_sets(skillset):
 
 
 def lengths(findings):
-    """Return how long each story is that has to be a shortest one."""
+    """Return how long each counterexample is that has to be a shortest one."""
     return {
-        (f.code, f.message.split(":")[0]): len(f.story.steps)
+        (f.code, f.message.split(":")[0]): len(f.counterexample.steps)
         for f in findings
         if f.code != "ALU524" and "never gets there" not in f.message
     }
 
 
 def found(findings):
-    # Which skills share a story of being lost, and which situation refutes a property, are matters of luck.
+    # Which skills share a counterexample of being lost, and which situation refutes a property, are matters of luck.
     return {(f.code, f.message.split(":")[0] if f.code == "ALU531" else f.message, f.severity) for f in findings if f.code != "ALU524"} | {
         ("ALU524", name, f.severity) for f in findings if f.code == "ALU524" for name in f.message.split("`")[1::2]
     }

@@ -43,7 +43,7 @@ def test_example_and_mended_twin(code, most, tmp_path):
     shown = [f for f in proved(tmp_path, broken, most=most) if f.code == code]
     if most:
         first = shown[0]
-        told = [f"{first.severity.value} {code}: {first.message}", *(f"  {line}" for line in first.counterexample)]
+        told = [f"{first.severity.value} {code}: {first.message}", *(f"  {line}" for line in first.counterexample_lines)]
         assert "\n".join(told) == printed.strip()
     assert shown
     assert all(finding.span.line for finding in shown)

@@ -1,4 +1,4 @@
-"""A story's world over rclpy, in a DDS domain of its own; as a process it plays stories (see ``alula_testing.live_story``)."""
+"""A counterexample's world over rclpy, in a DDS domain of its own; as a process it plays them (``alula_testing.live_counterexample``)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from skillset_interfaces import action
 
 from alula.common.network import claim_domain
 from alula.model.model import Skillset
-from alula.runtime.story_world import Hooks
-from alula_testing.live_story import LiveWorld, interfaces_of, serve
+from alula.runtime.counterexample_world import Hooks
+from alula_testing.live_counterexample import LiveWorld, interfaces_of, serve
 from skillset_ros2.middleware import RclpyMiddleware
 from skillset_ros2.session import Session
 
@@ -22,7 +22,7 @@ from skillset_ros2.session import Session
 def ros2_world(skillset: Skillset, hooks: Hooks) -> Iterator[LiveWorld]:
     """Serve a skillset over rclpy: a node of the managers and one of the client, each spun by a thread."""
     claim = claim_domain()
-    sessions = [Session(f"story_{side}", domain=claim.domain) for side in ("managers", "client")]
+    sessions = [Session(f"counterexample_{side}", domain=claim.domain) for side in ("managers", "client")]
     try:
         for session in sessions:
             session.node.set_parameters([Parameter("use_sim_time", value=True)])

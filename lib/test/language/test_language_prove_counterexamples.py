@@ -50,13 +50,13 @@ skillset uav {
 @BOTH
 def test_goto_loses_its_invariant_right_after_the_start(most, tmp_path):
     (finding,) = proved(tmp_path, GOTO, most=most)
-    assert (finding.code, finding.severity.value, finding.counterexample[0]) == ("ALU510", "error", "authority == None")
-    assert finding.counterexample[1:] == (
+    assert (finding.code, finding.severity.value, finding.counterexample_lines[0]) == ("ALU510", "error", "authority == None")
+    assert finding.counterexample_lines[1:] == (
         "1. initially authority == Pilot",
         "2. event lost: authority Pilot -> None",
         "3. goto starts; `in_control` of goto is false and ends it",
     )
-    assert finding.as_json()["counterexample"] == list(finding.counterexample)
+    assert finding.as_json()["counterexample"] == list(finding.counterexample_lines)
 
 
 ARM = Resource("arm", ("In", "Out"), "In", (Transition("In", "Out"), Transition("Out", "In")))
@@ -88,8 +88,8 @@ def test_data_exclude_each_other_by_their_values_and_units(most):
     assert prove(reaching(full, invariants=[kept]), most=most) == []
     (finding,) = prove(reaching(invariants=[kept]), most=most)
     assert finding.code == "ALU510"
-    assert finding.counterexample[1].startswith("battery.level == ")
-    assert float(finding.counterexample[1].split("== ")[1]) <= 0.2
+    assert finding.counterexample_lines[1].startswith("battery.level == ")
+    assert float(finding.counterexample_lines[1].split("== ")[1]) <= 0.2
 
 
 @BOTH
@@ -101,7 +101,7 @@ def test_an_invariant_with_patience_may_break_later_and_its_effect_is_applied(mo
     keeps = replace(patient, effect=Effect())
     lost = prove(reaching(invariants=[keeps]), most=most)
     assert [f.code for f in lost] == ["ALU524"]
-    assert lost[0].counterexample[-1] == "5. 2 s pass; `steady` of reach is false and ends it"
+    assert lost[0].counterexample_lines[-1] == "5. 2 s pass; `steady` of reach is false and ends it"
 
 
 @BOTH
@@ -111,7 +111,7 @@ def test_only_fairness_makes_an_execution_end(most):
     model = replace(reaching(properties=(ends,)), resources=(ARM, toggle))
     (finding,) = prove(model, most=most)
     assert finding.code == "ALU531"
-    loop = finding.counterexample[finding.counterexample.index("and then for ever:") + 1 :]
+    loop = finding.counterexample_lines[finding.counterexample_lines.index("and then for ever:") + 1 :]
     assert sorted(line.split(": ")[-1] for line in loop) == ["day No -> Yes", "day Yes -> No"]
     assert prove(replace(model, properties=(replace(ends, fair=True),)), most=most) == []
 
@@ -122,7 +122,7 @@ def test_the_vehicles_skillsets_are_proved():
     findings = [finding for skillset in skillsets for finding in prove(skillset)]
     # The paper's takeoff keeps the axes when it loses the authority (see the comment in the model).
     assert [finding.code for finding in findings] == ["ALU524"]
-    assert "`keep_sdk_authority` of takeoff is false and ends it" in findings[0].counterexample[-1]
+    assert "`keep_sdk_authority` of takeoff is false and ends it" in findings[0].counterexample_lines[-1]
 
 
 def test_a_long_search_says_what_it_is_doing(monkeypatch):

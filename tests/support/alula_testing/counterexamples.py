@@ -1,4 +1,4 @@
-"""Stories of the proofs: those of the page PROOFS.md, a model with data and time, and one whose arrows are taken from outside."""
+"""Counterexamples of the proofs: those of the page PROOFS.md, a model with data and time, and one with arrows from outside."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ skillset uav {
 MODELS = {**EXAMPLES, "data and time": DATA, "from outside": OUTSIDE}
 
 
-def stories(path: Path, text: str) -> tuple[Skillset, list[Diagnostic]]:
-    """Return the skillset of a model, written to ``path``, and the findings that tell a story."""
+def counterexamples(path: Path, text: str) -> tuple[Skillset, list[Diagnostic]]:
+    """Return the skillset of a model, written to ``path``, and the findings that have a counterexample with steps."""
     path.write_text(text)
     (file,) = check_files([path])
     (skillset,) = file.skillsets
-    return skillset, [finding for finding in prove(skillset) if finding.story.steps]
+    return skillset, [finding for finding in prove(skillset) if finding.counterexample.steps]

@@ -1,4 +1,4 @@
-"""A story's world over rospy, with a master of its own; as a process it plays stories (see ``alula_testing.live_story``)."""
+"""A counterexample's world over rospy, with a master of its own; as a process it plays them (``alula_testing.live_counterexample``)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from rosmaster.master import Master
 from skillset_interfaces import msg as messages
 
 from alula.model.model import Skillset
-from alula.runtime.story_world import Hooks
-from alula_testing.live_story import LiveWorld, interfaces_of, serve
+from alula.runtime.counterexample_world import Hooks
+from alula_testing.live_counterexample import LiveWorld, interfaces_of, serve
 from skillset_ros1.middleware import RospyMiddleware
 from skillset_ros1.names import place
 
@@ -43,8 +43,8 @@ def own_graph() -> Callable[[int], None]:
     master = Master(port=0)
     master.start()
     os.environ["ROS_MASTER_URI"] = master.uri
-    rosgraph.Master("/story").setParam("/use_sim_time", True)
-    rospy.init_node("story", disable_signals=True, disable_rosout=True)
+    rosgraph.Master("/counterexample").setParam("/use_sim_time", True)
+    rospy.init_node("counterexample", disable_signals=True, disable_rosout=True)
     clock = rospy.Publisher("/clock", Clock, queue_size=1)
     return lambda now_ns: clock.publish(Clock(clock=rospy.Time(0, now_ns)))
 

@@ -45,7 +45,7 @@ class StateChange:
 
 @dataclass(frozen=True)
 class Execution:
-    """An execution of a skill; ``number`` counts the starts of the skill in the story, from 1."""
+    """An execution of a skill; ``number`` counts the starts of the skill in the run, from 1."""
 
     skill: str
     number: int
@@ -66,7 +66,7 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class StoryStep:
+class CounterexampleStep:
     """One step. ``subject`` names what is done: resource and state, event, skill, result, data, or invariant.
 
     ``data`` has the values that are received (None: no fresh value any more), ``time_s`` how much mission time passes before
@@ -106,9 +106,9 @@ class StoryStep:
         }
 
     @staticmethod
-    def from_json(plain: Mapping[str, Any]) -> StoryStep:
+    def from_json(plain: Mapping[str, Any]) -> CounterexampleStep:
         """Return the step that ``as_json`` was made of; its values are believed."""
-        return StoryStep(
+        return CounterexampleStep(
             StepKind(plain["kind"]),
             plain["text"],
             subject=tuple(plain["subject"]),
@@ -125,10 +125,10 @@ class StoryStep:
 
 
 @dataclass(frozen=True)
-class Story:
+class Counterexample:
     """The steps of a run; ``stops`` tells that nothing more can happen after the last."""
 
-    steps: tuple[StoryStep, ...] = ()
+    steps: tuple[CounterexampleStep, ...] = ()
     stops: bool = False
 
     @property
@@ -141,7 +141,7 @@ class Story:
         return (*told, *(["and nothing more can happen"] if self.stops else []))
 
 
-NO_STORY = Story()
+NO_COUNTEREXAMPLE = Counterexample()
 
 
 def messages(values: Values) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""Where a story is played: managers of one skillset, a client of theirs, and a clock that the player moves. Here, in virtual time."""
+"""Where a counterexample is played: managers of one skillset, their client, and a clock that the player moves. Here: virtual time."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalWorld
 
 
-class StoryManagers(Protocol):
-    """What a story needs of the managers beside their client."""
+class PlayManagers(Protocol):
+    """What a counterexample needs of the managers besides their client."""
 
     @property
     def engine(self) -> SkillsetEngine:
@@ -26,11 +26,11 @@ class StoryManagers(Protocol):
         ...
 
 
-class StoryWorld(Protocol):
+class PlayWorld(Protocol):
     """Managers of one skillset, a client of theirs, and a mission clock that stands still unless it is told to go on."""
 
     @property
-    def managers(self) -> StoryManagers:
+    def managers(self) -> PlayManagers:
         """The managers."""
         ...
 
@@ -54,7 +54,7 @@ class StoryWorld(Protocol):
 
 
 Hooks = Mapping[str, SkillHooks]
-MakeWorld = Callable[[Skillset, Hooks], AbstractContextManager[StoryWorld]]
+MakeWorld = Callable[[Skillset, Hooks], AbstractContextManager[PlayWorld]]
 
 
 class VirtualWorld:
@@ -80,6 +80,6 @@ class VirtualWorld:
 
 
 @contextmanager
-def virtual_world(skillset: Skillset, hooks: Hooks) -> Iterator[StoryWorld]:
+def virtual_world(skillset: Skillset, hooks: Hooks) -> Iterator[PlayWorld]:
     """Serve a skillset in virtual time."""
     yield VirtualWorld(skillset, hooks)

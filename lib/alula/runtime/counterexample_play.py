@@ -1,7 +1,7 @@
 """Plays a counterexample of the proofs in running managers: the same requests, reports and data, one after another.
 
-Functions are hooks that do nothing but what the story says: they end with its results, and make progress meanwhile. After each
-step, the states of the resources and the ends of the executions are held against the story. The managers and their client are
+Functions are hooks that do only what the counterexample says: they end with its results, and make progress meanwhile. After each step,
+ the states of the resources and the ends of the executions are held against the counterexample. The managers and their client are
 those of any world: in virtual time, over rclpy, over rospy.
 """
 
@@ -12,15 +12,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
+from alula.language.counterexamples import Counterexample, CounterexampleStep, Execution, messages
+from alula.language.counterexamples import StepKind as Kind
 from alula.language.outside import opened
-from alula.language.stories import Execution, Story, StoryStep, messages
-from alula.language.stories import StepKind as Kind
 from alula.model.model import Skillset
 from alula.runtime.core.execution import Execution as Running
 from alula.runtime.core.replies import TransitionReply
+from alula.runtime.counterexample_world import MakeWorld, PlayWorld, virtual_world
 from alula.runtime.handle import SkillHandle
 from alula.runtime.hooks import SkillHooks
-from alula.runtime.story_world import MakeWorld, StoryWorld, virtual_world
 from alula.runtime.waiting import Pending
 
 READY_S = 60.0
@@ -31,14 +31,14 @@ TICK_S = 0.5
 
 @dataclass(frozen=True)
 class PlayedStep:
-    """A step of the story, and how the managers differ from it: a line for each difference, none where they agree."""
+    """A step of the counterexample, and how the managers differ from it: a line for each difference, none where they agree."""
 
-    step: StoryStep
+    step: CounterexampleStep
     differences: tuple[str, ...] = ()
 
 
 class _Function(SkillHooks):
-    """A function that goes on until the story ends it."""
+    """A function that goes on until the counterexample ends it."""
 
     def __init__(self) -> None:
         self.now_ns: Callable[[], int] = lambda: 0
@@ -59,16 +59,16 @@ class _Function(SkillHooks):
         return (self._reports % 100) / 100
 
 
-def play(skillset: Skillset, story: Story, make_world: MakeWorld = virtual_world) -> list[PlayedStep]:
-    """Play a story from its first step on; stop after the first step that comes out otherwise."""
-    arrows = _from_outside(story)
-    # Managers refuse what is not extern; arrows that the story has taken from outside are, in this play.
+def play(skillset: Skillset, counterexample: Counterexample, make_world: MakeWorld = virtual_world) -> list[PlayedStep]:
+    """Play a counterexample from its first step on; stop after the first step with a difference."""
+    arrows = _from_outside(counterexample)
+    # Managers refuse what is not extern; arrows that the counterexample has taken from outside are, in this play.
     played_model = _without_parameters(opened(skillset, arrows) if arrows else skillset)
     functions = {skill.name: _Function() for skill in skillset.skills}
     played: list[PlayedStep] = []
     with make_world(played_model, functions) as world:
         player = _Player(played_model, functions, world)
-        for step in story.steps:
+        for step in counterexample.steps:
             played.append(PlayedStep(step, tuple(player.take(step))))
             if played[-1].differences:
                 break
@@ -77,7 +77,7 @@ def play(skillset: Skillset, story: Story, make_world: MakeWorld = virtual_world
 
 @dataclass
 class _Known:
-    """An execution of the story: its handle and how it ended there."""
+    """An execution of the counterexample: its handle and how it ended there."""
 
     handle: SkillHandle
     function: _Function
@@ -85,7 +85,7 @@ class _Known:
 
 
 class _Player:
-    def __init__(self, skillset: Skillset, functions: Mapping[str, _Function], world: StoryWorld) -> None:
+    def __init__(self, skillset: Skillset, functions: Mapping[str, _Function], world: PlayWorld) -> None:
         self._functions = functions
         self._world = world
         self._managers = world.managers
@@ -99,8 +99,8 @@ class _Player:
         periods_s = [*self._periods_s.values(), *(data.period_s for data in skillset.data if data.period_s is not None)]
         self._tick_s = min(periods_s, default=2 * TICK_S) / 2
 
-    def take(self, step: StoryStep) -> Iterable[str]:
-        """Do what a step says, let the managers come to rest, and yield each difference from the story."""
+    def take(self, step: CounterexampleStep) -> Iterable[str]:
+        """Do what a step says, let the managers come to rest, and yield each difference from the counterexample."""
         refusal = self._do(step)
         if refusal:
             yield refusal
@@ -111,28 +111,28 @@ class _Player:
         self._world.settle(lambda: not any(self._differences(step)))
         yield from self._differences(step)
 
-    def _differences(self, step: StoryStep) -> Iterable[str]:
-        """Yield how the managers are otherwise than the story says after a step."""
+    def _differences(self, step: CounterexampleStep) -> Iterable[str]:
+        """Yield each difference between the managers and the counterexample after a step."""
         states = {name: status.state for name, status in self._managers.engine.resources.items()}
         for name, state in step.states:
             if states[name] != state:
-                yield f"{name} is {states[name]} in the managers, {state} in the story"
+                yield f"{name} is {states[name]} in the managers, {state} in the counterexample"
         told, found = Counter(one.skill for one in step.running), Counter(one.skill for one in self._managers.engine.executions)
         for skill in sorted({*told, *found}):
             if told[skill] != found[skill]:
-                yield f"{found[skill]} executions of {skill} run in the managers, {told[skill]} in the story"
+                yield f"{found[skill]} executions of {skill} run in the managers, {told[skill]} in the counterexample"
         yield from self._ends()
 
     def _ends(self) -> Iterable[str]:
-        """Yield each execution that has not ended as in the story, or not yet."""
+        """Yield each execution that has not ended as in the counterexample, or not yet."""
         for execution, known in self._executions.items():
             handle = known.handle
             found = [(str(handle.outcome), handle.result)] if handle.done else []
             if found != known.ends:
-                managers, story = (" ".join(ends[0]).strip() if ends else "running" for ends in (found, known.ends))
-                yield f"{execution.skill} (execution {execution.number}) is {managers} in the managers, {story} in the story"
+                managers, expected = (" ".join(ends[0]).strip() if ends else "running" for ends in (found, known.ends))
+                yield f"{execution.skill} (execution {execution.number}) is {managers} in the managers, {expected} in the counterexample"
 
-    def _do(self, step: StoryStep) -> str:
+    def _do(self, step: CounterexampleStep) -> str:
         """Do what a step says; return why the managers refuse it, or nothing."""
         match step.kind:
             case Kind.EXTERN | Kind.OUTSIDE:
@@ -158,7 +158,7 @@ class _Player:
             return "the managers do not answer"
         return answer.failure or answer.value.reason
 
-    def _start(self, step: StoryStep) -> str:
+    def _start(self, step: CounterexampleStep) -> str:
         assert step.execution is not None  # noqa: S101 - a start has one
         handle = self._client.start(step.execution.skill)
         if step.refused:
@@ -169,7 +169,7 @@ class _Player:
         self._world.settle(lambda: handle.done or handle.id in function.running)
         return ""
 
-    def _end(self, step: StoryStep) -> str:
+    def _end(self, step: CounterexampleStep) -> str:
         known = self._executions.get(step.execution) if step.execution is not None else None
         running = None if known is None or known.handle.done else known.function.running.get(known.handle.id)
         if known is None or running is None:
@@ -180,7 +180,7 @@ class _Player:
             running.terminate(step.subject[1])
         return ""
 
-    def _receive(self, step: StoryStep) -> None:
+    def _receive(self, step: CounterexampleStep) -> None:
         for name in dict.fromkeys(path[0] for path, value in step.data if value is None):
             self._data.pop(name, None)
             self._managers.update_data(name, None)
@@ -212,11 +212,11 @@ class _Player:
 
 
 def _without_parameters(skillset: Skillset) -> Skillset:
-    """Return the model as a story knows it: inputs and outputs are the hooks' own affair."""
+    """Return the model as a counterexample knows it: inputs and outputs are the hooks' own affair."""
     return replace(skillset, skills=tuple(replace(skill, inputs=(), outputs=()) for skill in skillset.skills))
 
 
-def _from_outside(story: Story) -> frozenset[tuple[str, str, str]]:
-    """Return the arrows that nothing in the model takes and the story has taken."""
-    changes = [(step.changes[0], step.subject) for step in story.steps if step.kind is Kind.OUTSIDE]
+def _from_outside(counterexample: Counterexample) -> frozenset[tuple[str, str, str]]:
+    """Return the arrows that nothing in the model takes and the counterexample has taken."""
+    changes = [(step.changes[0], step.subject) for step in counterexample.steps if step.kind is Kind.OUTSIDE]
     return frozenset((change.resource, change.source, change.target) for change, _ in changes)

@@ -1,6 +1,6 @@
-"""What the worlds of a story have in common over a real middleware: real managers and a real client, on a mission clock of their own.
+"""The worlds of counterexamples over a real middleware have this in common: real managers and client, on a mission clock of their own.
 
-Each is a process: it takes models and the steps of stories as lines of JSON, and answers with the differences at each step.
+Each is a process: it takes models and the steps of counterexamples as lines of JSON, and answers with the differences at each step.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ import time
 from collections.abc import Callable
 from types import ModuleType
 
-from alula.language.stories import Story, StoryStep
+from alula.language.counterexamples import Counterexample, CounterexampleStep
 from alula.model.json_form import from_json, to_json
 from alula.model.model import Skillset
 from alula.model.ros_types import camel
 from alula.runtime.client import Client
 from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.counterexample_play import PlayedStep, play
+from alula.runtime.counterexample_world import Hooks, MakeWorld
 from alula.runtime.managers import Managers
 from alula.runtime.middleware import Middleware
-from alula.runtime.story_play import PlayedStep, play
-from alula.runtime.story_world import Hooks, MakeWorld
 
 SETTLE_S = 10.0
 """How long (wall clock) a condition is waited for."""
@@ -29,7 +29,7 @@ CLOCK_S = 30.0
 LOOK_S = 0.005
 NANOSECONDS = 1_000_000_000
 NO_TOPIC = "std_msgs/msg/String"
-"""Of data's topics, which carry nothing in a play: the values of a story are handed over to the managers, whatever their types."""
+"""Of data's topics, which carry nothing in a play: the managers get a counterexample's values directly, whatever their types."""
 
 
 class LiveWorld:
@@ -48,7 +48,7 @@ class LiveWorld:
         self._tell_time = tell_time
         self._now_ns = max(side.now_ns() for side in self._sides)
         self.pass_time(1.0)
-        bindings = {data.name: (f"{skillset.name}/story/{data.name}", NO_TOPIC) for data in skillset.data}
+        bindings = {data.name: (f"{skillset.name}/counterexample/{data.name}", NO_TOPIC) for data in skillset.data}
         self.managers = Managers(serving, skillset, hooks, bindings=bindings)
         self.client = Client(calling, skillset.name)
 
@@ -75,8 +75,8 @@ class LiveWorld:
 
     def close(self) -> None:
         """End the managers and the client."""
-        self.managers.close("the story is over")
-        self.client.close("the story is over")
+        self.managers.close("the play is over")
+        self.client.close("the play is over")
         self._sides[0].close()
 
 
@@ -89,24 +89,24 @@ def interfaces_of(skillset: Skillset, messages: object, kinds: tuple[str, ...]) 
     return interfaces
 
 
-def to_line(skillset: Skillset, story: Story) -> str:
+def to_line(skillset: Skillset, counterexample: Counterexample) -> str:
     """Return the line that ``serve`` reads."""
-    return json.dumps({"model": to_json(skillset), "steps": [step.as_json() for step in story.steps]}) + "\n"
+    return json.dumps({"model": to_json(skillset), "steps": [step.as_json() for step in counterexample.steps]}) + "\n"
 
 
-def from_line(story: Story, answer: str) -> list[PlayedStep]:
-    """Return what ``serve`` has answered for a story."""
-    return [PlayedStep(step, tuple(differences)) for step, differences in zip(story.steps, json.loads(answer), strict=False)]
+def from_line(counterexample: Counterexample, answer: str) -> list[PlayedStep]:
+    """Return what ``serve`` has answered for a counterexample."""
+    return [PlayedStep(step, tuple(differences)) for step, differences in zip(counterexample.steps, json.loads(answer), strict=False)]
 
 
 def serve(make_world: MakeWorld) -> None:
-    """Play the stories that come as lines on stdin, each in a world of its own; answer each with a line on stdout."""
+    """Play the counterexamples that come as lines on stdin, each in a world of its own; answer each with a line on stdout."""
     # Whatever prints to stdout goes to stderr: that line belongs to the answers.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     for line in sys.stdin:
         asked = json.loads(line)
-        story = Story(tuple(StoryStep.from_json(step) for step in asked["steps"]))
-        played = play(from_json(asked["model"]), story, make_world)
+        counterexample = Counterexample(tuple(CounterexampleStep.from_json(step) for step in asked["steps"]))
+        played = play(from_json(asked["model"]), counterexample, make_world)
         answers.write(json.dumps([one.differences for one in played]) + "\n")
         answers.flush()

@@ -1,47 +1,47 @@
 """Tells a way through the situations: each step is taken again with data and time, by the semantics, and put into words.
 
-The search leaves data and time out: what they decide may go either way. A story names values that show the way. Where none
-are found (two invariants may want different values at once), the rest of the way is told as the search took it.
+The search leaves data and time out: what they decide may go either way. A counterexample names values that show the way.
+Where none are found (two invariants may want different values at once), the rest of the way is told as the search took it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from alula.language.stories import Story
+from alula.language.counterexamples import Counterexample
 from alula.prove.explore import Edge, Graph
 from alula.prove.replay import Replay
 from alula.prove.steps import Key, Move, State, World
 
 
-def story(graph: Graph, way: Sequence[Edge], last: Move | None = None, fault: Key = ()) -> Story:
-    """Return the story of a way, and of a last step that shows a fault."""
+def of_way(graph: Graph, way: Sequence[Edge], last: Move | None = None, fault: Key = ()) -> Counterexample:
+    """Return the run along a way, and of a last step that shows a fault."""
     moves = [move_of(graph, edge) for edge in way]
     return walked(graph.world, graph.states[0], moves if last is None else [*moves, last], fault)
 
 
-def walked(world: World, first: State, moves: Iterable[Move], fault: Key = ()) -> Story:
-    """Return the story of steps from the initial situation; the last one shows the fault if there is one."""
+def walked(world: World, first: State, moves: Iterable[Move], fault: Key = ()) -> Counterexample:
+    """Return the run of steps from the initial situation; the last one shows the fault if there is one."""
     replay = Replay(world, first)
     several = list(moves)
     for number, move in enumerate(several, 1):
         replay.take(move, fault if number == len(several) else ())
-    return Story(tuple(replay.steps))
+    return Counterexample(tuple(replay.steps))
 
 
-def to(graph: Graph, number: int, last: Move | None = None, fault: Key = ()) -> Story:
-    """Return the story of a shortest way to a situation."""
-    return story(graph, graph.path(number), last, fault)
+def to(graph: Graph, number: int, last: Move | None = None, fault: Key = ()) -> Counterexample:
+    """Return the run along a shortest way to a situation."""
+    return of_way(graph, graph.path(number), last, fault)
 
 
-def lasso(graph: Graph, way: Sequence[Edge], loop: Sequence[Edge]) -> Story:
-    """Return the story of a way and of the loop after it, or of the end that it comes to where there is no loop."""
+def lasso(graph: Graph, way: Sequence[Edge], loop: Sequence[Edge]) -> Counterexample:
+    """Return the run along a way and the loop after it; without a loop, nothing more can happen at its end."""
     replay = Replay(graph.world, graph.states[0])
     for edge in way:
         replay.take(move_of(graph, edge))
     for edge in loop:
         replay.take(move_of(graph, edge), loop=True)
-    return Story(tuple(replay.steps), stops=not loop)
+    return Counterexample(tuple(replay.steps), stops=not loop)
 
 
 def move_of(graph: Graph, edge: Edge) -> Move:
