@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PATIENCE_S = 5.0  # wall clock, for the server to say goodbye to its viewers
+TIMEOUT_S = 5.0  # wall clock, for the server to say goodbye to its viewers
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def page_beside(out: Path, say: Callable[[str], None], command: tuple[str, ...] 
         finally:
             server.terminate()
             try:
-                server.wait(PATIENCE_S)
+                server.wait(TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 server.kill()
 

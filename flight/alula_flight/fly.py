@@ -40,8 +40,8 @@ from alula_flight.mocked import STOPPING, MockFront
 from alula_flight.spec import RequestError, RunSpec
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
-MISSION_PATIENCE_S = 150.0  # wall clock; stop, hover, land
-PATIENCE_S = 3.0  # wall clock, for what is left of a run to end by itself
+MISSION_TIMEOUT_S = 150.0  # wall clock; stop, hover, land
+TIMEOUT_S = 3.0  # wall clock, for what is left of a run to end by itself
 MISSION_NODE = "mission"
 RADIO_PORT, RADIO_PORTS = 20_000, 10
 SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
@@ -103,7 +103,7 @@ class Front:
             live.show_new()
         finally:
             # At the second Ctrl-C the run is ended at once: a supervisor that is told politely would still try to land.
-            end_run(self._spec.run_id, patience_s=0.0 if self._interrupts.at_once else PATIENCE_S)
+            end_run(self._spec.run_id, timeout_s=0.0 if self._interrupts.at_once else TIMEOUT_S)
             supervisor.wait()
             sweep_shared_memory()
         return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
@@ -124,7 +124,7 @@ class Front:
         for mission in missions:
             with contextlib.suppress(psutil.NoSuchProcess):
                 mission.send_signal(signal.SIGINT)
-        end = time.monotonic() + MISSION_PATIENCE_S
+        end = time.monotonic() + MISSION_TIMEOUT_S
         while missions and time.monotonic() < end and not self._interrupts.at_once:
             _, missions = psutil.wait_procs(missions, timeout=0.2)
             live.show_new()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
-STANDSTILL_PATIENCE_S = 60.0  # wall clock without a tick of the mission clock
-START_PATIENCE_S = 120.0  # wall clock until the mission clock runs
+STANDSTILL_TIMEOUT_S = 60.0  # wall clock without a tick of the mission clock
+START_TIMEOUT_S = 120.0  # wall clock until the mission clock runs
 
 
 class MissionClock:
@@ -43,12 +43,12 @@ class MissionClock:
     @property
     def stands_still(self) -> bool:
         """Tell whether the clock has not moved for so long that nothing will move it any more."""
-        patience_s = STANDSTILL_PATIENCE_S if self.began else START_PATIENCE_S
-        return self._simulated and time.monotonic() - self._moved > patience_s
+        timeout_s = STANDSTILL_TIMEOUT_S if self.began else START_TIMEOUT_S
+        return self._simulated and time.monotonic() - self._moved > timeout_s
 
     @property
     def standstill(self) -> str:
         """Say how it stands still."""
         if self.began:
-            return f"the mission clock stood still for {STANDSTILL_PATIENCE_S:g} s"
-        return f"the mission clock did not begin within {START_PATIENCE_S:g} s"
+            return f"the mission clock stood still for {STANDSTILL_TIMEOUT_S:g} s"
+        return f"the mission clock did not begin within {START_TIMEOUT_S:g} s"

@@ -31,10 +31,10 @@ from alula_flight.process_faults import ProcessFaults, Started
 from alula_flight.spec import RunSpec
 from alula_flight.waits import Beginning, clock_words
 
-LANDING_PATIENCE_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
+LANDING_TIMEOUT_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
 FOR_EVER_S = 2**31
-STATE_PATIENCE_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
-ABORT_PATIENCE_S = 150.0  # wall clock; stop, hover, land
+STATE_TIMEOUT_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
+ABORT_TIMEOUT_S = 150.0  # wall clock; stop, hover, land
 
 log = logging.getLogger("alula.supervisor")
 
@@ -183,8 +183,8 @@ class Supervisor:
                 abort_since = time.monotonic()
                 self._note_abort()
                 self._abort_mission(launch)
-            if abort_since is not None and time.monotonic() - abort_since > ABORT_PATIENCE_S:
-                log.error("the mission did not end within %.0f s after it was told to", ABORT_PATIENCE_S)
+            if abort_since is not None and time.monotonic() - abort_since > ABORT_TIMEOUT_S:
+                log.error("the mission did not end within %.0f s after it was told to", ABORT_TIMEOUT_S)
                 return GIVEN_UP
 
     def _look_for_the_front(self) -> None:
@@ -223,9 +223,9 @@ class Supervisor:
             heard.set()
 
         rospy.Subscriber("/uav_guidance/state", GuidanceState, look, queue_size=1)
-        if not heard.wait(STATE_PATIENCE_S) or down.is_set() or not commanded:
+        if not heard.wait(STATE_TIMEOUT_S) or down.is_set() or not commanded:
             return
-        end_s = (self._clock.now_s or 0.0) + LANDING_PATIENCE_S
+        end_s = (self._clock.now_s or 0.0) + LANDING_TIMEOUT_S
         # Again where something else is followed instead: a skill that was running may have answered the first with a hover.
         while not down.is_set() and (self._clock.now_s or 0.0) < end_s and not self._clock.stands_still:
             if reference != "land" and commanded:

@@ -225,7 +225,7 @@ def test_everything_of_a_run_ends_and_nothing_else(tmp_path):
         assert process.stdout is not None
         assert process.stdout.readline() == b"up\n"
     assert len(processes_of_run(run_id)) == 2
-    assert len(end_run(run_id, patience_s=0.3)) == 2
+    assert len(end_run(run_id, timeout_s=0.3)) == 2
     assert processes_of_run(run_id) == []
     assert mine.wait(5) == -9
     assert other.poll() is None

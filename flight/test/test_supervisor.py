@@ -61,12 +61,12 @@ class Flight:
 
 @pytest.fixture
 def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Flight:
-    monkeypatch.setattr(supervisor, "ABORT_PATIENCE_S", 0.0)
+    monkeypatch.setattr(supervisor, "ABORT_TIMEOUT_S", 0.0)
     return Flight(tmp_path)
 
 
 def test_a_clock_that_never_begins_is_the_reason_that_is_told(flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mission_clock, "START_PATIENCE_S", 0.0)
+    monkeypatch.setattr(mission_clock, "START_TIMEOUT_S", 0.0)
     assert flight.ends() == GIVEN_UP
     assert read_end(tmp_path) == Ended(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from ArduPilot on UDP 9772")
 

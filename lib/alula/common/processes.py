@@ -30,15 +30,15 @@ def processes_of_run(run_id: str) -> list[psutil.Process]:
     return found
 
 
-def end_run(run_id: str, *, patience_s: float = 3.0) -> list[int]:
-    """End all processes of the run: SIGTERM and ``patience_s`` of wall clock, then SIGKILL; 0: SIGKILL at once.
+def end_run(run_id: str, *, timeout_s: float = 3.0) -> list[int]:
+    """End all processes of the run: SIGTERM and ``timeout_s`` of wall clock, then SIGKILL; 0: SIGKILL at once.
 
     Returns:
         The ids of those that still ran.
     """
     told = processes_of_run(run_id)
-    if patience_s > 0.0:
-        _signal_all(run_id, psutil.Process.terminate, patience_s)
+    if timeout_s > 0.0:
+        _signal_all(run_id, psutil.Process.terminate, timeout_s)
     _signal_all(run_id, psutil.Process.kill, KILL_S)
     return [process.pid for process in told]
 

@@ -139,5 +139,5 @@ def start(flight: Flight) -> Path:
 def everything_off(folder: Path) -> str:
     """End all processes of a run at once, without landing; return what was done."""
     run_id = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["run_id"])
-    ended = end_run(run_id, patience_s=0.0)
+    ended = end_run(run_id, timeout_s=0.0)
     return f"{len(ended)} processes were ended at once"

@@ -136,7 +136,7 @@ class Precondition:
 
 @dataclass(frozen=True)
 class Hold:
-    """How patient an invariant is (``fps >= 10 for 2 s recovers at 12``).
+    """How long an invariant's condition may be false, and when it is true again (``fps >= 10 for 2 s recovers at 12``).
 
     It is broken when its condition has been false for ``for_s`` seconds without a break. With ``hysteresis`` a value that fell
     through the condition's threshold is good again only from that value on (in ``unit``, empty for the condition's own).

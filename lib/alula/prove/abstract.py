@@ -1,7 +1,7 @@
 """A skillset without data and without clocks, for the search: what data or time decide may go either way.
 
 A precondition becomes what it asks of resources, if some data fulfil the rest. An invariant over data, or one with
-patience (``hold``), becomes what it asks at once of resources alone, whatever the data; that data (also the lack of a fresh
+a ``hold``, becomes what it asks at once of resources alone, whatever the data; that data (also the lack of a fresh
 value) or time may break it all the same for an execution is a step of its own, a ``Breaker``. A progress deadline ends an
 execution as an interruption does, so it adds no step. Every run of the skillset is a run of this one.
 """
@@ -52,12 +52,12 @@ def without_data(skillset: Skillset, deadline: Deadline, outside: frozenset[Arro
     events = tuple(_event(event, possibly) for event in skillset.events)
     undecided = [(skill, one) for skill in skillset.skills for one in skill.invariants if not _at_once(one)]
     breakers = [Breaker(skill.name, one.name, Not(whatever_the_data(one.condition, unknown=False))) for skill, one in undecided]
-    births = [Breaker(skill.name, one.name, _at_birth(skill, one, possibly)) for skill, one in undecided if not _patient(one)]
+    births = [Breaker(skill.name, one.name, _at_birth(skill, one, possibly)) for skill, one in undecided if not _timed(one)]
     resources = replace(skillset, skills=skills, events=events)
     return Abstraction(resources, skillset, solver, tuple(breakers), tuple(births), outside)
 
 
-def _patient(invariant: Invariant) -> bool:
+def _timed(invariant: Invariant) -> bool:
     return invariant.hold is not None and invariant.hold.for_s > 0
 
 
@@ -75,7 +75,7 @@ def _after(atom: Atom, after: Mapping[str, str]) -> Expression:
 
 
 def _at_once(invariant: Invariant) -> bool:
-    return not _patient(invariant) and not any(isinstance(atom, DataIs) for atom in atoms(invariant.condition))
+    return not _timed(invariant) and not any(isinstance(atom, DataIs) for atom in atoms(invariant.condition))
 
 
 def _skill(skill: Skill, possibly: _Possibly) -> Skill:
@@ -88,7 +88,7 @@ def _skill(skill: Skill, possibly: _Possibly) -> Skill:
 def _invariant(invariant: Invariant) -> Invariant:
     if _at_once(invariant):
         return invariant
-    condition = TRUE if _patient(invariant) else whatever_the_data(invariant.condition, unknown=True)
+    condition = TRUE if _timed(invariant) else whatever_the_data(invariant.condition, unknown=True)
     return replace(invariant, condition=condition, hold=None)
 
 

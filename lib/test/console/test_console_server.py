@@ -204,7 +204,7 @@ def test_a_run_that_is_over_is_not_commanded(make_run: Callable[..., Path]) -> N
 
 def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[tuple[str, float]] = []
-    monkeypatch.setattr(acts, "end_run", lambda run_id, *, patience_s: ended.append((run_id, patience_s)) or [1, 2, 3])
+    monkeypatch.setattr(acts, "end_run", lambda run_id, *, timeout_s: ended.append((run_id, timeout_s)) or [1, 2, 3])
     assert acts.everything_off(make_run()) == "3 processes were ended at once"
     assert ended == [("id-run", 0.0)]
 

@@ -75,7 +75,7 @@ def datum(draw):
 
 
 def _hold(draw, asked):
-    """Patience for a condition, or none; recovery values go with a threshold and lie on its good side."""
+    """A hold for a condition, or none; recovery values go with a threshold and lie on its good side."""
     for_s = draw(st.sampled_from([0.0, 0.0, 1.0, 2.0]))
     good_side = {Comparison.LT: -1.0, Comparison.LE: -1.0, Comparison.GT: 1.0, Comparison.GE: 1.0}
     recovers = isinstance(asked, DataIs) and asked.comparison in good_side and draw(st.booleans())

@@ -93,12 +93,12 @@ def test_data_exclude_each_other_by_their_values_and_units(most):
 
 
 @BOTH
-def test_an_invariant_with_patience_may_break_later_and_its_effect_is_applied(most):
-    patient = Invariant("steady", level(Comparison.GT, 0.2), GIVE, Hold(2.0))
+def test_an_invariant_that_holds_for_some_time_may_break_later_and_its_effect_is_applied(most):
+    steady = Invariant("steady", level(Comparison.GT, 0.2), GIVE, Hold(2.0))
     wanted = Property("stays", PropertyKind.NEVER, ResourceIs("arm", "Out"))
-    (finding,) = prove(reaching(invariants=[patient], properties=(wanted,)), most=most)
+    (finding,) = prove(reaching(invariants=[steady], properties=(wanted,)), most=most)
     assert finding.code == "ALU531"
-    keeps = replace(patient, effect=Effect())
+    keeps = replace(steady, effect=Effect())
     lost = prove(reaching(invariants=[keeps]), most=most)
     assert [f.code for f in lost] == ["ALU524"]
     assert lost[0].counterexample_lines[-1] == "5. 2 s pass; `steady` of reach is false and ends it"

@@ -33,12 +33,12 @@ def wait_until(condition: Callable[[], bool], *, timeout_s: float, what: str) ->
         time.sleep(0.01)
 
 
-def end_process(process: subprocess.Popen[bytes], *, patience_s: float = 5.0) -> None:
+def end_process(process: subprocess.Popen[bytes], *, timeout_s: float = 5.0) -> None:
     """End a process group that the test started: first politely, then for good."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGINT)
         try:
-            process.wait(patience_s)
+            process.wait(timeout_s)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()

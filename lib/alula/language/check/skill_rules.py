@@ -69,7 +69,7 @@ def _conditions(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
         yield from condition_findings(skillset, result.postcondition, f"the postcondition of `{result.name}`", data_allowed=False)
 
 
-def _patience(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
+def _holds(skillset: Skillset, skill: Skill) -> Iterator[Diagnostic]:
     for invariant in skill.invariants:
         if invariant.hold is not None:
             yield from _hold(invariant, invariant.hold)
@@ -132,7 +132,7 @@ SKILL_RULES: Sequence[Callable[[Skillset, Skill], Iterable[Diagnostic]]] = (
     _skill_names,
     _interface_names,
     _conditions,
-    _patience,
+    _holds,
     _effects,
     _ends,
     _stops,

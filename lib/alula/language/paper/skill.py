@@ -101,9 +101,9 @@ class _SkillReader(SkillReader):
 
     def _invariant(self) -> None:
         name, holds = self._named_condition("an invariant")
-        patience = hold(self.cursor)
+        duration = hold(self.cursor)
         effect = self._setting("violation") if self.cursor.at_word("violation") else NO_EFFECT
-        self.parts.invariants.append(Invariant(name.text, holds, effect, patience, span=self.cursor.span(name)))
+        self.parts.invariants.append(Invariant(name.text, holds, effect, duration, span=self.cursor.span(name)))
 
     def _interrupt(self) -> None:
         if not any(self.cursor.at_word(word) for word in ("apply", "post", "interrupting", "timeout")):

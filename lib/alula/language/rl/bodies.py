@@ -27,7 +27,7 @@ class Body:
     """What was read of an invariant's, a result's or the interruption's body."""
 
     condition: Expression | None = None
-    patience: Hold | None = None
+    hold: Hold | None = None
     changes: list[Assignment] = field(default_factory=list)
     reference: Effect | None = None
     postcondition: Expression = TRUE
@@ -79,7 +79,7 @@ def _is_another(cursor: Cursor) -> bool:
 def _guard(cursor: Cursor, body: Body) -> None:
     cursor.accept(":", "=")
     body.condition = bare_condition(cursor)
-    body.patience = hold(cursor)
+    body.hold = hold(cursor)
 
 
 def _effect(cursor: Cursor, body: Body) -> None:

@@ -136,9 +136,9 @@ class _SkillReader(SkillReader):
             if first.kind is Kind.NAME and cursor.ahead().text == ":":
                 name = cursor.name("an invariant").text
                 cursor.advance()
-            condition, patience = bare_condition(cursor), hold(cursor)
+            condition, duration = bare_condition(cursor), hold(cursor)
             effect = read_body(cursor, ("effect",)).effect(cursor, first)
-            self._add_invariant(Invariant(name, condition, effect, patience, span=cursor.span(first)))
+            self._add_invariant(Invariant(name, condition, effect, duration, span=cursor.span(first)))
 
     def _guarded(self, first: Token, name: str) -> None:
         cursor = self.cursor
@@ -148,7 +148,7 @@ class _SkillReader(SkillReader):
             cursor.source.report("ALU103", message, cursor.span(first), hint="write `guard resource == STATE`")
             return
         effect = body.effect(cursor, first)
-        self._add_invariant(Invariant(name, body.condition, effect, body.patience, span=cursor.span(first)))
+        self._add_invariant(Invariant(name, body.condition, effect, body.hold, span=cursor.span(first)))
 
     def _add_invariant(self, invariant: Invariant) -> None:
         name = invariant.name or self._free_name("invariant")

@@ -15,7 +15,7 @@ from alula.runtime.mock import Behaviour
 EARLY_S = 0.05
 """The managers' clock ticks at 50 Hz: an event's stamp may be some ticks older than what caused it."""
 LATE_S = 5.0
-"""A fault that has ended can still show for so long: the patience of the watches, 3 s, and what they say has to arrive."""
+"""A fault that has ended can still show for so long: the timeout of the monitors, 3 s, and what they say has to arrive."""
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,7 @@ def test_a_look_between_bytes_and_their_message_rebuilds_nothing_however_far_the
     assert not any(stream.lost(*so_far, 10.0 * k) for k, so_far in enumerate(looks))
 
 
-def test_a_stream_without_messages_is_lost_after_its_patience_which_doubles_until_one_comes() -> None:
+def test_a_stream_without_messages_is_lost_after_its_timeout_which_doubles_until_one_comes() -> None:
     stream = subscription.Stream()
     assert not stream.lost(100, 1, 0.0)
     assert [stream.lost(100 + 10 * k, 1, 0.5 * k) for k in range(1, 6)] == [False] * 4 + [True]

@@ -14,7 +14,7 @@ from alula.common.network import free_port
 from alula_testing.waits import until
 
 NODE = Path(__file__).parents[1] / "scripts/radio_link_node"
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 
 
 def test_a_lost_control_link_takes_the_control_alone_and_is_written_down(ros_master, start_node, tmp_path):
@@ -36,14 +36,14 @@ def test_a_lost_control_link_takes_the_control_alone_and_is_written_down(ros_mas
         return video in arrived, control in arrived
 
     simulator = rospy.Publisher("/sim/state", String, queue_size=1, latch=True)
-    until(lambda: passes() == (True, True), "both come through", PATIENCE_S)
+    until(lambda: passes() == (True, True), "both come through", TIMEOUT_S)
     simulator.publish(String(json.dumps({"lift_off_s": rospy.get_time()})))
-    until(lambda: told() == [False, True], "the fault begins", PATIENCE_S)
+    until(lambda: told() == [False, True], "the fault begins", TIMEOUT_S)
     while select.select([control], [], [], 0.2)[0]:
         control.recv(100)  # what was under way
     assert passes() == (True, False)
-    until(lambda: told() == [False, True, False], "the fault ends", PATIENCE_S)
-    until(lambda: passes() == (True, True), "both come through again", PATIENCE_S)
+    until(lambda: told() == [False, True, False], "the fault ends", TIMEOUT_S)
+    until(lambda: passes() == (True, True), "both come through again", TIMEOUT_S)
     begins, ends = (json.loads(line)["t_s"] for line in log.read_text().splitlines()[1:])
     assert 0.9 < ends - begins < 1.5
     for each in (video, control, talker):
@@ -63,7 +63,7 @@ def test_every_flow_crosses_and_the_autopilots_answer_comes_back(ros_master, sta
             sender.sendto(data, ("127.0.0.1", to))
             return bool(select.select([listeners[at]], [], [], 0.1)[0])
 
-        until(comes, f"{data!r} at +{at}", PATIENCE_S)
+        until(comes, f"{data!r} at +{at}", TIMEOUT_S)
         got, source = listeners[at].recvfrom(100)
         assert got == data
         return source

@@ -16,11 +16,11 @@ from uav_simulator.pacing import Pacer, header_stamp_s
 from uav_simulator.pilot_hooks import apply_pilot_word
 from uav_simulator.settings import Settings, settings_from_params
 
-LIMIT_S, PATIENCE_S = 0.3, 2.0
+LIMIT_S, TIMEOUT_S = 0.3, 2.0
 
 
 def pacer():
-    return Pacer(limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    return Pacer(limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
 
 
 def test_time_waits_for_a_laggard_and_goes_on_when_it_has_caught_up():
@@ -34,7 +34,7 @@ def test_time_waits_for_a_laggard_and_goes_on_when_it_has_caught_up():
 
 
 def test_from_its_beginning_time_waits_for_all_that_are_held_against_the_clock():
-    p = Pacer(["/a", "/b=0.06", "/c=zed"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    p = Pacer(["/a", "/b=0.06", "/c=zed"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
     assert p.may_advance(50.0, 0.0), "time has not begun"
     p.heard("/a", 10.04)
     p.begin(10.0)
@@ -45,7 +45,7 @@ def test_from_its_beginning_time_waits_for_all_that_are_held_against_the_clock()
     assert not p.may_advance(10.36, 0.1), "/a spoke before time began, and no more"
 
 
-def test_time_lets_go_after_its_patience_until_the_topic_speaks_again():
+def test_time_lets_go_after_its_timeout_until_the_topic_speaks_again():
     p = pacer()
     p.heard("/a", 10.0)
     assert not p.may_advance(11.0, 50.0)
@@ -81,7 +81,7 @@ def test_a_topic_that_repeats_an_old_stamp_does_not_come_back():
 
 
 def test_a_node_that_works_on_measurements_is_waited_for_while_there_are_some():
-    p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    p = Pacer(["/depth/done=zed", "/state"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
     p.measured("zed", 10.0, 10.0)
     p.heard("/depth/done", 10.0)
     assert p.may_advance(99.0, 0.0), "a dead camera does not hold time"
@@ -93,7 +93,7 @@ def test_a_node_that_works_on_measurements_is_waited_for_while_there_are_some():
 
 
 def test_time_stops_before_the_measurement_after_the_one_that_is_not_dealt_with():
-    p, tick, wall = Pacer(["/depth/done=zed"], limit_s=LIMIT_S, patience_s=PATIENCE_S), 0, 0.0
+    p, tick, wall = Pacer(["/depth/done=zed"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S), 0, 0.0
     done = [0]
     p.heard("/depth/done", 0.02)
     for turn in range(400):
@@ -110,7 +110,7 @@ def test_time_stops_before_the_measurement_after_the_one_that_is_not_dealt_with(
 
 
 def test_a_late_measurement_is_waited_for_from_its_arrival():
-    p = Pacer(["/depth/done=zed"], limit_s=LIMIT_S, patience_s=PATIENCE_S)
+    p = Pacer(["/depth/done=zed"], limit_s=LIMIT_S, timeout_s=TIMEOUT_S)
     p.heard("/depth/done", 9.9)
     p.measured("zed", 10.0, 10.5)
     assert p.may_advance(10.56, 0.0)

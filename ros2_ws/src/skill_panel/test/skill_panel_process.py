@@ -7,7 +7,7 @@ from alula.runtime.hooks import SkillHooks
 from skillset_ros2 import run_skillset
 
 
-class Patient(SkillHooks):
+class Endless(SkillHooks):
     """Runs until it is interrupted; a takeoff higher than 100 m is refused."""
 
     def validate(self, inputs):
@@ -26,4 +26,4 @@ class Patient(SkillHooks):
         pass
 
 
-run_skillset(SKILLSET, navigation_interfaces.action, lambda _: {skill.name: Patient() for skill in SKILLSET.skills})
+run_skillset(SKILLSET, navigation_interfaces.action, lambda _: {skill.name: Endless() for skill in SKILLSET.skills})

@@ -158,23 +158,23 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 class Standstill:
     """Notices that the mission clock stands still, on the wall clock."""
 
-    def __init__(self, patience_s: float) -> None:
-        self._patience_s = patience_s
+    def __init__(self, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
         self._last = 0.0
         self._since = time.monotonic()
 
     def lasts(self, now_s: float) -> bool:
-        """Tell whether it has stood still for longer than the patience."""
+        """Tell whether the mission clock has stood still for longer than the timeout."""
         if now_s != self._last:
             self._last, self._since = now_s, time.monotonic()
-        return time.monotonic() - self._since > self._patience_s
+        return time.monotonic() - self._since > self._timeout_s
 
 
 def tick_to_the_end(node: MissionNode, signals: Sequence[int]) -> End:
     """Tick until the mission is over; ``signals`` grows when the process is told to end."""
     executor = NodeExecutor()
     executor.add_node(node)
-    standstill = Standstill(patience_s=60.0)
+    standstill = Standstill(timeout_s=60.0)
     obeyed = 0
     while node.director.end is None:
         executor.spin_once(timeout_sec=TURN_S)
@@ -186,8 +186,8 @@ def tick_to_the_end(node: MissionNode, signals: Sequence[int]) -> End:
             node.tick()
         if standstill.lasts(node.now_s):
             return End(Outcome.NOT_STARTED if node.director.start_s is None else Outcome.GIVEN_UP, "the mission clock stands still")
-    patience = time.monotonic() + LAST_EVENTS_S
-    while node.record.unended and time.monotonic() < patience:
+    end = time.monotonic() + LAST_EVENTS_S
+    while node.record.unended and time.monotonic() < end:
         executor.spin_once(timeout_sec=TURN_S)
     return node.director.end
 

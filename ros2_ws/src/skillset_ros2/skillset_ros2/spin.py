@@ -191,7 +191,7 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
 
     def end() -> None:
         """Shut down once nothing else is left: rclpy sends results by tasks, which make others."""
-        if executor.idle or time.monotonic() > patient_until_s:
+        if executor.idle or time.monotonic() > drain_until_s:
             over.set()
             executor.shutdown(timeout_sec=0)
         else:
@@ -202,6 +202,6 @@ def spin_until(node: SkillsetNode | HooksNode, stop: threading.Event, *, at_stop
     wait_for(stop)
     at_stop()
     node.close("the managers were shut down")
-    patient_until_s = time.monotonic() + END_S / 2
+    drain_until_s = time.monotonic() + END_S / 2
     executor.create_task(end)
     thread.join(END_S)

@@ -11,7 +11,7 @@ from typing import Any
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import SkillHandle
-from alula_testing.attacks.graph import PATIENCE_S, Graph, LiveGraph
+from alula_testing.attacks.graph import TIMEOUT_S, Graph, LiveGraph
 from alula_testing.navigation import FLYING
 
 Found = dict[str, Any]
@@ -96,7 +96,7 @@ def unclosed(graph: LiveGraph) -> Found:
     """Run a script that ends without closing its client."""
     fly(graph)
     script = graph.start("unclosed")
-    outcome, said = script.communicate(timeout=PATIENCE_S)
+    outcome, said = script.communicate(timeout=TIMEOUT_S)
     return {"outcome": outcome.strip(), "code": script.returncode, "said": said[-1000:]}
 
 
@@ -113,7 +113,7 @@ def fly(graph: Graph) -> None:
     client = graph.client()
     for resource, state in FLYING.items():
         asked = client.transition(resource, state)
-        assert asked.wait(PATIENCE_S)
+        assert asked.wait(TIMEOUT_S)
         assert asked.value.accepted or asked.value.state == state, asked.value.reason
     graph.until(lambda: all(client.resources.get(name) == state for name, state in FLYING.items()), "the vehicle is in the air")
     graph.until(lambda: client.resources.get("axes_authority") == "AVAILABLE", "the axes are free")

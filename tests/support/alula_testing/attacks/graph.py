@@ -12,7 +12,7 @@ from typing import IO, Any, Protocol
 from alula_testing import waits
 from alula_testing.ros1 import end_process
 
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 READY = "serving"
 
 
@@ -50,12 +50,12 @@ class LiveGraph:
         assert self.managers.poll() is None, "the managers have ended"
         if self._client is None:
             self._client = self.make_client()
-        assert self._client.wait_ready(PATIENCE_S), "the managers are not there"
+        assert self._client.wait_ready(TIMEOUT_S), "the managers are not there"
         return self._client
 
-    def until(self, condition: Callable[[], object], what: str, patience_s: float = PATIENCE_S) -> None:
+    def until(self, condition: Callable[[], object], what: str, timeout_s: float = TIMEOUT_S) -> None:
         """Wait until the condition holds (wall clock)."""
-        waits.until(condition, what, patience_s)
+        waits.until(condition, what, timeout_s)
 
     def start(self, program: str, *words: str, log: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
         """Start a program of this package in this world; what it says on stderr goes to ``log``."""

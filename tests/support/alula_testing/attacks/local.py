@@ -11,7 +11,7 @@ from navigation_managers.model import SKILLSET
 from alula.runtime.local import LocalWorld
 from alula_testing.attacks.hooks import tame_hooks
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 class LocalGraph:
@@ -24,9 +24,9 @@ class LocalGraph:
 
     def client(self) -> Any:
         """Return the one client of this world."""
-        assert self._client.wait_ready(PATIENCE_S)
+        assert self._client.wait_ready(TIMEOUT_S)
         return self._client
 
     def until(self, condition: Callable[[], object], what: str) -> None:
         """Let virtual time pass until the condition holds."""
-        assert self.world.run_until(lambda: bool(condition()), timeout_s=PATIENCE_S), what
+        assert self.world.run_until(lambda: bool(condition()), timeout_s=TIMEOUT_S), what

@@ -18,7 +18,7 @@ from navigation_managers.model import SKILLSET
 
 from alula.common.shared_memory import sweep_shared_memory
 from alula.runtime.local import LocalManagers, LocalWorld
-from alula_testing.attacks.graph import PATIENCE_S, LiveGraph
+from alula_testing.attacks.graph import TIMEOUT_S, LiveGraph
 from alula_testing.attacks.hooks import random_hooks
 from alula_testing.navigation import FLYING
 from alula_testing.ros1 import end_process
@@ -147,7 +147,7 @@ class LiveStage:
         self._threads.append(threads_of(self._managers.pid))
         self._managers.send_signal(signal.SIGTERM)
         try:
-            code: int | str = self._managers.wait(PATIENCE_S)
+            code: int | str = self._managers.wait(TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._managers.kill()
             code = "hangs"
@@ -172,7 +172,7 @@ class LiveStage:
 
     def _serve(self) -> subprocess.Popen[str]:
         managers = self._graph.start("server", str(self._chance.randrange(2**31)), log=self._log)  # type: ignore[arg-type]
-        assert self._graph.read_until_ready(managers), f"the managers do not start: {managers.wait(PATIENCE_S)}\n{self._tail()}"
+        assert self._graph.read_until_ready(managers), f"the managers do not start: {managers.wait(TIMEOUT_S)}\n{self._tail()}"
         return managers
 
     def _tail(self) -> str:
@@ -181,15 +181,15 @@ class LiveStage:
         return "".join(deque(self._log, TAIL_LINES))
 
     def _fly(self) -> None:
-        found = self.until(lambda: all(client.ready for client in self.clients), PATIENCE_S)
+        found = self.until(lambda: all(client.ready for client in self.clients), TIMEOUT_S)
         assert found, f"clients do not find the managers: {[what_is_known(client) for client in self.clients if not client.ready]}"
         for resource, state in FLYING.items():
-            assert self.until(lambda r=resource, s=state: self._taken(r, s), PATIENCE_S), f"{resource} does not get {state}"  # type: ignore[misc]
+            assert self.until(lambda r=resource, s=state: self._taken(r, s), TIMEOUT_S), f"{resource} does not get {state}"  # type: ignore[misc]
 
     def _taken(self, resource: str, state: str) -> bool:
         """Take a transition; a client that has just doubted slow managers is asked again."""
         asked = self.clients[0].transition(resource, state)
-        return bool(asked.wait(PATIENCE_S)) and not asked.failure
+        return bool(asked.wait(TIMEOUT_S)) and not asked.failure
 
 
 def failures_in(log: Iterable[str]) -> list[str]:

@@ -10,7 +10,7 @@ from alula.runtime.codecs import event_of
 from alula.runtime.core.events import event_record
 from alula_testing import waits
 
-PATIENCE_S = 90.0
+TIMEOUT_S = 90.0
 
 
 def after(delay_s: float, job: Callable[[], object]) -> threading.Timer:
@@ -23,7 +23,7 @@ def after(delay_s: float, job: Callable[[], object]) -> threading.Timer:
 
 def until(condition: Callable[[], bool], what: str) -> None:
     """Wait until the condition holds."""
-    waits.until(condition, what, PATIENCE_S)
+    waits.until(condition, what, TIMEOUT_S)
 
 
 class LiveStage:

@@ -12,7 +12,7 @@ from alula.runtime.core.events import EngineEvent, event_record
 from alula.runtime.local import LocalWorld
 from alula_testing.traces.stage import Client, HooksFactory
 
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 
 
 class NoneStage:
@@ -31,7 +31,7 @@ class NoneStage:
     def client(self) -> Client:
         """Return a new client that is ready."""
         client = self._world.client(SKILLSET.name)
-        assert client.wait_ready(PATIENCE_S)
+        assert client.wait_ready(TIMEOUT_S)
         return client
 
     def transition(self, resource: str, state: str) -> tuple[bool, str, str]:
@@ -56,7 +56,7 @@ class NoneStage:
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Let virtual time pass."""
-        assert self._world.run_until(condition, timeout_s=PATIENCE_S), what
+        assert self._world.run_until(condition, timeout_s=TIMEOUT_S), what
 
     def events(self) -> list[dict[str, Any]]:
         """Return what was heard."""

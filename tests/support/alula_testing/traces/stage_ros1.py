@@ -34,25 +34,25 @@ class Ros1Stage(live.LiveStage):
         """Return a new client that is ready."""
         client = SkillsetClient(SKILLSET.name, namespace=self._namespace)
         self._clients.append(client)
-        assert client.wait_ready(live.PATIENCE_S)
+        assert client.wait_ready(live.TIMEOUT_S)
         return client
 
     def transition(self, resource: str, state: str) -> tuple[bool, str, str]:
         """Call the service."""
         request = TransitionRequest(resource=resource, to=state)
-        reply = call_and_wait(f"{self._managers.place}/transition", Transition, request, timeout_s=live.PATIENCE_S)
+        reply = call_and_wait(f"{self._managers.place}/transition", Transition, request, timeout_s=live.TIMEOUT_S)
         return reply.accepted, reply.reason, reply.state
 
     def set_paused(self, identifier: str, *, paused: bool) -> tuple[bool, str]:
         """Call the service."""
         request = SetPausedRequest(id=identifier, paused=paused)
-        reply = call_and_wait(f"{self._managers.place}/pause", SetPaused, request, timeout_s=live.PATIENCE_S)
+        reply = call_and_wait(f"{self._managers.place}/pause", SetPaused, request, timeout_s=live.TIMEOUT_S)
         return reply.accepted, reply.reason
 
     def why(self, skill: str, inputs: dict[str, Any]) -> tuple[bool, str, list[str]]:
         """Call the service."""
         request = WhyRequest(skill=skill, inputs_json=json.dumps(inputs) if inputs else "")
-        reply = call_and_wait(f"{self._managers.place}/why", Why, request, timeout_s=live.PATIENCE_S)
+        reply = call_and_wait(f"{self._managers.place}/why", Why, request, timeout_s=live.TIMEOUT_S)
         return reply.ready, reply.reason, [transition.cause for transition in reply.history]
 
     def close(self) -> None:

@@ -43,7 +43,7 @@ class Ros2Stage(live.LiveStage):
         """Return a new client that is ready."""
         node = self._new_node()
         client: Client = SkillsetClient(node, SKILLSET.name)
-        assert client.wait_ready(live.PATIENCE_S)
+        assert client.wait_ready(live.TIMEOUT_S)
         self._spin(node)
         return client
 
@@ -66,15 +66,15 @@ class Ros2Stage(live.LiveStage):
         """End the managers."""
         self._managers.close("the play is over")
         for node, executor, thread in reversed(self._spun):
-            end_spinning(executor, thread, live.PATIENCE_S)
+            end_spinning(executor, thread, live.TIMEOUT_S)
             node.destroy_node()
 
     def _call(self, service: str, request: Any) -> Any:
         client = self._services[service]
         # Both ends must know one another, or DDS loses the answer: the managers, too, that this client is there.
-        assert client.wait_for_service(live.PATIENCE_S)
+        assert client.wait_for_service(live.TIMEOUT_S)
         live.until(lambda: self._managers.count_clients(client.srv_name) > 0, f"the managers know the client of {service}")
-        reply = client.call(request, timeout_sec=live.PATIENCE_S)
+        reply = client.call(request, timeout_sec=live.TIMEOUT_S)
         assert reply is not None, f"{service} does not answer"
         return reply
 

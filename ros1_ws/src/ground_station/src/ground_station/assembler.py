@@ -9,7 +9,7 @@ from aiortc.codecs.h264 import h264_depayload
 from video_stream.report import MOST_MISSING
 from video_stream.wire import NS, VideoPacket
 
-PATIENCE_NS = NS // 2  # how long a frame that others wait for may still be sent again
+TIMEOUT_NS = NS // 2  # how long a frame that others wait for may still be sent again
 MOST_WAITING = 60
 
 
@@ -124,7 +124,7 @@ class Assembler:
     def _late(self, now_ns: int) -> bool:
         """Tell whether newer frames have waited too long for the next one."""
         newer = [p.begun_ns for frame_id, p in self._partial.items() if self._next_id is not None and frame_id >= self._next_id]
-        return len(self._partial) > MOST_WAITING or (bool(newer) and now_ns - min(newer) > PATIENCE_NS and self._behind())
+        return len(self._partial) > MOST_WAITING or (bool(newer) and now_ns - min(newer) > TIMEOUT_NS and self._behind())
 
     def _behind(self) -> bool:
         return self._next_id is not None and self.newest_id > self._next_id

@@ -11,8 +11,8 @@ from perception_core.poses import NS
 
 RATE_OVER_S = 2.0
 INTERVALS = 5  # between the last measurements, good or bad: the shortest tells how often they come
-PATIENCE = 2.5  # of this interval: one measurement of a slow sensor may be lost, as one of a fast one may
-MOST_PATIENCE_S = 0.75
+TIMEOUT_INTERVALS = 2.5  # of this interval: one measurement of a slow sensor may be lost, as one of a fast one may
+LONGEST_TIMEOUT_S = 0.75
 LATE_TICK_S = 0.1
 
 
@@ -126,7 +126,7 @@ class HealthWatch:
 
     def _good(self, arrived_ns: int) -> None:
         last = self._last_good_ns
-        if self._good_since_ns is None or last is None or arrived_ns - last > self._patience_ns():
+        if self._good_since_ns is None or last is None or arrived_ns - last > self._timeout_ns():
             self._good_since_ns = arrived_ns
         self._last_good_ns = arrived_ns
         self._trouble = None
@@ -165,11 +165,11 @@ class HealthWatch:
         span_ns = recent[-1] - recent[0] if recent else 0
         return (len(recent) - 1) * NS / span_ns if span_ns > 0 else 0.0
 
-    def _patience_ns(self) -> float:
+    def _timeout_ns(self) -> float:
         """Return how long the sensor may be without a good measurement."""
         known = len(self._arrived_ns) > INTERVALS
         usual_ns = min(later - earlier for earlier, later in pairwise(self._arrived_ns)) if known else 0
-        return max(self.limits.timeout_s * NS, min(PATIENCE * usual_ns, MOST_PATIENCE_S * NS))
+        return max(self.limits.timeout_s * NS, min(TIMEOUT_INTERVALS * usual_ns, LONGEST_TIMEOUT_S * NS))
 
     def _verdict_without_good(self, now_ns: int) -> Verdict:
         trouble = self._fresh_trouble(now_ns)
@@ -177,12 +177,12 @@ class HealthWatch:
 
     def _fresh_trouble(self, now_ns: int) -> Finding | None:
         """Return what the last measurement complained about; None when none came within the time-out: then the sensor is silent."""
-        fresh = self._trouble is not None and now_ns - self._trouble_ns <= self._patience_ns()
+        fresh = self._trouble is not None and now_ns - self._trouble_ns <= self._timeout_ns()
         return self._trouble if fresh else None
 
     def _overdue(self, now_ns: int) -> bool:
         if self._last_good_ns is not None:
-            return now_ns - self._last_good_ns > self._patience_ns()
+            return now_ns - self._last_good_ns > self._timeout_ns()
         return self._started_ns is not None and now_ns - self._started_ns > self.limits.start_s * NS
 
     def _is_good(self) -> bool:
@@ -202,5 +202,5 @@ class HealthWatch:
         if self._last_good_ns is None:
             return FaultKind.SILENT, self._missing or "nothing received yet"
         if self._overdue(now_ns):
-            return FaultKind.SILENT, f"no measurement for {self._patience_ns() / NS:.2g} s"
+            return FaultKind.SILENT, f"no measurement for {self._timeout_ns() / NS:.2g} s"
         return self.fault, "recovering"

@@ -12,7 +12,7 @@ STREAMS_HZ: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 1.0,
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 0.5,
 }
-PATIENCE_S = 2.5
+TIMEOUT_S = 2.5
 
 
 class StreamKeeper:
@@ -32,6 +32,6 @@ class StreamKeeper:
 
     def due(self, now_s: float) -> list[int]:
         """Return the messages to ask for now; they are not due again before 2.5 s are over."""
-        missing = [number for number in STREAMS_HZ if number not in self._heard_s or abs(now_s - self._heard_s[number]) >= PATIENCE_S]
+        missing = [number for number in STREAMS_HZ if number not in self._heard_s or abs(now_s - self._heard_s[number]) >= TIMEOUT_S]
         self._heard_s.update(dict.fromkeys(missing, now_s))
         return missing

@@ -66,7 +66,7 @@ class SimulatorNode:
         )
         if settings.world_path:
             write_mesh(Path(settings.world_path), self._simulation.world.vertices, self._simulation.world.triangles)
-        self._pacer = Pacer(settings.pace_topics, limit_s=settings.pace_limit_s, patience_s=settings.pace_patience_s)
+        self._pacer = Pacer(settings.pace_topics, limit_s=settings.pace_limit_s, timeout_s=settings.pace_timeout_s)
         self._pilot_words: queue.SimpleQueue[str] = queue.SimpleQueue()
         # Holds more ticks than a pace limit lets through at once, so a paced run loses none; flat out, the oldest may be dropped.
         self._clock = rospy.Publisher("/clock", Clock, queue_size=100)
@@ -122,14 +122,14 @@ class SimulatorNode:
         """
         if self._settings.followed_url:
             return
-        patience = time.monotonic() + self._settings.start_patience_s
-        while (missing := [*self._absent(), *unconnected()]) and time.monotonic() < patience and not self._ended:
+        end = time.monotonic() + self._settings.start_timeout_s
+        while (missing := [*self._absent(), *unconnected()]) and time.monotonic() < end and not self._ended:
             self._publish_clock()
             again = time.monotonic() + START_CLOCK_S
             while (rest := again - time.monotonic()) > 0.0:
                 self._pilot.serve(min(rest, WAIT_S))
         if missing and not self._ended:
-            rospy.logwarn(f"simulated time begins without {', '.join(missing)}: not connected for {self._settings.start_patience_s:g} s")
+            rospy.logwarn(f"simulated time begins without {', '.join(missing)}: not connected for {self._settings.start_timeout_s:g} s")
         self._pacer.begin(self._simulation.now_s)
 
     def _absent(self) -> list[str]:
@@ -203,7 +203,7 @@ class SimulatorNode:
     def _tell_left_out(self) -> None:
         left_out = self._pacer.left_out
         for topic in set(left_out) - set(self._left_out):
-            silent = f"silent for {self._settings.pace_patience_s:g} s" if self._paced[topic].get_num_connections() else "its node has gone"
+            silent = f"silent for {self._settings.pace_timeout_s:g} s" if self._paced[topic].get_num_connections() else "its node has gone"
             rospy.logwarn(f"simulated time no longer waits for {topic}: {silent}")
         self._left_out = left_out
 

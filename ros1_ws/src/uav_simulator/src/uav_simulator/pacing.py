@@ -29,8 +29,8 @@ class _Listener:
 class Pacer:
     """Remembers the last stamp of each topic; heard from other threads than the one that asks."""
 
-    def __init__(self, topics: Iterable[str] = (), *, limit_s: float, patience_s: float) -> None:
-        self._limit_s, self._patience_s = limit_s, patience_s
+    def __init__(self, topics: Iterable[str] = (), *, limit_s: float, timeout_s: float) -> None:
+        self._limit_s, self._timeout_s = limit_s, timeout_s
         words = [word.partition("=") for word in topics]
         said = {topic: against for topic, _, against in words if against}
         self._limits_s = {topic: float(against) for topic, against in said.items() if against[0].isdigit()}
@@ -61,9 +61,9 @@ class Pacer:
                 self._listeners[topic] = _Listener(stamp_s, lagging_since_s=listener.lagging_since_s if listener.live else None)
 
     def may_advance(self, now_s: float, wall_s: float) -> bool:
-        """Return whether simulated time may go on at ``now_s``; ``wall_s`` is a monotonic clock for the patience."""
+        """Return whether simulated time may go on at ``now_s``; ``wall_s`` is a monotonic clock for the timeout."""
         with self._lock:
-            # Asks every topic: each has a patience of its own.
+            # Asks every topic: each has a timeout of its own.
             held = [self._holds(listener, self._lag_s(topic, listener, now_s), wall_s) for topic, listener in self._listeners.items()]
             return not any(held)
 
@@ -96,7 +96,7 @@ class Pacer:
             return False
         if listener.lagging_since_s is None:
             listener.lagging_since_s = wall_s
-        listener.live = wall_s - listener.lagging_since_s < self._patience_s
+        listener.live = wall_s - listener.lagging_since_s < self._timeout_s
         return listener.live
 
 

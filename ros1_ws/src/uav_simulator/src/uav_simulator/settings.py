@@ -30,8 +30,8 @@ class Settings:
     rate: float = 1.0  # simulated seconds per second at most; 0: as fast as it can
     pace_topics: tuple[str, ...] = ()  # simulated time waits for them: TOPIC, or TOPIC=SENSOR of a node that deals with its measurements
     pace_limit_s: float = 0.3
-    pace_patience_s: float = 15.0  # wall clock; a node that hangs is waited for so long, one that has died is not
-    start_patience_s: float = 45.0  # wall clock; time begins when all of pace_topics are advertised, and then without them
+    pace_timeout_s: float = 15.0  # wall clock; a node that hangs is waited for so long, one that has died is not
+    start_timeout_s: float = 45.0  # wall clock; time begins when all of pace_topics are advertised, and then without them
     boot_before_s: float = 60.0  # how long the autopilot has had power when the clock starts
 
     @property
@@ -48,7 +48,7 @@ def settings_from_params(params: dict[str, Any]) -> Settings:
         raise ConfigError(f"unknown parameter ~{unknown[0]}; known are {', '.join(types)}")
     values = {name: _converted(name, value, types[name]) for name, value in params.items()}
     settings = Settings(**values)
-    for name in ("seed", "rate", "pace_limit_s", "pace_patience_s", "start_patience_s", "boot_before_s"):
+    for name in ("seed", "rate", "pace_limit_s", "pace_timeout_s", "start_timeout_s", "boot_before_s"):
         if getattr(settings, name) < 0:
             raise ConfigError(f"parameter ~{name}: {getattr(settings, name)} must not be negative")
     if settings.vehicle not in VEHICLES and not settings.followed_url:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from uav_msgs.srv import StreamRequest
 
 STATE_PERIOD_NS = NS // 5
-LINK_PATIENCE_NS = NS  # without a report: nothing is known of what the telepilot sees
+LINK_TIMEOUT_NS = NS  # without a report: nothing is known of what the telepilot sees
 IMAGE_BYTES = 1 << 23
 RED_FIRST = {"rgb8": True, "bgr8": False}
 
@@ -150,7 +150,7 @@ class VideoStreamNode:
     def _on_tick(self) -> None:
         now_ns = self._loop.now_ns
         heard_ns = self._sender.heard_ns
-        up = heard_ns is not None and now_ns - heard_ns < LINK_PATIENCE_NS
+        up = heard_ns is not None and now_ns - heard_ns < LINK_TIMEOUT_NS
         self._tell_link("UP" if up else "DOWN" if heard_ns is not None else "")
         if now_ns >= self._state_due_ns:
             self._state_due_ns = now_ns + STATE_PERIOD_NS

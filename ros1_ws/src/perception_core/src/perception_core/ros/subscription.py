@@ -38,18 +38,18 @@ class Stream:
     """Tells from what a stream has brought so far, as seen from time to time, whether it has lost the borders between its messages.
 
     It has where bytes came and for `SILENCE_S` no message, from the first look that sees it on: a look may fall between the bytes and
-    their message, and the mission clock may have run far since the look before. Each time the patience is doubled, until a message comes.
+    their message, and the mission clock may have run far since the look before. Each time the timeout is doubled, until a message comes.
     """
 
     def __init__(self) -> None:
         self._received, self._messages = 0, 0
         self._waits_since_s: float | None = None
-        self._patience_s = SILENCE_S
+        self._timeout_s = SILENCE_S
 
     def lost(self, received: int, messages: int, now_s: float) -> bool:
         """Return whether the connections are to be rebuilt; their counts begin at zero then. Bytes and messages so far, mission clock."""
         if messages > self._messages:
-            self._patience_s = SILENCE_S
+            self._timeout_s = SILENCE_S
         if messages != self._messages or received < self._received:
             self._received, self._messages = received, messages
         if received == self._received:
@@ -57,10 +57,10 @@ class Stream:
             return False
         if self._waits_since_s is None:
             self._waits_since_s = now_s
-        if abs(now_s - self._waits_since_s) < self._patience_s:  # absolute: the clock may go back
+        if abs(now_s - self._waits_since_s) < self._timeout_s:  # absolute: the clock may go back
             return False
         self._received, self._messages, self._waits_since_s = 0, 0, None
-        self._patience_s = min(2.0 * self._patience_s, LONGEST_SILENCE_S)
+        self._timeout_s = min(2.0 * self._timeout_s, LONGEST_SILENCE_S)
         return True
 
 

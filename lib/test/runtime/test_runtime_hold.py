@@ -169,7 +169,7 @@ def test_recovery_of_a_condition_that_excludes_its_threshold_includes_the_value(
     assert bench.engine.due_ns is None
 
 
-def test_an_invariant_of_resources_may_be_patient_too():
+def test_an_invariant_of_resources_may_have_a_hold_too():
     skill = flying_skill("takeoff", invariants=(Invariant("keep_sdk", SDK, RELEASE, Hold(0.5)),))
     bench = Timed(flying_skillset(skill))
     execution = bench.run()
@@ -287,7 +287,7 @@ TRACES = st.lists(st.sampled_from([None, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0]), min
 
 
 def breaks_at_ms(values, hold):
-    """Return when `fps >= 10`, patient by ``hold``, is broken in a trace whose last value stays, by looking at every millisecond."""
+    """Return when `fps >= 10` with ``hold`` is broken in a trace whose last value stays, by looking at every millisecond."""
     fallen, false_for_ms = False, 0
     for_ms = hold.for_s * 1000
     for now_ms in range(len(values) * STEP_MS + 5000):
