@@ -22,7 +22,7 @@ from alula.common.files import write_json, write_text
 from alula.common.robots import RobotError
 from alula.common.runs import runs_folder
 from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
-from alula.records.causes.fault_file import reaches_of_robot
+from alula.records.causes.fault_file import effects_of_robot
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
 
@@ -45,7 +45,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 def check_faults(campaign: Campaign) -> None:
     """Refuse faults that the mocks of a scenario don't have, and a robot's file of faults that is wrong; raises AnalysisError."""
-    reaches_of_robot()
+    effects_of_robot()
     if campaign.over == MOCKS:
         scenarios = {name: load_flights(name, campaign.behaviour) for name in campaign.scenarios}
         for flight in campaign.flights:

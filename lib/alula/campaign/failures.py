@@ -12,9 +12,9 @@ from alula.model.execution_state import ExecutionState as S
 from alula.model.expressions import ResourceIs, atoms
 from alula.model.model import Invariant, Resource, ResultKind, Skill, Skillset, Transition
 from alula.records.causes.answers import NO_SKILL, answer_to, answer_to_fault
+from alula.records.causes.effects import EXTERN
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.records.causes.faults import Fault, trace
-from alula.records.causes.reach import EXTERN
 from alula.records.tree import Places
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 

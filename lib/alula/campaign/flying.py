@@ -16,9 +16,9 @@ from alula.campaign.mock_flights import MockFlights, load_flights
 from alula.campaign.plan import SIMULATOR, Flight
 from alula.common.record import RecordError, read_record
 from alula.common.robots import find_robot
-from alula.records.causes.fault_file import reaches_of_robot
+from alula.records.causes.effects import EffectsByFault
+from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault, faults_asked
-from alula.records.causes.reach import Reaches
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
@@ -97,10 +97,10 @@ def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Mon
         monitor.take(event)
     events = left.events if left.known is None else left.known
     origin_s = origin_of(events)
-    reaches = reaches_of_robot()
-    asked = faults_asked(flight.requests, events, lift_off_of(events), reaches, first_s=left.first_s, behaviour=left.behaviour)
+    effects = effects_of_robot()
+    asked = faults_asked(flight.requests, events, lift_off_of(events), effects, first_s=left.first_s, behaviour=left.behaviour)
     begun = [(Way(FAULT, name_of(request)), fault) for request, fault in asked]
-    died = [(Way(PROCESS, one["name"]), _ended(one, events, reaches)) for one in found["died"]]
+    died = [(Way(PROCESS, one["name"]), _ended(one, events, effects)) for one in found["died"]]
     every = [failure for causes in (begun, died) for failure in failures_by(causes, events, left.places)]
     every += failures_in(events, ways, left.places)
     return {
@@ -116,11 +116,11 @@ def _row(flight: Flight, found: Mapping[str, Any], left: _Evidence, monitor: Mon
     }
 
 
-def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], reaches: Reaches) -> Fault:
+def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: EffectsByFault) -> Fault:
     """Return the end of a process, as the summary tells of it, as a fault; without a time it ended before the mission clock ran."""
     begun_s = min((event.stamp_s for event in events), default=0.0)
     at_s = begun_s if died["when_s"] is None else origin_of(events) + died["when_s"]
-    return Fault(died["name"], at_s, reach=reaches.of(died["name"]))
+    return Fault(died["name"], at_s, effects=effects.of(died["name"]))
 
 
 # --- in the simulator ---------------------------------------------------------------------------------------------------

@@ -10,8 +10,8 @@ from typing import TypedDict
 from alula.common.faults import MENDED, FaultChange, parse_fault
 from alula.common.scenarios import Scenario
 from alula.records.causes.answers import Answer, answer_to_fault
+from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.faults import Fault, Traced, faults_asked, trace
-from alula.records.causes.reach import Reaches
 from alula.report.deaths import DIED
 from alula.report.facts import RunFacts
 from alula.report.history import History
@@ -60,10 +60,10 @@ def injected(observed: Observed) -> tuple[FaultChange, ...]:
 
 
 def known_faults(
-    facts: RunFacts, scenario: Scenario, history: History, observed: Observed, phases: Phases, reaches: Reaches
+    facts: RunFacts, scenario: Scenario, history: History, observed: Observed, phases: Phases, effects: EffectsByFault
 ) -> list[Known]:
     """Return every fault of the run that is known by what was asked for and recorded, and every process that died."""
-    return [*_told(observed, reaches), *_asked(facts, scenario, history, phases, reaches), *_died(facts, scenario, observed, reaches)]
+    return [*_told(observed, effects), *_asked(facts, scenario, history, phases, effects), *_died(facts, scenario, observed, effects)]
 
 
 def find_answers(known: Sequence[Known], history: History) -> tuple[FaultAnswer, ...]:
@@ -76,31 +76,34 @@ def find_answers(known: Sequence[Known], history: History) -> tuple[FaultAnswer,
     return tuple(found)
 
 
-def _told(observed: Observed, reaches: Reaches) -> Iterator[Known]:
+def _told(observed: Observed, effects: EffectsByFault) -> Iterator[Known]:
     """Yield what the recordings tell; a fault lasts until the next change of the same thing."""
     for at, change in enumerate(observed.all_faults):
         if change.mode != MENDED:
             until_s = next((later.t_s for later in observed.all_faults[at + 1 :] if later.sensor == change.sensor), math.inf)
-            yield change, Fault(change.sensor, change.t_s, until_s, reaches.of(change.sensor))
+            yield change, Fault(change.sensor, change.t_s, until_s, effects.of(change.sensor))
 
 
-def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases, reaches: Reaches) -> Iterator[Known]:
+def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases, effects: EffectsByFault) -> Iterator[Known]:
     """Yield what was asked for and no recording tells: in the simulator the radio's faults."""
     if not facts.mock:
         untold = dict(scenario.faults).keys() - dict(scenario.processes).keys()
         requests = [request for request in map(parse_fault, facts.faults) if request.what in untold]
         lift_off_s = phases.zero_s if phases.departed else None
-        for request, fault in faults_asked(requests, history.events, lift_off_s, reaches):
+        for request, fault in faults_asked(requests, history.events, lift_off_s, effects):
             yield FaultChange(request.what, request.how, fault.at_s), fault
 
 
-def _died(facts: RunFacts, scenario: Scenario, observed: Observed, reaches: Reaches) -> Iterator[Known]:
+def _died(facts: RunFacts, scenario: Scenario, observed: Observed, effects: EffectsByFault) -> Iterator[Known]:
     """Yield the processes that ended without being told to, but for those that a fault has ended."""
     nodes = dict(scenario.processes)
     ended = {nodes.get(change.sensor) for change in observed.processes}
     for death in facts.died:
         if death["when_s"] is not None and death["name"] not in ended:
-            yield FaultChange(death["name"], DIED, death["when_s"]), Fault(death["name"], death["when_s"], reach=reaches.of(death["name"]))
+            yield (
+                FaultChange(death["name"], DIED, death["when_s"]),
+                Fault(death["name"], death["when_s"], effects=effects.of(death["name"])),
+            )
 
 
 def summarise_answer(one: FaultAnswer, phases: Phases) -> AnswerSummary:

@@ -14,8 +14,8 @@ from alula.common.record import FILE as RECORD
 from alula.common.scenarios import load_scenario
 from alula.console.entries import FAULT, Wire
 from alula.console.page import write_report
-from alula.records.causes.fault_file import reaches_of_robot
-from alula.records.causes.reach import Reaches
+from alula.records.causes.effects import EffectsByFault
+from alula.records.causes.fault_file import effects_of_robot
 from alula.report.answers import FaultAnswer, Known, find_answers, known_faults
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
@@ -86,12 +86,12 @@ def _account(run: Run, part: ReportPart) -> Account:
         with run.problems.survive("the robot's recordings"):
             observed = part.observe(run)
     phases = find_phases(run.history, observed)
-    reaches = Reaches()
+    effects = EffectsByFault()
     with run.problems.survive("what faults can bring about"):
-        reaches = reaches_of_robot()
-    known: list[Known] = known_faults(run.facts, run.scenario, run.history, observed, phases, reaches)
+        effects = effects_of_robot()
+    known: list[Known] = known_faults(run.facts, run.scenario, run.history, observed, phases, effects)
     with run.problems.survive("what else failed"):
-        known += part.failures(phases, [fault for _, fault in known], reaches)
+        known += part.failures(phases, [fault for _, fault in known], effects)
     answers = find_answers(known, run.history)
     recovery = find_recovery(run.scenario, run.history, observed, phases, answers)
     return Account(observed, mock, phases, answers, recovery)

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 from alula.common.faults import FaultChange
 from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario
+from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.faults import Fault
-from alula.records.causes.reach import Reaches
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History
@@ -64,7 +64,7 @@ class ReportPart(Protocol):
         """Read the robot's own recordings; not called of a run over mocks."""
         ...
 
-    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:
+    def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:
         """Return what else failed, by the recordings, than is known by now."""
         ...
 
@@ -84,7 +84,7 @@ class NoPart:
         """Know what the supervisor did."""
         return Observed(processes=read_process_faults(run.folder))
 
-    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
+    def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
         """Find nothing."""
         return ()
 

@@ -15,16 +15,16 @@ from alula.model.execution_state import ExecutionState as S
 from alula.model.model import ResultKind
 from alula.model.unmet import Unmet
 from alula.records.causes.answers import answer_to_fault
+from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.failures import skill_failures
-from alula.records.causes.fault_file import reaches_of_robot
+from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault, faults_asked, trace
-from alula.records.causes.reach import Reaches
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.kinds import with_kind
 from alula.records.tree import Places
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent, event_record
 
-DRONE = reaches_of_robot()
+DRONE = effects_of_robot()
 VIOLATED, TERMINATED, NOT_READY = S.RESOURCE_INVARIANT_VIOLATED, S.TERMINATED, S.NOT_READY
 
 
@@ -114,13 +114,13 @@ def test_what_a_skill_changes_or_what_becomes_well_tells_of_no_fault():
     assert told([("pilot", 30.0, math.inf), ("zed", 30.0, math.inf)], taken, well) == [(None, []), (None, [])]
 
 
-def test_a_fault_that_is_not_known_reaches_what_has_its_name():
+def test_a_fault_that_is_not_known_affects_what_has_its_name():
     assert told([("slam", 5.0, math.inf)], change(5.2, "mapping.slam_status", "OK", "LOST")) == [(5.2, [])]
     assert told([("navigation", 5.0, math.inf)], end(6.0, "navigation.goto", S.FAILED)) == [(6.0, [6.0])]
     assert told([("slam", 5.0, math.inf)], BLOCKED) == [(None, [])]
 
 
-def test_faults_come_when_they_were_asked_for_and_reach_what_the_behaviour_says():
+def test_faults_come_when_they_were_asked_for_and_have_the_effects_that_the_behaviour_declares():
     events = [
         change(0.5, "navigation.flight_status", "ON_GROUND", "IN_AIR"),
         change(100.0, "navigation.flight_status", "IN_AIR", "ON_GROUND"),
@@ -131,7 +131,7 @@ def test_faults_come_when_they_were_asked_for_and_reach_what_the_behaviour_says(
         ("zed@20-30", "zed", 30.0, 40.0),
         ("zed:dark@50", "zed:dark", 60.0, math.inf),
     ]
-    assert all(fault.reach == DRONE.of("zed") for _, fault in found)
+    assert all(fault.effects == DRONE.of("zed") for _, fault in found)
     assert faults_asked(requests, [], 10.0, DRONE) == []
 
 
@@ -153,7 +153,7 @@ def test_the_end_of_an_execution_whose_managers_have_gone_is_what_the_mission_wa
     (told,) = [event for event in known if event not in [*begun, *ended, later]]
     assert known.index(told) == len(known) - 2
     assert (told.stamp_s, told.skillset, told.skill, told.state) == (30.0, "perception", "zed_depthmap", S.FAILED)
-    (traced,) = trace([Fault("perception", 29.5, reach=DRONE.of("perception"))], known)
+    (traced,) = trace([Fault("perception", 29.5, effects=DRONE.of("perception"))], known)
     assert (traced.detected_s, [one.end for one in traced.failures]) == (30.0, [told])
 
 
@@ -180,8 +180,8 @@ def test_kinds_of_results_that_a_record_does_not_say_are_those_of_the_model():
 def test_a_robot_without_a_file_has_the_rule_by_names(monkeypatch, tmp_path):
     (tmp_path / "robot.yaml").write_text("name: rover\n")
     monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
-    assert reaches_of_robot() == Reaches()
-    assert Reaches().of("zed").states == {"*.zed_status *"}
+    assert effects_of_robot() == EffectsByFault()
+    assert EffectsByFault().of("zed").states == {"*.zed_status *"}
 
 
 FLOWN = {

@@ -11,8 +11,8 @@ import pytest
 from alula.campaign.coverage import processes
 from alula.campaign.mock_flights import load_flights
 from alula.common.scenarios import load_scenario, scenario_names
-from alula.records.causes.fault_file import load_reaches, reaches_of_robot
-from alula.records.causes.reach import Reach
+from alula.records.causes.effects import FaultEffects
+from alula.records.causes.fault_file import effects_of_robot, load_effects
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
 
@@ -20,10 +20,10 @@ ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 DRONE = models_of(["navigation", "perception", "mapping", "video"])
 
 
-def read(folder: Path, text: str) -> dict[str, Reach]:
+def read(folder: Path, text: str) -> dict[str, FaultEffects]:
     path = folder / "faults.yaml"
     path.write_text(text, encoding="utf-8")
-    return dict(load_reaches(path, DRONE).known)
+    return dict(load_effects(path, DRONE).known)
 
 
 def test_states_and_ends_are_read_with_patterns(tmp_path):
@@ -38,9 +38,9 @@ def test_states_and_ends_are_read_with_patterns(tmp_path):
     """
     known = read(tmp_path, text)
     states = frozenset({"perception.zed_status BROKEN", "perception.zed_status UNKNOWN"})
-    assert known["zed"] == Reach(states, frozenset(), frozenset({"perception.zed_depthmap LOST", "navigation.* *"}))
+    assert known["zed"] == FaultEffects(states, frozenset(), frozenset({"perception.zed_depthmap LOST", "navigation.* *"}))
     assert known["zed_depth"] == known["zed"]
-    assert known["radio_link"] == Reach(later=frozenset({"navigation.SDK_authority UNAVAILABLE"}))
+    assert known["radio_link"] == FaultEffects(later=frozenset({"navigation.SDK_authority UNAVAILABLE"}))
     assert read(tmp_path, "") == {}
 
 
@@ -74,7 +74,7 @@ def test_what_is_wrong_is_told_with_file_and_line(text, line, complaint, tmp_pat
 
 
 def test_the_drones_file_is_right_and_names_what_there_is():
-    known = reaches_of_robot().known
+    known = effects_of_robot().known
     scenarios = [load_scenario(name) for name in scenario_names()]
     faults = {what for scenario in scenarios for what, _ in scenario.faults}
     faults |= {name.partition(":")[0] for scenario in scenarios for name in load_flights(scenario.name).behaviour.faults}

@@ -1,4 +1,4 @@
-"""Reads ``faults.yaml``, which stands beside a robot's models: what its faults and the ends of its processes can bring about."""
+"""Reads ``faults.yaml``, which lies beside a robot's models: the effects of its faults and of the ends of its processes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.robots import FAULTS, RobotError, find_robot
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Skill, Skillset
-from alula.records.causes.reach import Reach, Reaches
+from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
 
@@ -24,8 +24,8 @@ Members = Mapping[str, Collection[str]]
 """By ``skillset.resource`` its states; by ``skillset.skill`` how it can end."""
 
 
-def reaches_of_robot() -> Reaches:
-    """Return what is known of the robot; of one without ``faults.yaml`` nothing is.
+def effects_of_robot() -> EffectsByFault:
+    """Return the effects that the robot declares: none without ``faults.yaml``.
 
     Raises:
         AnalysisError: the file can't be read or is wrong; the message names file and line.
@@ -34,10 +34,10 @@ def reaches_of_robot() -> Reaches:
         file = find_robot().file(FAULTS)
     except RobotError as error:
         raise AnalysisError(str(error)) from None
-    return Reaches() if file is None else load_reaches(file, robot_skillsets())
+    return EffectsByFault() if file is None else load_effects(file, robot_skillsets())
 
 
-def load_reaches(path: Path, skillsets: Sequence[Skillset]) -> Reaches:
+def load_effects(path: Path, skillsets: Sequence[Skillset]) -> EffectsByFault:
     """Read a file, and check it against the models of the robot.
 
     Raises:
@@ -47,18 +47,18 @@ def load_reaches(path: Path, skillsets: Sequence[Skillset]) -> Reaches:
     sections = {} if document is None else document.record("a file of faults", SECTIONS)
     states = {f"{one.name}.{resource.name}": resource.states for one in skillsets for resource in one.resources}
     ends = {f"{one.name}.{skill.name}": _ends(skill) for one in skillsets for skill in one.skills}
-    known: dict[str, Reach] = {}
+    known: dict[str, FaultEffects] = {}
     for section, part in sections.items():
         for name, entry in part.entries(f"`{section}`").items():
             if name in known:
                 raise entry.wrong(f"`{name}` is a fault already; a process needs another name")
             said = entry.record(f"`{name}`", PARTS)
-            known[name] = Reach(
+            known[name] = FaultEffects(
                 states=_read(said.get("states"), "resource", "state", states),
                 later=_read(said.get("later"), "resource", "state", states),
                 ends=_read(said.get("ends"), "skill", "end", ends),
             )
-    return Reaches(known)
+    return EffectsByFault(known)
 
 
 def _ends(skill: Skill) -> tuple[str, ...]:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from alula.common.faults import FaultRequest, spans_of
+from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.failures import SkillFailure, skill_failures
-from alula.records.causes.reach import Reach, Reaches
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.mock import Behaviour
 
@@ -25,7 +25,7 @@ class Fault:
     name: str
     at_s: float
     until_s: float = math.inf
-    reach: Reach = field(default_factory=Reach)
+    effects: FaultEffects = field(default_factory=FaultEffects)
 
     def holds(self, t_s: float) -> bool:
         """Tell whether what happened at this time can follow from it."""
@@ -56,7 +56,7 @@ def faults_asked(
     requests: Sequence[FaultRequest],
     events: Sequence[EngineEvent],
     lift_off_s: float | None,
-    reaches: Reaches,
+    effects: EffectsByFault,
     *,
     first_s: Mapping[str, float] | None = None,
     behaviour: Behaviour | None = None,
@@ -67,16 +67,16 @@ def faults_asked(
         requests: as on the command line.
         events: of the run.
         lift_off_s: seconds of mission clock; None: it never lifted off.
-        reaches: of the robot.
+        effects: of the robot's faults.
         first_s: what mocks say (see ``alula.common.faults.spans_of``).
-        behaviour: of the mocks, which says what the faults reach.
+        behaviour: of the mocks, which declares effects of faults.
     """
     stamps = [event.stamp_s for event in events]
     begun_s, ended_s = min(stamps, default=0.0), max(stamps, default=-math.inf)
     found = []
     for span in spans_of(requests, begun_s=begun_s, lift_off_s=lift_off_s, ended_s=ended_s, first_s=first_s):
         name = f"{span.request.what}:{span.request.how}" if span.request.how else span.request.what
-        found.append((span.request, Fault(name, span.at_s, span.until_s, reaches.of(name, behaviour))))
+        found.append((span.request, Fault(name, span.at_s, span.until_s, effects.of(name, behaviour))))
     return found
 
 
@@ -85,14 +85,14 @@ def trace(faults: Sequence[Fault], events: Sequence[EngineEvent]) -> list[Traced
 
     A change of a resource follows from the last fault before it that can show so and had not ended long before; else from the last one
     that can lead to it later, which tells of nothing. A skill's failure follows from the fault behind the newest change that it names;
-    one that names no change, from the last fault that holds and reaches such an end. Nothing follows from two faults, and what none
-    explains from none.
+    one that names no change, from the last fault that holds and has such an end among its effects. Nothing follows from two faults,
+    and what none explains from none.
     """
     causes = {at: cause for at, event in enumerate(events) if (cause := _cause(faults, event)) is not None}
     changes: list[list[TransitionEvent]] = [[] for _ in faults]
     for at, cause in causes.items():
         event = events[at]
-        if isinstance(event, TransitionEvent) and faults[cause].reach.shows(event):
+        if isinstance(event, TransitionEvent) and faults[cause].effects.shows(event):
             changes[cause].append(event)
     failures: list[list[SkillFailure]] = [[] for _ in faults]
     for failure in skill_failures(events):
@@ -106,7 +106,7 @@ def _cause(faults: Sequence[Fault], event: EngineEvent) -> int | None:
     """Return the place of the last fault that can have brought about an event by itself."""
     holding = [at for at, fault in enumerate(faults) if fault.holds(event.stamp_s)]
     if isinstance(event, TransitionEvent):
-        reaching = [at for at in holding if faults[at].reach.shows(event)] or [at for at in holding if faults[at].reach.leads_to(event)]
+        suspects = [at for at in holding if faults[at].effects.shows(event)] or [at for at in holding if faults[at].effects.leads_to(event)]
     else:
-        reaching = [at for at in holding if faults[at].reach.stops(event)]
-    return max(reaching, key=lambda at: faults[at].at_s, default=None)
+        suspects = [at for at in holding if faults[at].effects.stops(event)]
+    return max(suspects, key=lambda at: faults[at].at_s, default=None)

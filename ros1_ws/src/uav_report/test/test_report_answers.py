@@ -176,7 +176,7 @@ def test_a_file_of_faults_that_is_wrong_costs_no_report(tmp_path, monkeypatch):
     def wrong():
         raise AnalysisError("faults.yaml:3: there is no resource")
 
-    monkeypatch.setattr(making, "reaches_of_robot", wrong)
+    monkeypatch.setattr(making, "effects_of_robot", wrong)
     summary = report(tmp_path, flight(("zed", 30.3)), ("zed", 30.0))
     assert "what faults can bring about: AnalysisError: faults.yaml:3: there is no resource" in summary["problems"]
     assert [one["detected_s"] for one in summary["answers"]] == [30.3], "by its name"

@@ -8,7 +8,7 @@ import pytest
 
 from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
-from alula.records.causes.fault_file import reaches_of_robot
+from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault
 from alula.report.answers import find_answers, known_faults
 from alula.report.facts import RunFacts
@@ -49,10 +49,10 @@ def test_a_stream_that_no_criterion_ended_lost_no_radio():
 def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s, failed):
     killed = () if killed_s is None else (FaultChange("ground_station", "killed", killed_s),)
     scenario, observed, facts = load_scenario("inspection"), Observed(processes=killed), RunFacts("inspection", 0, Path(), (), (), None)
-    reaches = reaches_of_robot()
-    known = known_faults(facts, scenario, History(), observed, Phases(), reaches)
-    if not any(explains(fault, 112.5, reaches.of(RADIO)) for _, fault in known):
-        known.append((FaultChange(RADIO, "", 112.5), Fault(RADIO, 112.5, reach=reaches.of(RADIO))))
+    effects = effects_of_robot()
+    known = known_faults(facts, scenario, History(), observed, Phases(), effects)
+    if not any(explains(fault, 112.5, effects.of(RADIO)) for _, fault in known):
+        known.append((FaultChange(RADIO, "", 112.5), Fault(RADIO, 112.5, effects=effects.of(RADIO))))
     recovery = find_recovery(scenario, History(), observed, Phases(), find_answers(known, History()))
     assert (recovery.failure_s, recovery.failed) == (failure_s, failed)
     (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery)["marks"]

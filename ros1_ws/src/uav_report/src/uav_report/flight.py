@@ -11,8 +11,8 @@ import numpy as np
 from alula.common.faults import FaultChange
 from alula.common.files import write_aside
 from alula.common.runs import INPUTS_FILE
+from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.faults import Fault
-from alula.records.causes.reach import Reach, Reaches
 from alula.report.observed import Observed, read_process_faults
 from alula.report.part import Entry, Findings, Run
 from alula.report.phases import Phases, home, status_changes
@@ -75,17 +75,17 @@ class FlightReport:
             moving_again=None if path is None else lambda since_s: moving_again(path, since_s, self._phases.landing_s),
         )
 
-    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:
+    def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:
         """Return the radio that ended the video, where nothing that is known explains that."""
         run = self._run
         self._phases = flight_phases(phases, run.history, self._recording.guidance)
         if "video" in run.scenario.report:
             with run.problems.survive("video"):
                 self._video = read_video(run.folder, run.history, self._phases, run.problems)
-        lost_s, radio = radio_lost_s(self._video, self._phases), reaches.of(RADIO)
+        lost_s, radio = radio_lost_s(self._video, self._phases), effects.of(RADIO)
         if lost_s is None or any(explains(fault, lost_s, radio) for fault in known):
             return []
-        return [(FaultChange(RADIO, "", lost_s), Fault(RADIO, lost_s, reach=radio))]
+        return [(FaultChange(RADIO, "", lost_s), Fault(RADIO, lost_s, effects=radio))]
 
     def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
         """Compare with the true world, and draw map and video."""
@@ -166,11 +166,11 @@ class FlightReport:
         return MapScene(truth.points, truth.quality.missed_enu_m, truth.world, truth.route, self._recording.path, failure_s, failed)
 
 
-def explains(fault: Fault, lost_s: float, radio: Reach) -> bool:
+def explains(fault: Fault, lost_s: float, radio: FaultEffects) -> bool:
     """Tell whether a fault is what the loss of the radio was: a process of the video, or the radio at that moment."""
     if fault.name == RADIO:
         return abs(fault.at_s - lost_s) < SAME_MOMENT_S
-    return fault.holds(lost_s) and bool(fault.reach.ends & radio.ends)
+    return fault.holds(lost_s) and bool(fault.effects.ends & radio.ends)
 
 
 def moving_again(track: Track, since_s: float, landing_s: float | None) -> float | None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from alula.common.faults import FaultChange
+from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.faults import Fault
-from alula.records.causes.reach import Reaches
 from alula.report.observed import Observed
 from alula.report.part import Entry, Findings, ReportPart, Run
 from alula.report.phases import Phases
@@ -41,7 +41,7 @@ class Mocked:
         """Observe nothing."""
         return Observed()
 
-    def failures(self, phases: Phases, known: Sequence[Fault], reaches: Reaches) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
+    def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
         """Find nothing."""
         return ()
 

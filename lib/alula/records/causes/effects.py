@@ -1,4 +1,4 @@
-"""What a fault, or the end of a process, can bring about in the skill layer first: changes of resources and ends of skills."""
+"""The first effects that a fault, or the end of a process, can have on the skill layer: changes of resources and ends of skills."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ WELL = "OK"
 
 
 @dataclass(frozen=True)
-class Reach:
+class FaultEffects:
     """Patterns in which ``*`` stands for anything.
 
     Attributes:
-        states: ``skillset.resource STATE`` that tell of it.
-        later: states that it can bring about by what is done about it, such as the landing of a failsafe.
+        states: ``skillset.resource STATE`` that report it.
+        later: states that the reaction to it can bring about, such as the landing of a failsafe.
         ends: ``skillset.skill END`` of executions that no change of a resource explains: the name of the result or the invariant, else
             the state.
     """
@@ -32,15 +32,15 @@ class Reach:
     ends: frozenset[str] = field(default_factory=frozenset)
 
     def shows(self, change: TransitionEvent) -> bool:
-        """Tell whether it can be what the functional layer reported with a change of a resource."""
+        """Tell whether the functional layer can have reported the fault by this change of a resource."""
         return _reported(change) and _any(self.states, f"{change.skillset}.{change.resource} {change.to_state}")
 
     def leads_to(self, change: TransitionEvent) -> bool:
-        """Tell whether the change can be of what was done about it."""
+        """Tell whether the change can follow from the reaction to the fault."""
         return _reported(change) and _any(self.later, f"{change.skillset}.{change.resource} {change.to_state}")
 
     def stops(self, end: ExecutionEvent) -> bool:
-        """Tell whether an execution can end like this because of it."""
+        """Tell whether an execution can end like this because of the fault."""
         return _any(self.ends, f"{end.skillset}.{end.skill} {end.result or end.state.value}")
 
 
@@ -53,24 +53,24 @@ def _any(patterns: Iterable[str], text: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Reaches:
-    """What the faults of a robot, and the ends of its processes, can bring about; ``known``: by name, without the way of failing."""
+class EffectsByFault:
+    """The effects of a robot's faults, and of the ends of its processes; ``known``: by name, without the way of failing."""
 
-    known: Mapping[str, Reach] = field(default_factory=dict)
+    known: Mapping[str, FaultEffects] = field(default_factory=dict)
 
-    def of(self, name: str, behaviour: Behaviour | None = None) -> Reach:
-        """Return the reach of a fault or a process by its name, as in ``radio`` or ``radio:out``.
+    def of(self, name: str, behaviour: Behaviour | None = None) -> FaultEffects:
+        """Return the effects of a fault or a process by its name, as in ``radio`` or ``radio:out``.
 
-        What is not known reaches what has its name: the resource ``NAME_status`` and the skillset NAME. A fault that a behaviour of mocks
-        declares brings about the states that are said there.
+        One that is not known affects what has its name: the resource ``NAME_status`` and the skillset NAME. A fault that a behaviour of
+        mocks declares has the states that are declared there.
         """
         what = name.partition(":")[0]
-        found = self.known.get(what) or Reach(frozenset([f"*.{what}_status *"]), ends=frozenset([f"{what}.*"]))
+        found = self.known.get(what) or FaultEffects(frozenset([f"*.{what}_status *"]), ends=frozenset([f"{what}.*"]))
         fault = None if behaviour is None else behaviour.faults.get(name) or behaviour.faults.get(what)
         if fault is None:
             return found
         later = [_named(change.states) for change in fault.changes]
-        return Reach(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
+        return FaultEffects(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
 
 
 def _named(words: Mapping[Place, str]) -> frozenset[str]:
