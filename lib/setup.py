@@ -12,6 +12,12 @@ setup(
     version="0.2.0",
     packages=find_packages(include=["alula", "alula.*"]),
     package_dir={"": "."},  # so that an editable installation is a path, not an import hook
-    package_data={"alula": ["py.typed"], "alula.console": ["page/*"], "alula.scaffold": ["robot/**/*.in"]},
+    package_data={
+        "alula": ["py.typed"],
+        "alula.console": ["page/*"],
+        "alula.language": ["examples.yaml"],
+        "alula.prove": ["examples.yaml"],
+        "alula.scaffold": ["robot/**/*.in"],
+    },
     data_files=[("share/ament_index/resource_index/packages", ["resource/alula"]), ("share/alula", ["package.xml"])],
 )

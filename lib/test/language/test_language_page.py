@@ -10,6 +10,7 @@ import pytest
 from alula.language import paper, rl
 from alula.language.check import check
 from alula.language.codes import CODES, PROOF_CODES
+from alula.language.examples import LANGUAGE, examples
 from alula.language.models import ModelFile, check_texts
 from alula.language.syntax.quantities import SECONDS
 from alula.model.json_form import to_json
@@ -19,7 +20,7 @@ from alula.model.units import UNIT_IN_SI
 PAGE = next(p / "skillsets" / "LANGUAGE.md" for p in Path(__file__).resolve().parents if (p / "skillsets").is_dir()).read_text()
 PAPER = [paper.parse(f"skillset page {{ {text} }}") for text in re.findall(r"```skill\n(.*?)```", PAGE, re.DOTALL)]
 TEXTS_RL = re.findall(r"```rl\n(.*?)```", PAGE, re.DOTALL)
-ROWS = re.findall(r"^\| (ALU\d+) \| (.*?) \| (.*?) \| (.*?) \|$", PAGE, re.MULTILINE)
+EXAMPLES = examples(LANGUAGE)
 
 
 def test_every_example_is_sound():
@@ -54,13 +55,16 @@ def test_all_units_are_told():
     assert set(told.split()) == set(SECONDS)
 
 
-def test_all_codes_are_told():
-    assert {code: meaning for code, meaning, _, _ in ROWS} == {code: CODES[code] for code in CODES if code not in PROOF_CODES}
-    assert all(cure for *_, cure in ROWS)
+def test_each_code_has_an_example():
+    assert set(EXAMPLES) == set(CODES) - set(PROOF_CODES)
+    assert all(example.cure and bool(example.broken) != bool(example.files) for example in EXAMPLES.values())
 
 
-@pytest.mark.parametrize(("code", "example"), [(code, example) for code, _, example, _ in ROWS if not example.startswith("*")])
-def test_an_example_has_the_finding_that_it_shows(code, example):
-    (file,) = check_texts([ModelFile("example.rl", example.strip("`"))])
-    assert code in [finding.code for finding in file.findings]
-    assert len(file.findings) <= 3
+@pytest.mark.parametrize("code", [code for code, example in EXAMPLES.items() if example.broken])
+def test_broken_and_mended_model(code):
+    (broken,) = check_texts([ModelFile("example.rl", EXAMPLES[code].broken)])
+    assert code in [finding.code for finding in broken.findings]
+    assert len(broken.findings) <= 3
+    (mended,) = check_texts([ModelFile("example.rl", EXAMPLES[code].mended)])
+    assert mended.skillsets
+    assert mended.findings == []

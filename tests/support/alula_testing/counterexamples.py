@@ -1,18 +1,16 @@
-"""Counterexamples of the proofs: those of the page PROOFS.md, a model with data and time, and one with arrows from outside."""
+"""Counterexamples of the proofs: those of its examples, a model with data and time, and one with arrows from outside."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from alula.language.errors import Diagnostic
+from alula.language.examples import PROOFS, examples
 from alula.language.models import check_files
 from alula.model.model import Skillset
 from alula.prove import prove
 
-PAGE = Path(__file__).resolve().parents[3] / "skillsets" / "PROOFS.md"
-SECTION = re.compile(r"^### (ALU\d+): .*?```rl\n(.*?)```", re.MULTILINE | re.DOTALL)
-EXAMPLES = dict(SECTION.findall(PAGE.read_text()))
+EXAMPLES = {code: example.broken for code, example in examples(PROOFS).items() if example.broken}
 DATA = """
 skillset watch {
   data fps: float64 period 1 sec
