@@ -33,7 +33,7 @@ SHOW_EVERY_S = 1.0
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the arguments."""
     parser = argparse.ArgumentParser(
-        prog="alula campaign", description="Fly many flights with faults, and tell what answered each failure."
+        prog="alula campaign", description="Fly many flights with faults, and report the mission's response to each failure."
     )
     parser.add_argument("file", type=Path, help="the campaign (docs/records.md)")
     parser.add_argument("--out", type=Path, help="its folder (default: runs/campaign-NAME); one that was interrupted goes on")

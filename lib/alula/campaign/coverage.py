@@ -1,4 +1,4 @@
-"""The failure coverage of a campaign: each way to fail against what answered it, how often, how late at worst; and what was never tried."""
+"""The failure coverage of a campaign: each way to fail with the mission's responses and their delays, and the ways never tried."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ CODE_OF = {outcome.value: code for outcome, code in EXIT_CODES.items()}
 
 @dataclass
 class Cover:
-    """What became of one way to fail. ``answers`` counts the branches that answered; clearance is of whole flights."""
+    """The flights with one way to fail. ``responses`` counts the branches of the tree that took over; clearance is of whole flights."""
 
     way: Way
-    answers: Counter[str] = field(default_factory=Counter)
+    responses: Counter[str] = field(default_factory=Counter)
     outcomes: Counter[str] = field(default_factory=Counter)
     worst_after_s: float | None = None
     worst_clearance_m: float | None = None
@@ -32,11 +32,11 @@ class Cover:
     @property
     def times(self) -> int:
         """How often it came about."""
-        return self.answers.total()
+        return self.responses.total()
 
     def as_dict(self) -> dict[str, object]:
         """Return it for JSON."""
-        found = {"kind": self.way.kind, "name": self.way.name, "times": self.times, "answers": dict(self.answers.most_common())}
+        found = {"kind": self.way.kind, "name": self.way.name, "times": self.times, "answers": dict(self.responses.most_common())}
         worst = {"worst_recovery_s": self.worst_after_s, "worst_clearance_m": self.worst_clearance_m}
         return {**found, "outcomes": dict(self.outcomes.most_common()), **worst}
 
@@ -92,8 +92,8 @@ def is_troubled(row: Row) -> bool:
     return bool(unfinished or wrong or not row["conforms"] or row["exit_code"] not in {None, CODE_OF.get(str(row["outcome"]))})
 
 
-def _count(one: Cover, row: Row, answer: str, after_s: float | None) -> None:
-    one.answers[answer] += 1
+def _count(one: Cover, row: Row, response: str, after_s: float | None) -> None:
+    one.responses[response] += 1
     one.outcomes[str(row["outcome"])] += 1
     if after_s is not None:
         one.worst_after_s = max(after_s, one.worst_after_s or 0.0)

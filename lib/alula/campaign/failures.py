@@ -11,10 +11,10 @@ from alula.model.conditions import NO_DATA, judge
 from alula.model.execution_state import ExecutionState as S
 from alula.model.expressions import ResourceIs, atoms
 from alula.model.model import Invariant, Resource, ResultKind, Skill, Skillset, Transition
-from alula.records.causes.answers import NO_SKILL, answer_to, answer_to_fault
 from alula.records.causes.effects import EXTERN
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.records.causes.faults import Fault, trace
+from alula.records.causes.responses import NO_SKILL, response_to, response_to_fault
 from alula.records.tree import Places
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 
@@ -42,7 +42,7 @@ class Failure:
 
     Attributes:
         at_s: when, seconds of mission clock.
-        answered_by: the branch of the tree that took over (see ``Places.answer``); the skill's name where that is not known.
+        answered_by: the branch of the tree that took over (see ``Places.response``); the skill's name where that is not known.
         skill: the skill that started next, ``skillset.skill``.
         after_s: how long after the failure it ran; None: none was started.
     """
@@ -106,7 +106,7 @@ def failures_in(events: Sequence[EngineEvent], known: Iterable[Way], places: Pla
         way = _way_of(event)
         if way is not None and way in ways:
             failure = broken.get(at) if isinstance(event, TransitionEvent) else SkillFailure(at, event, event.stamp_s)
-            found.append(_answered(way, event.stamp_s, failure, events, places))
+            found.append(_failure(way, event.stamp_s, failure, events, places))
     return found
 
 
@@ -114,8 +114,8 @@ def failures_by(causes: Sequence[tuple[Way, Fault]], events: Sequence[EngineEven
     """Return what failed by faults, or by processes that ended, as one failure each; see ``causes.faults.trace``."""
     found = []
     for (way, fault), traced in zip(causes, trace([fault for _, fault in causes], events), strict=True):
-        answer, after_s = answer_to_fault(traced, events, places)
-        found.append(Failure(way, fault.at_s, answer.branch, answer.skill, after_s))
+        response, after_s = response_to_fault(traced, events, places)
+        found.append(Failure(way, fault.at_s, response.branch, response.skill, after_s))
     return found
 
 
@@ -134,12 +134,12 @@ def _way_of(event: EngineEvent) -> Way | None:
     return None
 
 
-def _answered(way: Way, at_s: float, failure: SkillFailure | None, events: Sequence[EngineEvent], places: Places) -> Failure:
+def _failure(way: Way, at_s: float, failure: SkillFailure | None, events: Sequence[EngineEvent], places: Places) -> Failure:
     """Return a failure with the first skill that was asked for and ran after it."""
     if failure is None:
         return Failure(way, at_s, NO_NEED, NO_NEED)
-    answer = answer_to(failure, events, places)
-    return Failure(way, at_s, answer.branch, answer.skill, None if answer.ran_s is None else answer.ran_s - at_s)
+    response = response_to(failure, events, places)
+    return Failure(way, at_s, response.branch, response.skill, None if response.ran_s is None else response.ran_s - at_s)
 
 
 def as_dict(failure: Failure, origin_s: float) -> Mapping[str, object]:

@@ -13,7 +13,7 @@ table { border-collapse: collapse; width: 100% } th, td { text-align: left; padd
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums } tr.never td { color: #6b7786; background: #fbf3e6 }
 .bar { display: inline-block; height: .6rem; background: #3b7dd8; margin-right: .4rem; vertical-align: baseline }
 """
-_HEAD = ("way to fail", "times", "answered by", "outcomes", "worst recovery", "worst clearance")
+_HEAD = ("way to fail", "times", "response", "outcomes", "worst recovery", "worst clearance")
 
 
 def counted(names: dict[str, int]) -> str:
@@ -27,9 +27,9 @@ def shown(value: float | None, unit: str) -> str:
 
 
 def _cells(cover: Cover) -> tuple[str, ...]:
-    answers, outcomes = dict(cover.answers.most_common()), dict(cover.outcomes.most_common())
+    responses, outcomes = dict(cover.responses.most_common()), dict(cover.outcomes.most_common())
     worst = shown(cover.worst_after_s, "s"), shown(cover.worst_clearance_m, "m")
-    return f"{cover.way.kind}: {cover.way.name}", str(cover.times), counted(answers), counted(outcomes), *worst
+    return f"{cover.way.kind}: {cover.way.name}", str(cover.times), counted(responses), counted(outcomes), *worst
 
 
 def as_text(coverage: Coverage) -> str:
@@ -55,7 +55,7 @@ def as_page(coverage: Coverage, title: str) -> str:
         f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>\n'
         f"<h1>{escape(title)}</h1>\n<p>{coverage.flights} flights: {escape(counted(dict(coverage.outcomes)))}. "
         f"Flights with trouble: {escape(troubled)}.</p>\n"
-        f"<h2>What failed, and what answered</h2>\n<table><tr>{head}</tr>\n{chr(10).join(rows)}</table>\n"
+        f"<h2>What failed, and the mission's responses</h2>\n<table><tr>{head}</tr>\n{chr(10).join(rows)}</table>\n"
         f"<h2>Never tried ({len(never)})</h2>\n<table>{chr(10).join(never)}</table>\n</html>\n"
     )
 

@@ -20,11 +20,11 @@ class Places:
     started: Mapping[str, Path] = field(default_factory=dict)
     end: Path = ()
 
-    def answer(self, failed: str, started: str | None) -> str:
-        """Name the branch that answered the failure of an execution: the first node that leads elsewhere than to what failed.
+    def response(self, failed: str, started: str | None) -> str:
+        """Name the branch that responded to the failure of an execution: the first node that leads elsewhere than to what failed.
 
-        ``started`` is the execution that was started next, None where none was: then it is where the tree ended. The same leaf once
-        more is answered by the node above it, which repeats it. Empty where the tree is not known, or stayed where it was.
+        ``started`` is the execution that was started next, None where none was: then it is where the tree ended. Where the same leaf
+        starts once more, it is the node above, which repeats it. Empty where the tree is not known, or stayed where it was.
         """
         here, there = self.started.get(failed, ()), self.end if started is None else self.started.get(started, ())
         if not here or not there:

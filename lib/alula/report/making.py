@@ -16,7 +16,6 @@ from alula.console.entries import FAULT, Wire
 from alula.console.page import write_report
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.fault_file import effects_of_robot
-from alula.report.answers import FaultAnswer, Known, find_answers, known_faults
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History, read_history
@@ -25,6 +24,7 @@ from alula.report.observed import Observed
 from alula.report.part import Findings, ReportPart, Run, part_of_robot
 from alula.report.phases import Phases, find_phases
 from alula.report.recovery import Recovery, find_recovery
+from alula.report.responses import FaultResponse, Known, find_responses, known_faults
 from alula.report.summary import Summary, summarise
 from alula.report.timeline import Timeline, make_timeline
 from alula.report.timeline_picture import draw_timeline
@@ -37,7 +37,7 @@ class Account:
     observed: Observed
     mock: MockSummary | None
     phases: Phases
-    answers: tuple[FaultAnswer, ...]
+    responses: tuple[FaultResponse, ...]
     recovery: Recovery | None
 
 
@@ -60,7 +60,7 @@ def make_report(facts: RunFacts) -> Summary:
         history=run.history,
         observed=account.observed,
         phases=account.phases,
-        answers=account.answers,
+        responses=account.responses,
         recovery=account.recovery,
         findings=findings,
         mock=account.mock,
@@ -92,9 +92,9 @@ def _account(run: Run, part: ReportPart) -> Account:
     known: list[Known] = known_faults(run.facts, run.scenario, run.history, observed, phases, effects)
     with run.problems.survive("what else failed"):
         known += part.failures(phases, [fault for _, fault in known], effects)
-    answers = find_answers(known, run.history)
-    recovery = find_recovery(run.scenario, run.history, observed, phases, answers)
-    return Account(observed, mock, phases, answers, recovery)
+    responses = find_responses(known, run.history)
+    recovery = find_recovery(run.scenario, run.history, observed, phases, responses)
+    return Account(observed, mock, phases, responses, recovery)
 
 
 def _timeline(run: Run, account: Account) -> Timeline | None:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from alula.common.scenarios import Scenario
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.records.causes.faults import EARLY_S
-from alula.report.answers import FaultAnswer
 from alula.report.deaths import DIED
 from alula.report.history import History, PastExecution
 from alula.report.observed import Observed
 from alula.report.phases import Phases
+from alula.report.responses import FaultResponse
 
 VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 LOST = "LOST"  # how the skills end whose function is not heard of any more
@@ -32,59 +32,59 @@ class Recovery:
 
 
 def find_recovery(
-    scenario: Scenario, history: History, observed: Observed, phases: Phases, answers: Sequence[FaultAnswer]
+    scenario: Scenario, history: History, observed: Observed, phases: Phases, responses: Sequence[FaultResponse]
 ) -> Recovery | None:
-    """Return the recovery from the first fault in the air that the mission answered, or None where nothing failed there.
+    """Return the recovery from the first fault in the air with a response of the mission, or None where nothing failed there.
 
-    Where it answered none: from what broke without a fault that is known; else from the first fault that was detected, else the first;
+    Where there was none: from what broke without a fault that is known; else from the first fault that was detected, else the first;
     these have no fallback. A fault before lift-off interrupts no flight.
 
     The scenario says which skill's running makes the flight safe again, and which take the vehicle on: a turn on the spot, or braking
     past the stop point and back, is not moving on.
     """
-    flown = [one for one in answers if _in_the_air(one, phases)]
-    answered = [one for one in flown if one.traced.failures]
-    if answered:
-        one = min(answered, key=lambda one: one.traced.failures[0].at)
+    flown = [one for one in responses if _in_the_air(one, phases)]
+    followed = [one for one in flown if one.traced.failures]
+    if followed:
+        one = min(followed, key=lambda one: one.traced.failures[0].at)
         fallback_s = _fallback(scenario.fallback, history, one)
         return _recovery(one, fallback_s, _moving(scenario, history, observed, fallback_s))
-    noticed_s = _unexplained(history, answers)
+    noticed_s = _unexplained(history, responses)
     if noticed_s is not None:
         fallback_s = _first([e.running_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
         return Recovery(None, noticed_s, fallback_s, _moving(scenario, history, observed, fallback_s))
     broken = [one for one in flown if one.mode != DIED]  # the death of a process that nothing hung on interrupts no flight
-    unanswered = [one for one in broken if one.traced.detected_s is not None] or broken
-    return _recovery(unanswered[0], None, None) if unanswered else None
+    unfollowed = [one for one in broken if one.traced.detected_s is not None] or broken
+    return _recovery(unfollowed[0], None, None) if unfollowed else None
 
 
-def _in_the_air(one: FaultAnswer, phases: Phases) -> bool:
+def _in_the_air(one: FaultResponse, phases: Phases) -> bool:
     at_s = one.traced.fault.at_s
     ended = phases.back_s is not None and at_s > phases.back_s
     return not ended and (at_s >= phases.zero_s or not phases.departed)
 
 
-def _recovery(one: FaultAnswer, fallback_s: float | None, moving_s: float | None) -> Recovery:
+def _recovery(one: FaultResponse, fallback_s: float | None, moving_s: float | None) -> Recovery:
     return Recovery(one.traced.fault.at_s, one.traced.detected_s, fallback_s, moving_s, one.what)
 
 
-def _fallback(skill: str, history: History, one: FaultAnswer) -> float | None:
-    """Return when the fallback ran in answer to a fault: in the branch that answered it, or before anything else failed."""
+def _fallback(skill: str, history: History, one: FaultResponse) -> float | None:
+    """Return when the fallback ran in response to a fault: in the branch that took over, or before anything else failed."""
     first = one.traced.failures[0]
     others = [failure for failure in skill_failures(history.events) if failure.at > first.at and failure not in one.traced.failures]
     other_s = min((failure.end.stamp_s for failure in others), default=math.inf)
 
-    def answers(execution: PastExecution) -> bool:
-        in_branch = one.answer.branch in history.places.started.get(execution.id, ())
+    def responds(execution: PastExecution) -> bool:
+        in_branch = one.response.branch in history.places.started.get(execution.id, ())
         return execution.running_s is not None and (in_branch or execution.running_s < other_s)
 
-    runs = [execution.running_s for execution in history.executions if execution.skill == skill and answers(execution)]
+    runs = [execution.running_s for execution in history.executions if execution.skill == skill and responds(execution)]
     return _first(runs, first.end.stamp_s - EARLY_S)
 
 
-def _unexplained(history: History, answers: Sequence[FaultAnswer]) -> float | None:
+def _unexplained(history: History, responses: Sequence[FaultResponse]) -> float | None:
     """Return when the skill layer noticed something broken that follows from no fault that is known; None: never."""
-    changes = {change for one in answers for change in one.traced.changes}
-    explained = {failure.at for one in answers for failure in one.traced.failures}
+    changes = {change for one in responses for change in one.traced.changes}
+    explained = {failure.at for one in responses for failure in one.traced.failures}
     broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN and change not in changes]
     failed = [failure.end.stamp_s for failure in skill_failures(history.events) if _lost(failure) and failure.at not in explained]
     return min([*broken, *failed]) if broken else None

@@ -7,7 +7,6 @@ from typing import Any, TypedDict
 
 from alula.common.faults import parse_fault
 from alula.common.scenarios import load_scenario
-from alula.report.answers import FaultAnswer, injected, summarise_answer
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, mapping, read_json, sequence
 from alula.report.history import History
@@ -16,6 +15,7 @@ from alula.report.observed import Observed
 from alula.report.part import Findings
 from alula.report.phases import Phases, home, status_changes
 from alula.report.recovery import Recovery
+from alula.report.responses import FaultResponse, injected, summarise_response
 from alula.report.rows import resources, skills
 
 OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_started", "running"})
@@ -116,7 +116,7 @@ def summarise(
     history: History,
     observed: Observed,
     phases: Phases,
-    answers: Sequence[FaultAnswer],
+    responses: Sequence[FaultResponse],
     recovery: Recovery | None,
     findings: Findings,
     problems: Problems,
@@ -139,7 +139,7 @@ def summarise(
         "bridge": bridge,
         "faults": list(facts.faults),
         "injected": [InjectedFault(sensor=f.sensor, mode=f.mode, t_s=phases.since(f.t_s)) for f in injected(observed)],
-        "answers": [summarise_answer(one, phases) for one in answers],
+        "answers": [summarise_response(one, phases) for one in responses],
         "died": [Death(name=death["name"], when_s=phases.since(death["when_s"]), how=death["how"]) for death in facts.died],
         "mission_exit": facts.mission_exit,
         "conformance": None if facts.conformance is None else dict(facts.conformance),

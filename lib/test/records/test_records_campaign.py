@@ -195,8 +195,8 @@ def test_the_branch_that_answers_is_the_first_node_that_leads_elsewhere():
     places = Places(
         {"a": ("root", "fly", "zed", "leg"), "b": ("root", "fly", "lidar", "leg"), "c": ("root", "fly", "zed", "leg")}, ("root", "end")
     )
-    assert (places.answer("a", "b"), places.answer("a", "c"), places.answer("a", None)) == ("lidar", "zed", "end")
-    assert (places.answer("a", "?"), places.answer("?", "a"), Places().answer("a", None)) == ("", "", "")
+    assert (places.response("a", "b"), places.response("a", "c"), places.response("a", None)) == ("lidar", "zed", "end")
+    assert (places.response("a", "?"), places.response("?", "a"), Places().response("a", None)) == ("", "", "")
 
 
 def test_the_rows_of_flights_over_mocks_tell_of_their_faults():

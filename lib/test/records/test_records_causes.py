@@ -14,11 +14,11 @@ from alula.common.record import REPORTS, Entry
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import ResultKind
 from alula.model.unmet import Unmet
-from alula.records.causes.answers import answer_to_fault
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.failures import skill_failures
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault, faults_asked, trace
+from alula.records.causes.responses import response_to_fault
 from alula.records.causes.told_ends import with_told_ends
 from alula.records.kinds import with_kind
 from alula.records.tree import Places
@@ -91,8 +91,8 @@ def test_a_skill_that_is_refused_for_a_resource_fails_by_the_fault_that_broke_it
     refused += [end(41.0, "perception.lidar_depthmap", NOT_READY, "lidar_ready", states={"lidar_status": "BROKEN"})]
     events = [change(10.3, "perception.lidar_status", "OK", "BROKEN"), *refused, *started(41.2, "navigation.hover")]
     (traced,) = trace(faults(("lidar", 10.0, math.inf)), events)
-    answer, after_s = answer_to_fault(traced, events, Places())
-    assert (traced.detected_s, answer.skill, after_s) == (10.3, "navigation.hover", pytest.approx(0.2))
+    response, after_s = response_to_fault(traced, events, Places())
+    assert (traced.detected_s, response.skill, after_s) == (10.3, "navigation.hover", pytest.approx(0.2))
 
 
 def test_a_mapping_that_gets_no_scans_fails_by_the_lidar():

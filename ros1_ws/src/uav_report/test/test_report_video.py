@@ -10,12 +10,12 @@ from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault
-from alula.report.answers import find_answers, known_faults
 from alula.report.facts import RunFacts
 from alula.report.history import History
 from alula.report.observed import Observed
 from alula.report.phases import Phases
 from alula.report.recovery import find_recovery
+from alula.report.responses import find_responses, known_faults
 from alula.report.timeline import make_timeline
 from uav_report.flight import RADIO, explains
 from uav_report.phases import FlightPhases
@@ -53,7 +53,7 @@ def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s, faile
     known = known_faults(facts, scenario, History(), observed, Phases(), effects)
     if not any(explains(fault, 112.5, effects.of(RADIO)) for _, fault in known):
         known.append((FaultChange(RADIO, "", 112.5), Fault(RADIO, 112.5, effects=effects.of(RADIO))))
-    recovery = find_recovery(scenario, History(), observed, Phases(), find_answers(known, History()))
+    recovery = find_recovery(scenario, History(), observed, Phases(), find_responses(known, History()))
     assert (recovery.failure_s, recovery.failed) == (failure_s, failed)
     (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery)["marks"]
     assert (mark["t_s"], mark["label"]) == (failure_s - 100.0, f"{failed} fails")

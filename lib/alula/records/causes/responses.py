@@ -20,11 +20,11 @@ NOT_DETECTED = "not detected"
 
 
 @dataclass(frozen=True)
-class Answer:
+class Response:
     """What followed a failure.
 
     Attributes:
-        branch: of the tree, that took over (see ``Places.answer``); the skill's name where that is not known.
+        branch: of the tree, that took over (see ``Places.response``); the skill's name where that is not known.
         skill: the skill that started next, ``skillset.skill``.
         ran_s: when it ran, seconds of mission clock; None: none was started.
     """
@@ -34,29 +34,29 @@ class Answer:
     ran_s: float | None = None
 
 
-def answer_to(failure: SkillFailure, events: Sequence[EngineEvent], places: Places) -> Answer:
+def response_to(failure: SkillFailure, events: Sequence[EngineEvent], places: Places) -> Response:
     """Return what followed a skill's failure."""
     started = _started(events[failure.at + 1 :])
-    branch = places.answer(failure.end.id, None if started is None else started.id)
+    branch = places.response(failure.end.id, None if started is None else started.id)
     if started is None:
-        return Answer(branch or NO_SKILL)
+        return Response(branch or NO_SKILL)
     skill = f"{started.skillset}.{started.skill}"
-    return Answer(branch or skill, skill, started.stamp_s)
+    return Response(branch or skill, skill, started.stamp_s)
 
 
-def answer_to_fault(traced: Traced, events: Sequence[EngineEvent], places: Places) -> tuple[Answer, float | None]:
+def response_to_fault(traced: Traced, events: Sequence[EngineEvent], places: Places) -> tuple[Response, float | None]:
     """Return what followed a fault, and how long its recovery took, in seconds.
 
-    It is answered as the first failure that follows from it. Its recovery counts from the fault; where the skill that failed was asked
+    It is the response to the first failure that follows from it. Its recovery counts from the fault; where the skill that failed was asked
     for later, from then on.
     """
     if not traced.failures:
         word = NOT_DETECTED if traced.detected_s is None else NO_FAILURE
-        return Answer(word, word), None
+        return Response(word, word), None
     first = traced.failures[0]
-    answer = answer_to(first, events, places)
+    response = response_to(first, events, places)
     since_s = max(traced.fault.at_s, first.asked_s)
-    return answer, None if answer.ran_s is None else answer.ran_s - since_s
+    return response, None if response.ran_s is None else response.ran_s - since_s
 
 
 def _started(events: Iterable[EngineEvent]) -> ExecutionEvent | None:

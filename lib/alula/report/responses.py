@@ -9,9 +9,9 @@ from typing import TypedDict
 
 from alula.common.faults import MENDED, FaultChange, parse_fault
 from alula.common.scenarios import Scenario
-from alula.records.causes.answers import Answer, answer_to_fault
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.faults import Fault, Traced, faults_asked, trace
+from alula.records.causes.responses import Response, response_to_fault
 from alula.report.deaths import DIED
 from alula.report.facts import RunFacts
 from alula.report.history import History
@@ -21,17 +21,17 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent
 
 
 @dataclass(frozen=True)
-class FaultAnswer:
+class FaultResponse:
     """A fault, what followed from it, and the recovery's seconds; ``mode`` is empty where it is not known in which way it failed."""
 
     what: str
     mode: str
     traced: Traced
-    answer: Answer
+    response: Response
     after_s: float | None
 
 
-class AnswerSummary(TypedDict):
+class ResponseSummary(TypedDict):
     """A fault, a process that died, or the radio that ended the video, and what followed from it (``alula.records.causes``).
 
     ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the
@@ -66,13 +66,13 @@ def known_faults(
     return [*_told(observed, effects), *_asked(facts, scenario, history, phases, effects), *_died(facts, scenario, observed, effects)]
 
 
-def find_answers(known: Sequence[Known], history: History) -> tuple[FaultAnswer, ...]:
-    """Return every fault with its answer, in the order of time."""
+def find_responses(known: Sequence[Known], history: History) -> tuple[FaultResponse, ...]:
+    """Return every fault with the response to it, in the order of time."""
     known = sorted(known, key=lambda one: one[1].at_s)
     found = []
     for (change, _), traced in zip(known, trace([fault for _, fault in known], history.events), strict=True):
-        answer, after_s = answer_to_fault(traced, history.events, history.places)
-        found.append(FaultAnswer(change.sensor, change.mode, traced, answer, after_s))
+        response, after_s = response_to_fault(traced, history.events, history.places)
+        found.append(FaultResponse(change.sensor, change.mode, traced, response, after_s))
     return tuple(found)
 
 
@@ -106,11 +106,11 @@ def _died(facts: RunFacts, scenario: Scenario, observed: Observed, effects: Effe
             )
 
 
-def summarise_answer(one: FaultAnswer, phases: Phases) -> AnswerSummary:
-    """Return a fault with its answer for ``summary.json``."""
+def summarise_response(one: FaultResponse, phases: Phases) -> ResponseSummary:
+    """Return a fault with the response to it for ``summary.json``."""
     fault = one.traced.fault
     first = one.traced.first
-    return AnswerSummary(
+    return ResponseSummary(
         sensor=one.what,
         mode=one.mode,
         t_s=phases.since(fault.at_s),
@@ -118,8 +118,8 @@ def summarise_answer(one: FaultAnswer, phases: Phases) -> AnswerSummary:
         detected_s=phases.since(one.traced.detected_s),
         detected_by="" if first is None else _in_words(first),
         failed=[failure.end.id for failure in one.traced.failures],
-        answered_by=one.answer.branch,
-        skill=one.answer.skill,
+        answered_by=one.response.branch,
+        skill=one.response.skill,
         after_s=None if one.after_s is None else round(one.after_s, 3),
     )
 
