@@ -10,8 +10,8 @@ from typing import Any
 
 from alula.common.runs import NoRunError, Run, load_run
 from alula.console import acts
-from alula.console.hands import QUESTIONS, Hands
-from alula.console.link import ActError, Kept, Link, Mission
+from alula.console.link import ActError, Link, Mission, PerRun
+from alula.console.manual_control import QUESTIONS, ManualControl
 
 ON_THE_FLIGHT = frozenset({"abort", "pause", "resume", "off"})
 """Acts of which each is begun once: a request that comes while the act is under way gets the same answer."""
@@ -34,8 +34,8 @@ class Commands:
     """The acts by name. They wait for answers, so they are called in threads."""
 
     def __init__(self, link: Link) -> None:
-        self._missions: Kept[Mission] = Kept(link.connect)
-        self._hands: Kept[Hands] = Kept(lambda domain: Hands(link.listen(domain)))
+        self._missions: PerRun[Mission] = PerRun(link.connect)
+        self._controls: PerRun[ManualControl] = PerRun(lambda domain: ManualControl(link.listen(domain)))
         self._acts: Mapping[str, Callable[[Asked, Path | None], Done]] = {
             "start": self._start,
             "abort": lambda asked, run: self._told("abort", asked, run, lambda mission: mission.abort()),
@@ -55,20 +55,20 @@ class Commands:
             raise ActError(f"there is no command {command}")
         return self._acts[command](asked, run)
 
-    def hands_on(self, run: Path) -> Hands:
-        """Return the skillsets of a run under way, to be driven by hand; they are listened to from the first call on."""
-        return self._hands.of(load_run(run))
+    def manual_control_of(self, run: Path) -> ManualControl:
+        """Return the manual control of a run under way; its skillsets are listened to from the first call on."""
+        return self._controls.of(load_run(run))
 
-    def keep(self, watched: set[Path], by_hand: set[Path]) -> None:
+    def keep(self, watched: set[Path], manual: set[Path]) -> None:
         """Be connected to the missions of the runs that are watched, ahead of any command, and to no others.
 
-        Listen to no skillsets but those of the runs that are driven by hand: listening costs.
+        Listen to no skillsets but those of the runs under manual control: listening costs.
         """
         missions = _runs_of(watched)
         for run in missions:
             self._missions.of(run)
         self._missions.keep(missions)
-        self._hands.keep(_runs_of(by_hand))
+        self._controls.keep(_runs_of(manual))
 
     def _start(self, asked: Asked, _run: Path | None) -> Done:
         folder = acts.start(acts.read_flight(asked))
@@ -84,7 +84,7 @@ class Commands:
 
     def _skill(self, asked: Asked, run: Path | None) -> Done:
         folder = _confirmed(asked, run)
-        what, answer = self.hands_on(folder).do(asked)
+        what, answer = self.manual_control_of(folder).do(asked)
         return Done(folder, what, answer, noted=asked.get("act") not in QUESTIONS)
 
 

@@ -95,8 +95,8 @@ class Link(Protocol):
 T = TypeVar("T", bound=Closable)
 
 
-class Kept(Generic[T]):
-    """What is open of runs, made by ``make(domain)``: once a run, and kept until that is wanted no more.
+class PerRun(Generic[T]):
+    """A connection for each run, made by ``make(domain)`` at its first use and closed when the run is no longer wanted.
 
     A run that is started anew, be it in another domain, is another run.
     """
@@ -107,14 +107,14 @@ class Kept(Generic[T]):
         self._lock = Lock()
 
     def of(self, run: Run) -> T:
-        """Return what is open of a run; it is opened by the first call."""
+        """Return the connection of a run; the first call opens it."""
         with self._lock:
             if run not in self._open:
                 self._open[run] = self._make(run.domain)
             return self._open[run]
 
     def keep(self, runs: set[Run]) -> None:
-        """Close what is open of other runs than these."""
+        """Close the connections of all runs but these."""
         with self._lock:
             leaving = [self._open.pop(run) for run in set(self._open) - runs]
         for one in leaving:

@@ -42,7 +42,7 @@ MAX_COMMANDS_PER_S = 10
 LOOK_S = 0.5
 SHOWN_RUNS = 20
 WAITING = 16
-"""So many acts may wait for their answers at once; those by hand have threads of their own, so that none keeps a vehicle from landing."""
+"""So many acts may wait for their answers at once. Those of manual control have threads of their own: none keeps a vehicle from landing."""
 
 
 @dataclass(eq=False)
@@ -55,8 +55,8 @@ class Viewer:
     run: str = ""
     may: bool = True
     """Whether it may do more than watch."""
-    hands: bool = False
-    """Whether skills by hand are looked at."""
+    manual: bool = False
+    """Whether manual control is open."""
     commands: list[float] = field(default_factory=list)
 
 
@@ -75,9 +75,9 @@ class Console:
         self._live: set[Path] = set()
         self._starting = asyncio.Lock()
         self._commands = commands.Commands(link)
-        self._threads = {by_hand: ThreadPoolExecutor(WAITING, "by_hand" if by_hand else "acts") for by_hand in (False, True)}
+        self._threads = {manual: ThreadPoolExecutor(WAITING, "manual" if manual else "acts") for manual in (False, True)}
         self._under_way: dict[tuple[object, ...], asyncio.Task[commands.Done]] = {}
-        self._by_hand: dict[Path, str] = {}
+        self._manual: dict[Path, str] = {}
         self._answering: set[asyncio.Task[None]] = set()
         self._problem = ""
         """Why a robot whose run is under way can't be reached."""
@@ -169,31 +169,31 @@ class Console:
     async def _look_at_skills(self) -> None:
         """Keep an eye on the skillsets of the runs whose viewers look at them."""
         while True:
-            watched = self._watched(by_hand=True)
-            self._by_hand = {run: await asyncio.to_thread(self._seen_by_hand, run) for run in watched}
+            watched = self._watched(manual=True)
+            self._manual = {run: await asyncio.to_thread(self._manual_state, run) for run in watched}
             await asyncio.sleep(STATUS_S)
 
     async def _stay_connected(self) -> None:
         """Be connected to what viewers watch before they command it."""
         while True:
             try:
-                await asyncio.to_thread(self._commands.keep, self._watched(), self._watched(by_hand=True))
+                await asyncio.to_thread(self._commands.keep, self._watched(), self._watched(manual=True))
                 self._problem = ""
             except Exception as error:  # noqa: BLE001 - whatever ROS says, the next try may be better
                 self._problem = str(error)
             await asyncio.sleep(STATUS_S)
 
-    def _watched(self, *, by_hand: bool = False) -> set[Path]:
-        """Return the runs under way that are watched or, as the one that is shown first, soon will be; or those that are driven by hand."""
-        shown = [self._run_of(viewer) for viewer in self._viewers if viewer.hands or not by_hand]
-        return {run for run in [*shown, *([] if by_hand else [self._shown_first()])] if run in self._live}
+    def _watched(self, *, manual: bool = False) -> set[Path]:
+        """Return the runs under way that are watched or, as the one that is shown first, soon will be; or those under manual control."""
+        shown = [self._run_of(viewer) for viewer in self._viewers if viewer.manual or not manual]
+        return {run for run in [*shown, *([] if manual else [self._shown_first()])] if run in self._live}
 
-    def _seen_by_hand(self, run: Path) -> str:
+    def _manual_state(self, run: Path) -> str:
         try:
-            shown = self._commands.hands_on(run).describe()
+            shown = self._commands.manual_control_of(run).describe()
         except Exception as error:  # noqa: BLE001 - whatever a skillset says, the next look may be better
             shown = {"problems": [f"{type(error).__name__}: {error}"], "skillsets": []}
-        return json.dumps({"hands": {"run": run.name, **shown}})
+        return json.dumps({"manual": {"run": run.name, **shown}})
 
     def _run_of(self, viewer: Viewer) -> Path | None:
         """Return the run that a viewer watches: the one that it chose, or the one that is shown first."""
@@ -216,7 +216,7 @@ class Console:
             hello = _object(await asyncio.wait_for(connection.recv(), HELLO_S))
             _check_text(hello)
             viewer = Viewer(connection, str(hello.get("key") or secrets.token_hex(8))[:64], str(hello.get("name") or "a viewer")[:40])
-            viewer.run, viewer.hands = str(hello.get("run") or ""), hello.get("hands") is True
+            viewer.run, viewer.manual = str(hello.get("run") or ""), hello.get("manual") is True
             viewer.may = self._admission.may_command(str(connection.remote_address[0]))
             self._viewers.add(viewer)
             self._commander = self._commander or (viewer.key if viewer.may else "")
@@ -244,8 +244,8 @@ class Console:
                     if clock() >= due:
                         due = clock() + STATUS_S
                         await asyncio.wait_for(viewer.connection.send(json.dumps({"status": self._status(viewer, run, feed)})), STUCK_S)
-                        if viewer.hands and run in self._by_hand:
-                            await asyncio.wait_for(viewer.connection.send(self._by_hand[run]), STUCK_S)
+                        if viewer.manual and run in self._manual:
+                            await asyncio.wait_for(viewer.connection.send(self._manual[run]), STUCK_S)
                 except TimeoutError:
                     viewer.connection.transport.abort()
                     return
@@ -278,8 +278,8 @@ class Console:
             return
         if "watch" in asked:
             viewer.run = str(asked["watch"])[:200]
-        elif "hands" in asked:
-            viewer.hands = asked["hands"] is True
+        elif "manual" in asked:
+            viewer.manual = asked["manual"] is True
         else:  # beside one another: a skill that is slow to answer must not keep its operator from landing
             answering = asyncio.create_task(self._answer_command(viewer, str(asked.get("command")), asked))
             self._answering.add(answering)

@@ -430,15 +430,15 @@ def test_skills_are_driven_by_hand(
 ) -> None:
     folder = make_run("live")
     monkeypatch.setattr("alula.console.commands.is_live", lambda _run: True)
-    monkeypatch.setattr("alula.console.commands.Hands", Listened)
+    monkeypatch.setattr("alula.console.commands.ManualControl", Listened)
     LISTENED.clear()
     link = Robot()
     monkeypatch.setattr(link, "listen", lambda _domain: None)
     with served(folder, link) as console:
         page = Page(browser, console.address, size)
-        page.wait("document.querySelector('#hands') !== null && !document.querySelector('#hands').hidden && alula.live.state === 'live'")
+        page.wait("document.querySelector('#manual') !== null && !document.querySelector('#manual').hidden && alula.live.state === 'live'")
         assert LISTENED == []
-        page.browser.find_element("css selector", "#hands summary").send_keys(" ")  # a key of its own, not the one that plays
+        page.browser.find_element("css selector", "#manual summary").send_keys(" ")  # a key of its own, not the one that plays
         assert page.run("document.querySelector('#play').getAttribute('aria-pressed')") != "true"
         page.wait("document.querySelectorAll('.skills li').length === 2")
         assert "could not start now:" in page.text(".needs")
@@ -447,12 +447,12 @@ def test_skills_are_driven_by_hand(
         height = page.browser.find_element("css selector", ".skill input")
         height.clear()
         height.send_keys("4.5")
-        start = "document.querySelector('#hands form .go')"
+        start = "document.querySelector('#manual form .go')"
         page.run(f"{start}.click()")
         assert page.run(f"{start}.textContent") == "press again: start takeoff"
         assert LISTENED[0].asked == []
         page.run(f"{start}.click()")
-        page.wait("document.querySelector('#hands output').textContent.includes('done')")
+        page.wait("document.querySelector('#manual output').textContent.includes('done')")
         page.run("[...document.querySelectorAll('.pick')][1].click()")
         assert page.run("document.querySelector('.skills progress:not([style*=hidden])').value") == 0.5
         interrupt = "document.querySelector('.skill .danger')"
@@ -469,8 +469,8 @@ def test_skills_are_driven_by_hand(
         assert page.run("document.documentElement.scrollWidth") <= size[0]
         assert page.run(UNNAMED) == []
         assert page.run("document.title") == "Alula"
-        page.run("document.querySelector('#hands summary').click()")
-        page.wait("document.querySelector('#hands').open === false")
+        page.run("document.querySelector('#manual summary').click()")
+        page.wait("document.querySelector('#manual').open === false")
         end = time.monotonic() + WAIT_S
         while LISTENED[0].asked[-1] != {"act": "close"}:
             assert time.monotonic() < end

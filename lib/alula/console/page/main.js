@@ -217,7 +217,7 @@ class Link {
     sessionStorage.setItem("alula-key", this.key);
     this.name = `viewer ${this.key.slice(0, 4)}`;
     this.bar = new OperatorBar((asked) => this.send(asked), (name) => this.watch(name));
-    this.hands = new HandsView((asked) => this.send(asked), (...words_) => this.bar.armed(...words_));
+    this.manual = new ManualControlView((asked) => this.send(asked), (...words_) => this.bar.armed(...words_));
     byId("link").hidden = false;
     this.open();
     this.judge();
@@ -227,7 +227,7 @@ class Link {
   open() {
     this.socket = new WebSocket(`${location.origin.replace(/^http/, "ws")}/feed`);
     this.begun = performance.now();
-    this.socket.addEventListener("open", () => this.send({ key: this.key, name: this.name, run: this.run, hands: this.hands.box.open, ...this.at }));
+    this.socket.addEventListener("open", () => this.send({ key: this.key, name: this.name, run: this.run, manual: this.manual.box.open, ...this.at }));
     this.socket.addEventListener("message", ({ data }) => this.hear(JSON.parse(data)));
     this.socket.addEventListener("close", () => {
       this.bar.lose();
@@ -256,7 +256,7 @@ class Link {
       take(said.entries);
     }
     if (said.answer !== undefined) {
-      if (said.command === "skill") this.hands.say(said.answer);
+      if (said.command === "skill") this.manual.say(said.answer);
       else this.bar.hear(said.command, said.answer);
       if (said.started) [this.run, this.bar.starting.open] = [said.started, false];
     }
@@ -267,8 +267,8 @@ class Link {
       run.over = !said.status.live;
       this.bar.show(said.status, last(run.start.v), last(run.held.v) ?? null, run.departure !== null);
     }
-    if (said.status && (!said.status.live || this.hands.run !== said.status.run)) this.hands.forget();
-    if (said.hands && said.hands.run === this.status?.run) this.hands.show(said.hands);
+    if (said.status && (!said.status.live || this.manual.run !== said.status.run)) this.manual.forget();
+    if (said.manual && said.manual.run === this.status?.run) this.manual.show(said.manual);
     this.judge();
   }
 
@@ -284,7 +284,7 @@ class Link {
     byId("link").dataset.state = live.state = state;
     this.bar.enable();
     this.bar.showWaiting();
-    this.hands.enable(Boolean(this.status?.commands && this.status.live) && !stale);
+    this.manual.enable(Boolean(this.status?.commands && this.status.live) && !stale);
   }
 }
 

@@ -1,4 +1,4 @@
-"""Skills by hand: the skillsets of a run under way, found by their description, shown as JSON and called; what `./alula panel` can."""
+"""Manual control: the skillsets of a run under way, found by their description, shown as JSON and called; what `./alula panel` can."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ QUESTIONS = frozenset({"why"})
 """Acts that change nothing."""
 
 
-class Hands:
-    """The skillsets of a run, until it is closed; everything may be called from any thread."""
+class ManualControl:
+    """Starts, stops and questions skills of a run without its mission, until it is closed; all methods may be called from any thread."""
 
     def __init__(self, skillsets: Skillsets) -> None:
         self._skillsets = skillsets

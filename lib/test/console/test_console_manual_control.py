@@ -1,4 +1,4 @@
-"""Skills by hand: over the page's socket, against a real skillset in another process."""
+"""Manual control: over the page's socket, against a real skillset in another process."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ pytest.importorskip("navigation_interfaces.action")
 
 from console_serving import WAIT_S, Bench, answer_to, heard, serve
 
-from alula.console import commands
-from alula.console import hands as hands_module
+from alula.console import commands, manual_control
 from alula.console.acts import ActError
-from alula.console.hands import Hands
+from alula.console.manual_control import ManualControl
 from skill_panel.ros_link import RosLink
 from skill_panel.watcher import wait_for
 
@@ -45,18 +44,18 @@ def run_of(make_run: Callable[..., Path], skillset: int, monkeypatch: pytest.Mon
     known = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     (folder / "run.json").write_text(json.dumps({**known, "domain": skillset}), encoding="utf-8")
     monkeypatch.setattr(commands, "is_live", lambda _run: True)
-    monkeypatch.setattr(hands_module, "ANSWER_S", WAIT_S)
+    monkeypatch.setattr(manual_control, "ANSWER_S", WAIT_S)
     return folder
 
 
 def skill_of(message: dict[str, Any], name: str) -> dict[str, Any]:
     """Return a skill in a message; empty while it is not there."""
-    shown = message.get("hands", {}).get("skillsets", [])
+    shown = message.get("manual", {}).get("skillsets", [])
     return next((dict(skill) for one in shown for skill in one["skills"] if skill["name"] == name), {})
 
 
 def resource_of(message: dict[str, Any], name: str) -> dict[str, Any]:
-    shown = message.get("hands", {}).get("skillsets", [])
+    shown = message.get("manual", {}).get("skillsets", [])
     return next((dict(resource) for one in shown for resource in one["resources"] if resource["name"] == name), {})
 
 
@@ -72,7 +71,7 @@ async def make_ready(viewer: Any) -> None:
 
 def test_skills_are_shown_started_paused_interrupted_and_the_record_says_so(run_of: Path) -> None:
     async def play(bench: Bench) -> None:
-        viewer = await bench.viewer("me", hands=True)
+        viewer = await bench.viewer("me", manual=True)
         ask = lambda act, **more: answer_to(viewer, command="skill", run="live", act=act, root="/navigation", skill="takeoff", **more)  # noqa: E731
         takeoff = skill_of(await heard(viewer, lambda message: bool(skill_of(message, "takeoff"))), "takeoff")
         assert [(one["name"], one["kind"], one["said"]) for one in takeoff["inputs"]] == [
@@ -104,30 +103,30 @@ def test_skills_are_shown_started_paused_interrupted_and_the_record_says_so(run_
     assert not [command for command, _ in done if command.startswith("why")]
 
 
-def test_a_viewer_without_hands_drives_nothing_and_one_that_does_not_look_is_sent_nothing(run_of: Path) -> None:
+def test_a_viewer_without_control_drives_nothing_and_one_that_does_not_look_is_sent_nothing(run_of: Path) -> None:
     async def play(bench: Bench) -> None:
-        first = await bench.viewer("first", hands=True)
+        first = await bench.viewer("first", manual=True)
         await heard(first, lambda message: bool(skill_of(message, "hover")))
         second = await bench.viewer("second")
         asked = {"command": "skill", "run": "live", "act": "interrupt", "root": "/navigation", "skill": "hover"}
         assert await answer_to(second, **asked) == "refused: you watch; take over first"
         assert "another one by now" in await answer_to(first, **{**asked, "run": "an older one"})
         for _ in range(3):
-            assert "hands" not in await heard(second, lambda message: "status" in message or "hands" in message)
+            assert "manual" not in await heard(second, lambda message: "status" in message or "manual" in message)
 
     serve(play, fixed=run_of, link=RosLink())
 
 
 def test_listening_ends_with_the_last_viewer_that_looks(run_of: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     closed: list[bool] = []
-    close = Hands.close
-    monkeypatch.setattr(Hands, "close", lambda self: (closed.append(True), close(self))[1])
+    close = ManualControl.close
+    monkeypatch.setattr(ManualControl, "close", lambda self: (closed.append(True), close(self))[1])
 
     async def play(bench: Bench) -> None:
-        viewer = await bench.viewer("me", hands=True)
+        viewer = await bench.viewer("me", manual=True)
         await heard(viewer, lambda message: bool(skill_of(message, "hover")))
         assert closed == []
-        await viewer.send(json.dumps({"hands": False}))
+        await viewer.send(json.dumps({"manual": False}))
         async with asyncio.timeout(WAIT_S):
             while not closed:
                 await heard(viewer, lambda message: "status" in message)
@@ -150,23 +149,23 @@ def test_listening_ends_with_the_last_viewer_that_looks(run_of: Path, monkeypatc
         ({"root": "/navigation", "act": "start", "skill": "hover", "texts": {"duration": HOSTILE}}, "is no number"),
     ],
 )
-def test_acts_that_make_no_sense_are_refused(hands: Hands, asked: dict[str, Any], why: str) -> None:
+def test_acts_that_make_no_sense_are_refused(manual: ManualControl, asked: dict[str, Any], why: str) -> None:
     with pytest.raises(ActError, match=why):
-        hands.do(asked)
+        manual.do(asked)
 
 
 @pytest.mark.parametrize(("resource", "to"), [("axes_authority", "USED"), ("nothing", "AVAILABLE"), (HOSTILE, HOSTILE)])
-def test_transitions_that_the_model_lacks_are_refused_by_the_managers(hands: Hands, resource: str, to: str) -> None:
-    what, answer = hands.do({"root": "/navigation", "act": "transition", "resource": resource, "to": to})
+def test_transitions_that_the_model_lacks_are_refused_by_the_managers(manual: ManualControl, resource: str, to: str) -> None:
+    what, answer = manual.do({"root": "/navigation", "act": "transition", "resource": resource, "to": to})
     assert what == f"transition navigation.{resource} to {to}"
     assert answer.startswith("refused: ")
 
 
-def test_progress_is_shown_of_an_execution_that_another_client_started(hands: Hands, skillset: int) -> None:
+def test_progress_is_shown_of_an_execution_that_another_client_started(manual: ManualControl, skillset: int) -> None:
     def takeoff() -> dict[str, Any]:
-        return skill_of({"hands": hands.describe()}, "takeoff")
+        return skill_of({"manual": manual.describe()}, "takeoff")
 
-    mission = Hands(RosLink().listen(skillset))
+    mission = ManualControl(RosLink().listen(skillset))
     try:
         assert wait_for(lambda: bool(mission.describe()["skillsets"]), WAIT_S)
         for resource, to in (("SDK_authority", "AVAILABLE"), ("homepoint_status", "VALID")):
@@ -182,8 +181,8 @@ def test_progress_is_shown_of_an_execution_that_another_client_started(hands: Ha
 
 
 @pytest.fixture(scope="module")
-def hands(skillset: int) -> Iterator[Hands]:
-    made = Hands(RosLink().listen(skillset))
+def manual(skillset: int) -> Iterator[ManualControl]:
+    made = ManualControl(RosLink().listen(skillset))
     assert wait_for(lambda: bool(made.describe()["skillsets"]), WAIT_S)
     yield made
     made.close()

@@ -1,11 +1,11 @@
-// Skills by hand, on the live page: any skillset of the run by its description. Resources with the transitions that are possible now, skills
+// Manual control, on the live page: any skillset of the run by its description. Resources with the transitions that are possible now, skills
 // with their inputs, why one can't start now, what runs and how it last ended. Starts and transitions take two presses; managers decide.
 
-class HandsView {
+class ManualControlView {
   constructor(send, armed) {
     [this.send, this.armed] = [send, armed];
     [this.root, this.skill, this.texts, this.shown, this.may] = ["", "", new Map(), null, false];
-    this.box = byId("hands");
+    this.box = byId("manual");
     this.box.hidden = false;
     this.box.addEventListener("toggle", () => this.look());
     this.tabs = el("div", { class: "acts", role: "group", "aria-label": "skillset" });
@@ -15,12 +15,12 @@ class HandsView {
     this.data = el("ul", { class: "hand-data", "aria-label": "data" });
     this.answer = el("output", { role: "status" });
     this.note = el("p", { class: "hint" });
-    byId("hands-body").append(this.tabs, this.note, el("div", { class: "columns" }, el("div", {}, el("h4", {}, "Skills"), this.list, this.form, this.answer), el("div", {}, el("h4", {}, "Resources"), this.resources, el("h4", {}, "Data"), this.data)));
+    byId("manual-body").append(this.tabs, this.note, el("div", { class: "columns" }, el("div", {}, el("h4", {}, "Skills"), this.list, this.form, this.answer), el("div", {}, el("h4", {}, "Resources"), this.resources, el("h4", {}, "Data"), this.data)));
   }
 
   /** Has the server listen to the skillsets as long as they are looked at. */
   look() {
-    this.send({ hands: this.box.open });
+    this.send({ manual: this.box.open });
   }
 
   ask(act, asked) {
@@ -33,13 +33,13 @@ class HandsView {
   }
 
   /** What the managers said. */
-  show(hands) {
-    this.run = hands.run;
-    const roots = hands.skillsets.map(({ root }) => root);
+  show(manual) {
+    this.run = manual.run;
+    const roots = manual.skillsets.map(({ root }) => root);
     if (!roots.includes(this.root)) this.root = roots[0] ?? "";
     rewrite(this.tabs, roots, (root) => el("button", { type: "button", onclick: () => this.choose(root) }, root.replace(/^\//, "")));
     for (const [index, tab] of [...this.tabs.children].entries()) tab.setAttribute("aria-pressed", String(roots[index] === this.root));
-    this.hands = hands;
+    this.manual = manual;
     this.draw();
   }
 
@@ -49,8 +49,8 @@ class HandsView {
   }
 
   draw() {
-    const one = this.hands?.skillsets.find(({ root }) => root === this.root);
-    const problems = this.hands?.problems ?? [];
+    const one = this.manual?.skillsets.find(({ root }) => root === this.root);
+    const problems = this.manual?.problems ?? [];
     const said = one ? (one.alive ? "The managers decide; a mission that flies commands these skills, too: pause it first." : `The managers of ${one.root} have gone.`) : "No skillset answers in this run yet.";
     setText(this.note, [...problems, this.may ? said : `${said} You watch: to act, take over, in a run that is under way.`].join("; "));
     this.showSkills(one);
@@ -157,8 +157,8 @@ class HandsView {
 
   /** What was known belongs to another run, or to one that is over. */
   forget() {
-    if (!this.hands) return;
-    [this.hands, this.run] = [null, ""];
+    if (!this.manual) return;
+    [this.manual, this.run] = [null, ""];
     rewrite(this.tabs, [], () => null);
     this.draw();
   }
