@@ -29,7 +29,7 @@ ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
-    """Make no report of a replay: seconds each; ``test_replays_kept`` has those that are made."""
+    """Make no report of a replay: seconds each; ``test_replay_outputs`` has those that are made."""
     monkeypatch.setattr(alula.commands.replay, "make_report", lambda *_: None)
 
 

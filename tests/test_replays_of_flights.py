@@ -25,7 +25,7 @@ OTHERS = ALULA_ROOT.parent / "shared" / "data" / "bags"
 
 @pytest.fixture(autouse=True)
 def without_report(monkeypatch):
-    """Make no report of a replay: seconds each; ``test_replays_kept`` has those that are made."""
+    """Make no report of a replay: seconds each; ``test_replay_outputs`` has those that are made."""
     monkeypatch.setattr(alula.commands.replay, "make_report", lambda *_: None)
 
 

@@ -23,7 +23,7 @@ from alula.common.files import write_text
 from alula.records.errors import AnalysisError
 from alula.records.expectations import Checked, check, junit, load_expectations
 from alula.records.replay.deciding import Conditions, MakeAnswers, decide, read_mission
-from alula.records.replay.kept import same, trace_of, verdict, write_out
+from alula.records.replay.outputs import same, trace_of, verdict, write_out
 from alula.records.replay.recorded import Recorded, ReplayError, load
 from alula.records.replay.replay import Result
 from alula.records.run import load_run

@@ -12,7 +12,7 @@ from alula.common.faults import parse_fault
 from alula.common.record import DECISIONS, FILE, RecordWriter, read_record
 from alula.records.replay.comparison import alike
 from alula.records.replay.deciding import Conditions, bag_of, decide, read_mission
-from alula.records.replay.kept import same, trace_of, verdict, write_out
+from alula.records.replay.outputs import same, trace_of, verdict, write_out
 from alula.records.replay.recorded import ReplayError, load
 
 RECORDING = Path(os.environ["ALULA_ROOT"]) / "tests/recordings/mapping"

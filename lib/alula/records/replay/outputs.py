@@ -1,4 +1,4 @@
-"""What a replay tells, and what it leaves in its folder besides its own record: the trace, the verdict, and what failed."""
+"""The outputs of a replay besides its own record: the trace of its decisions, the verdict, and the faults."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def trace_of(result: Result, zero_s: float) -> list[dict[str, object]]:
 
 
 def same(recorded: Recorded, result: Result) -> bool:
-    """Tell whether all went as it did then."""
+    """Tell whether the replay made the recorded decisions and came to the recorded outcome."""
     ended_alike = result.end is None or not recorded.outcome or result.end.outcome.value == recorded.outcome
     return result.difference is None and ended_alike
 
 
 def verdict(recorded: Recorded, result: Result) -> list[str]:
-    """Return what came of it, in lines."""
+    """Return the verdict in lines: where the replay first differs from the record, or that it does not."""
     lines = []
     if not recorded.whole:
         lines.append(f"the record breaks off after {len(recorded.decisions)} decisions; replayed up to there")

@@ -1,4 +1,4 @@
-"""What a replay is asked to be: the record, and the one thing that is changed."""
+"""The request of a replay: the record, and the one thing that is changed (tree, models, parameters, mocks, faults)."""
 
 from __future__ import annotations
 

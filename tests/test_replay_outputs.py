@@ -1,4 +1,4 @@
-"""A replay that is kept has summary, pictures and page as a flight has."""
+"""A replay with a folder writes summary, pictures and page as a flight does."""
 
 from __future__ import annotations
 
