@@ -40,7 +40,7 @@ class Blackboard:
     pending: PendingInterrupts
     failures: list[Failure] = field(default_factory=list)
     reason: str = ""
-    remarks: dict[str, str] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
     """Why a resource is as it is, in the robot's own words, by ``skillset.resource``."""
 
     @property
@@ -62,6 +62,6 @@ class Blackboard:
         return self.reason
 
     def because(self, resource: str) -> str:
-        """Return what is remarked on a resource, to be put behind a sentence; empty when there is nothing."""
-        remark = self.remarks.get(resource, "")
-        return f": {remark}" if remark else ""
+        """Return the reason for a resource's state, to be put behind a sentence; empty when there is nothing."""
+        reason = self.reasons.get(resource, "")
+        return f": {reason}" if reason else ""

@@ -39,7 +39,7 @@ class MissionPlan:
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         inputs: what it was made of.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
-        listen: on ROS 2, has the node listen to what says why a resource is as it is (``Blackboard.remarks``).
+        listen: on ROS 2, has the node listen to what says why a resource is as it is (``Blackboard.reasons``).
     """
 
     scenario: str

@@ -14,9 +14,9 @@ from alula.common.record import Entry
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.model.model import Skillset
-from alula.records.replay.request import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.records.replay.replay import Replay, Result
+from alula.records.replay.request import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
 from alula.records.replay.vehicle import RecordedSkills, Vehicle
 from alula.runtime.mock import Behaviour
 

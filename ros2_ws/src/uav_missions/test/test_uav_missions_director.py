@@ -61,9 +61,9 @@ def test_each_condition_of_the_start_counts(resource, state):
     assert len(unmet(World(resources={**READY, resource: state}))) == 1
 
 
-def unmet(world: World, **remarks: str) -> list[str]:
+def unmet(world: World, **reasons: str) -> list[str]:
     blackboard = make_blackboard(world)
-    blackboard.remarks.update({name.replace("__", "."): remark for name, remark in remarks.items()})
+    blackboard.reasons.update({name.replace("__", "."): reason for name, reason in reasons.items()})
     return [one.unmet for one in conditions(clients(world), blackboard) if one.unmet]
 
 

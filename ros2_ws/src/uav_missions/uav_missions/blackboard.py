@@ -9,7 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from alula.missions.blackboard import Blackboard
-from uav_missions.remarks import AUTHORITY_INVARIANT, holder_of_the_vehicle
+from uav_missions.reasons import AUTHORITY_INVARIANT, holder_of_the_vehicle
 from uav_missions.route import Route, Waypoint
 
 
@@ -30,8 +30,8 @@ class RouteBlackboard(Blackboard):
     def explained(self) -> str:
         """Return the reason; where the authority was lost, with its holder."""
         lost = any(failure.result == AUTHORITY_INVARIANT for failure in self.failures)
-        remark = holder_of_the_vehicle(self) if lost else ""
-        return f"{self.reason} ({remark})" if remark else self.reason
+        reason = holder_of_the_vehicle(self) if lost else ""
+        return f"{self.reason} ({reason})" if reason else self.reason
 
 
 class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped

@@ -17,7 +17,7 @@ from alula.missions.leaves import Awaits, Check, Do, SkillLeaf, Stays
 from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from uav_missions.blackboard import RouteBlackboard, WaypointWriter
-from uav_missions.remarks import AUTHORITY
+from uav_missions.reasons import AUTHORITY
 from uav_missions.route import wrap_rad
 
 AUTHORITY_INVARIANTS = frozenset({"keep_sdk_authority", "sdk_authority"})

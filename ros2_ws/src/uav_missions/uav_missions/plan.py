@@ -9,7 +9,7 @@ from alula.missions.director import Mission
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import Inputs, MissionPlan
 from alula.missions.skillset import Client, Clock
-from uav_missions import remarks
+from uav_missions import reasons
 from uav_missions.blackboard import RouteBlackboard
 from uav_missions.flying import FlightSettings
 from uav_missions.route import route_of
@@ -28,7 +28,7 @@ def route_plan(name: str, skillsets: tuple[str, ...], make_tree: MakeTree, setti
 
     waypoints = [list(waypoint) for waypoint in route.waypoints]
     facts = lambda: {"waypoints": len(waypoints), "waypoints_reached": route.reached}  # noqa: E731
-    return MissionPlan(name, skillsets, make, vars(settings), {"route": waypoints}, facts, remarks.listen)
+    return MissionPlan(name, skillsets, make, vars(settings), {"route": waypoints}, facts, reasons.listen)
 
 
 def settings_of(defaults: FlightSettings, values: Mapping[str, float]) -> FlightSettings:

@@ -9,7 +9,7 @@ from uav_missions_fakes import World, make_blackboard
 
 from alula.missions.blackboard import Failure
 from alula.model.execution_state import ExecutionState
-from uav_missions.remarks import AuthorityRemarks, note_health
+from uav_missions.reasons import AuthorityReasons, note_health
 
 LOST = Failure("fly", "navigation.goto", ExecutionState.RESOURCE_INVARIANT_VIOLATED, "keep_sdk_authority", "")
 
@@ -28,7 +28,7 @@ def state(**changes: object) -> SimpleNamespace:
 )
 def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, words):
     blackboard = make_blackboard(World())
-    authority = AuthorityRemarks(blackboard)
+    authority = AuthorityReasons(blackboard)
     authority.note(told)
     authority.note(state(authority=True))
     blackboard.failures.append(LOST)
@@ -38,7 +38,7 @@ def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, w
 
 def test_the_cause_of_a_lost_authority_stays_told_after_a_landing():
     blackboard = make_blackboard(World())
-    authority = AuthorityRemarks(blackboard)
+    authority = AuthorityReasons(blackboard)
     blackboard.failures.append(LOST)
     blackboard.note_reason()
     for told in (state(landed_state=1, authority=True), state(authority=True), state(), state(authority=True)):
@@ -49,7 +49,7 @@ def test_the_cause_of_a_lost_authority_stays_told_after_a_landing():
 
 def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
     blackboard = make_blackboard(World())
-    authority = AuthorityRemarks(blackboard)
+    authority = AuthorityReasons(blackboard)
     authority.note(state(landed_state=1, ready=False, mode="STABILIZE"))
     authority.note(state(landed_state=1, authority=True, mode="GUIDED"))
     authority.note(state(authority=True, mode="GUIDED"))
@@ -61,7 +61,7 @@ def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
 @pytest.mark.parametrize("silent", [False, True])
 def test_an_autopilot_that_restarts_in_the_air_is_not_told_as_one_that_stands(silent):
     blackboard = make_blackboard(World())
-    authority = AuthorityRemarks(blackboard)
+    authority = AuthorityReasons(blackboard)
     authority.note(state(landed_state=1, authority=True, mode="GUIDED"))
     authority.note(state(authority=True, mode="GUIDED"))
     if silent:
@@ -75,7 +75,7 @@ def test_an_autopilot_that_restarts_in_the_air_is_not_told_as_one_that_stands(si
 @pytest.mark.parametrize("pilot", [False, True])
 def test_after_a_landing_a_vehicle_that_stands_is_told_as_one(pilot):
     blackboard = make_blackboard(World())
-    authority = AuthorityRemarks(blackboard)
+    authority = AuthorityReasons(blackboard)
     authority.note(state(authority=True, mode="GUIDED"))
     authority.note(state(landed_state=1, authority=not pilot, mode="LAND"))
     authority.note(state(landed_state=1, ready=False, mode="STABILIZE"))
@@ -86,7 +86,7 @@ def test_after_a_landing_a_vehicle_that_stands_is_told_as_one(pilot):
 
 def test_other_failures_are_told_without_it():
     blackboard = make_blackboard(World())
-    AuthorityRemarks(blackboard).note(state())
+    AuthorityReasons(blackboard).note(state())
     note_health(blackboard, "perception.zed_status", SimpleNamespace(reason="no images"))
     blackboard.failures.append(Failure("watch", "perception.zed_depthmap", ExecutionState.TERMINATED, "LOST", ""))
     blackboard.note_reason()
