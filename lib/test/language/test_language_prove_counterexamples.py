@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from test_language_prove_page import PAGE, proved
+from test_language_prove_page import FOLDER, proved
 
 from alula.language.load import check_file
 from alula.model.expressions import Comparison, DataIs, ResourceIs, SkillRuns
@@ -117,7 +117,7 @@ def test_only_fairness_makes_an_execution_end(most):
 
 
 def test_the_vehicles_skillsets_are_proved():
-    skillsets = [check_file(path)[0] for path in sorted((PAGE.parent / "uav").glob("*.skill"))]
+    skillsets = [check_file(path)[0] for path in sorted((FOLDER / "uav").glob("*.skill"))]
     assert len(skillsets) == 4
     findings = [finding for skillset in skillsets for finding in prove(skillset)]
     # The paper's takeoff keeps the axes when it loses the authority (see the comment in the model).
