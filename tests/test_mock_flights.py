@@ -63,7 +63,7 @@ def test_a_behaviour_that_can_not_be_read_leaves_nothing_behind(tmp_path: Path) 
     ):
         flight = start_flight(tmp_path / "run", "--mock", *more)
         assert flight.process.wait(120.0) == 2
-        assert flight.words().splitlines()[-1] == f"alula fly: {complaint}"
+        assert flight.words().splitlines()[-1] == f"alula run: {complaint}"
         assert not flight.out.exists()
 
 

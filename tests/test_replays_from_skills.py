@@ -12,9 +12,10 @@ import pytest
 from mcap.writer import Writer
 
 import alula.commands.replay
-from alula.campaign import mock_run
 from alula.commands import expect
+from alula.commands import run as over_mocks
 from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
+from alula.common.faults import parse_fault
 from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
@@ -35,7 +36,10 @@ def without_report(monkeypatch):
 
 def fly(out: Path, *faults: str, scenario: str = "mapping") -> Path:
     """Fly over mocks and return the run's folder."""
-    mock_run.main([scenario, "--out", str(out), *(word for fault in faults for word in ("--fail", fault))])
+    words = [scenario, "--mock", "--out", str(out), *(word for fault in faults for word in ("--fail", fault))]
+    mission, _ = over_mocks.prepare(over_mocks.parse(words))
+    mission.run()
+    over_mocks.write_account(out / "mock.json", mission, [parse_fault(fault) for fault in faults])
     return out
 
 

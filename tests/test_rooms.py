@@ -17,6 +17,7 @@ ROS = r"rclpy|rospy|roslib|roslaunch|rosbag|genpy|actionlib|rcl_interfaces|\w+_m
 ADAPTERS = "skillset_ros1|skillset_ros2|resource_reporter|skill_panel|ros_bridge"
 DRONE_PACKAGES = "ground_station|lidar_mapping|lidar_obstacles|perception_core|radio_link|video_stream|zed_depth"
 DRONE = rf"uav_\w+|{DRONE_PACKAGES}|navigation_\w+|perception_managers|mapping_managers|video_managers"
+DRONE_WORDS = "ardupilot|autopilot|guidance|imu|lidar|mavlink|radio|vehicle|zed"
 GENERATED = {"language/generate", "scaffold/robot"}
 """Texts of the library that become code of a robot, which imports ROS."""
 TYPES = "lib/alula/model/ros_types.py"
@@ -30,6 +31,8 @@ RULES = {
     "ros2_ws/src/skillset_ros2": DRONE,
     "ros2_ws/src/skill_panel": DRONE,
     "bridge/ros_bridge": DRONE,
+    # A run of any robot: no robot either, not even by what it consists of.
+    "flight": rf"{DRONE}|{DRONE_WORDS}",
 }
 
 

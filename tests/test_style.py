@@ -19,6 +19,7 @@ ROS1_PACKAGES = (
     "lidar_mapping",
     "uav_simulator",
     "uav_report",
+    "uav_flight",
     "radio_link",
     "video_stream",
     "ground_station",
@@ -27,7 +28,6 @@ ROS2_PACKAGES = ("skillset_ros2", "skill_panel", "uav_skills", "uav_missions")
 TYPED = [
     "lib/alula",
     "flight/alula_flight",
-    "flight/sensor_replay",
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
     "tools/skill_bench",

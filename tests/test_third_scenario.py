@@ -61,13 +61,12 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(root: Path, *words: str) -> subprocess.CompletedProcess[str]:
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "PYTHON", "AMENT", "CMAKE", "LD_", "ALULA_"))}
     environment["ALULA_STATE"] = os.environ.get("ALULA_STATE", str(ALULA_ROOT / ".alula"))
-    command = [str(root / "setup" / "in_ros1"), *words]
-    return subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, timeout=LIMIT_S, check=False)
+    return subprocess.run(words, cwd=root, env=environment, capture_output=True, text=True, timeout=LIMIT_S, check=False)
 
 
 def test_the_scenario_of_the_page_flies_over_mocks(checkout: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
-    flown = run(checkout, "python", "-m", "alula_flight.fly", "patrol", "--mock", "--out", str(out))
+    flown = run(checkout, "setup/in_ros2", "python", "-m", "alula.commands.run", "patrol", "--mock", "--out", str(out))
     assert flown.returncode == 0, flown.stdout + flown.stderr
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["scenario"], summary["outcome"], summary["landed"], summary["problems"]) == ("patrol", "accomplished", True, [])
@@ -77,6 +76,6 @@ def test_the_scenario_of_the_page_flies_over_mocks(checkout: Path, tmp_path: Pat
 
 
 def test_its_launch_file_starts_what_every_flight_needs(checkout: Path, tmp_path: Path) -> None:
-    listed = run(checkout, "roslaunch", "--nodes", "uav_bringup", "patrol.launch", f"out:={tmp_path}")
+    listed = run(checkout, "setup/in_ros1", "roslaunch", "--nodes", "uav_bringup", "patrol.launch", f"out:={tmp_path}")
     assert listed.returncode == 0, listed.stderr
     assert {"/uav_simulator", "/uav_guidance"} <= set(listed.stdout.split())

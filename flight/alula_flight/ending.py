@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from alula.live.spec import RunSpec
 from alula.records.conformance import Monitor
 from alula.report.deaths import read_deaths
-from alula_flight.spec import RunSpec
 
 GIVEN_UP, CANNOT_START = 1, 2
 """Exit codes of a run that did not reach its goal, and of one that could not begin, as the mission's own; 0: accomplished."""
@@ -21,7 +21,7 @@ def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = No
     from alula.report.verdict import verdict_lines
 
     out = Path(spec.out_dir)
-    died = read_deaths(out / "deaths.jsonl")
+    died = read_deaths(out)
     summary = make_report(
         RunFacts(
             scenario=spec.scenario,
@@ -30,7 +30,6 @@ def finish(spec: RunSpec, mission_exit: int | None, monitor: Monitor | None = No
             faults=list(spec.faults),
             died=[{"name": d.name, "when_s": d.when_s, "how": d.how} for d in died],
             mission_exit=mission_exit,
-            mock=spec.mock,
             conformance=None if monitor is None else monitor.verdict.as_dict(),
         )
     )

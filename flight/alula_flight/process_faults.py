@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
 import signal
 from collections.abc import Callable, Sequence
@@ -11,9 +9,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from alula.common.faults import MENDED, FaultChange, FaultRequest
+from alula.common.faults import MENDED, FaultChange, FaultRequest, parse_fault
+from alula.common.scenarios import load_scenario
+from alula.live.spec import RunSpec
+from alula.report.run_log import FAULT, note
 
-FILE = "process_faults.jsonl"
 KILLED, HUNG = "killed", "hung"
 WAYS = (KILLED, HUNG)
 
@@ -41,6 +41,13 @@ class ProcessFault:
         return self.request.how or WAYS[0]
 
 
+def process_faults_of(spec: RunSpec) -> list[ProcessFault]:
+    """Return those of a run's faults that its scenario says to be a process's."""
+    nodes = dict(load_scenario(spec.scenario).processes)
+    requests = map(parse_fault, spec.faults)
+    return [ProcessFault(request, nodes[request.what]) for request in requests if request.what in nodes]
+
+
 class ProcessFaults:
     """Applies faults and ends them; ``find`` returns the process of a node, None where there is none.
 
@@ -50,28 +57,27 @@ class ProcessFaults:
     def __init__(self, faults: Sequence[ProcessFault], find: Callable[[str], Started | None], out: Path) -> None:
         self._faults = tuple(faults)
         self._find = find
-        self._path = out / FILE
+        self._out = out
         self._active: dict[ProcessFault, float] = {}
-        self._lift_off_s: float | None = None
+        self._departed_s: float | None = None
 
-    def listen(self) -> None:
-        """Follow the mission clock and the simulator's lift-off; rospy's node must be there."""
-        if not self._faults:
-            return
-        import rospy
-        from rosgraph_msgs.msg import Clock
-        from std_msgs.msg import String
+    @property
+    def asked(self) -> bool:
+        """Tell whether there are any."""
+        return bool(self._faults)
 
-        rospy.Subscriber("/sim/state", String, lambda message: self.lifted_off(json.loads(message.data).get("lift_off_s")), queue_size=5)
-        rospy.Subscriber("/clock", Clock, lambda message: self.look(message.clock.to_sec()), queue_size=1)
+    @property
+    def counts(self) -> bool:
+        """Tell whether it is known when the robot departed."""
+        return self._departed_s is not None
 
-    def lifted_off(self, lift_off_s: float | None) -> None:
+    def departed(self, at_s: float) -> None:
         """Take note of the moment from which the faults' times count."""
-        self._lift_off_s = lift_off_s
+        self._departed_s = at_s
 
     def look(self, now_s: float) -> None:
         """Begin and end what is due."""
-        since_s = None if self._lift_off_s is None else now_s - self._lift_off_s
+        since_s = None if self._departed_s is None else now_s - self._departed_s
         for fault in self._faults:
             if fault.request.lasts(since_s):
                 self._break(fault, now_s)
@@ -111,6 +117,4 @@ class ProcessFaults:
             process.popen.send_signal(number)
 
     def _note(self, change: FaultChange) -> None:
-        # A folder that has gone must not end the run.
-        with contextlib.suppress(OSError), self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(asdict(change)) + "\n")
+        note(self._out, FAULT, asdict(change))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
@@ -12,8 +11,8 @@ import pytest
 
 from alula.common.faults import parse_fault
 from alula.common.processes import RUN_ID_VARIABLE
-from alula_flight.process_faults import FILE, ProcessFault, ProcessFaults
-from alula_flight.spec import RunSpec
+from alula.report.run_log import FAULT, FILE, read
+from alula_flight.process_faults import ProcessFault, ProcessFaults
 from alula_testing.waits import until
 
 LIFT_OFF_S = 100.0
@@ -45,12 +44,12 @@ def node():
 def faults_of(text: str, node: Node | None, out) -> ProcessFaults:
     made = ProcessFaults([ProcessFault(parse_fault(text), "video_stream")], {"video_stream": node}.get, out)
     made.look(LIFT_OFF_S - 1.0)
-    made.lifted_off(LIFT_OFF_S)
+    made.departed(LIFT_OFF_S)
     return made
 
 
 def told(out) -> list[tuple[str, str, float]]:
-    return [tuple(json.loads(line).values()) for line in (out / FILE).read_text().splitlines()]
+    return [tuple(one.values()) for one in read(out, FAULT)]
 
 
 def test_a_process_dies_at_its_time_and_is_not_started_again(node, tmp_path):
@@ -105,14 +104,3 @@ def test_at_the_end_of_the_run_a_hung_process_can_be_told_to_end(node, tmp_path)
 def test_a_process_that_is_not_there_is_no_matter(tmp_path):
     faults_of("encoder@40", None, tmp_path).look(LIFT_OFF_S + 41.0)
     assert not (tmp_path / FILE).exists()
-
-
-def test_faults_go_to_the_program_that_applies_them(tmp_path):
-    spec = RunSpec(
-        "inspection", str(tmp_path), "id", 0, 0.0, ("zed@3", "radio@4", "encoder@5", "ground_station:hung@6"), "w", None, 1, 2, 3
-    )
-    assert [(str(fault.request), fault.node, fault.mode) for fault in spec.process_faults] == [
-        ("encoder@5", "video_stream", "killed"),
-        ("ground_station:hung@6", "ground_station", "hung"),
-    ]
-    assert {"faults:=zed@3", "radio_faults:=radio@4"} <= set(spec.launch_arguments())

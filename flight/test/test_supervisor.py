@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from alula.live.part import Consequence, RunPart
+from alula.live.spec import RunSpec
 from alula.report.deaths import read_deaths
 from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, Ended, note_end, read_end
 from alula_flight import mission_clock, supervisor
-from alula_flight.deaths import Consequence, DeathRecord
 from alula_flight.ending import GIVEN_UP
 from alula_flight.mission_clock import MissionClock
-from alula_flight.spec import RunSpec
 from alula_flight.supervisor import Supervisor, Watch
 
 
@@ -27,24 +28,33 @@ class StartingLaunch:
     pm: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(get_process=lambda _: SimpleNamespace(spawn_count=1)))
 
     def start(self) -> None:
-        self.listener.process_died("uav_simulator-2", 1)
+        self.listener.process_died("simulator-2", 1)
 
 
 def test_a_death_while_roslaunch_still_starts_is_noted(tmp_path: Path) -> None:
-    watch = Watch(DeathRecord(tmp_path / "deaths.jsonl"), MissionClock(simulated=True))
+    watch = Watch(tmp_path, MissionClock(), {"simulator": Consequence.END})
     launch = StartingLaunch(watch)
     watch.follow(launch)
     launch.start()
-    assert [death.name for death in read_deaths(tmp_path / "deaths.jsonl")] == ["uav_simulator"]
+    assert [death.name for death in read_deaths(tmp_path)] == ["simulator"]
     assert watch.worst is not Consequence.GO_ON
+
+
+class Part(RunPart):
+    """A robot with a simulator."""
+
+    consequences: Mapping[str, Consequence] = {"simulator": Consequence.END}
+
+    def clock_source(self, spec: RunSpec) -> str:
+        return "the simulator"
 
 
 class Flight:
     """A supervisor whose run has no process left: it ends as soon as it is told to."""
 
     def __init__(self, out: Path) -> None:
-        spec = RunSpec("mapping", str(out), "", 0, 0.0, (), "", "tcp:127.0.0.1:1", 0, 0, 1, sensors="simulated", body_port=9772)
-        self.supervisor = Supervisor(spec)
+        self.supervisor = Supervisor(RunSpec("mapping", str(out), "id"), Part())
+        self.supervisor._clock.begin(simulated=True)
         process = SimpleNamespace(spawn_count=1, respawn=False)
         self.launch = SimpleNamespace(pm=SimpleNamespace(get_process=lambda _: process, get_active_names=list))
         self.supervisor._watch.follow(self.launch)
@@ -68,12 +78,12 @@ def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Flight:
 def test_a_clock_that_never_begins_is_the_reason_that_is_told(flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mission_clock, "START_TIMEOUT_S", 0.0)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == Ended(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from ArduPilot on UDP 9772")
+    assert read_end(tmp_path) == Ended(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from the simulator")
 
 
-@pytest.mark.parametrize("name", ["uav_simulator", "master"])
+@pytest.mark.parametrize("name", ["simulator", "master"])
 def test_a_death_that_ends_a_run_is_the_reason_that_is_told(name: str, flight: Flight, tmp_path: Path) -> None:
-    flight.died("zed_depth")
+    flight.died("driver")
     flight.died(name)
     assert flight.ends() == GIVEN_UP
     assert read_end(tmp_path) == Ended(SUPERVISOR, f"{name} died (exit code 1)")

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from alula.common.faults import parse_fault
 from alula.common.files import write_text
+from alula.common.record import FILE
 from alula.records.errors import AnalysisError
 from alula.records.expectations import Checked, check, junit, load_expectations
 from alula.records.replay.deciding import Conditions, MakeAnswers, decide, read_mission
@@ -59,8 +60,19 @@ class Below:
     settings: Sequence[str]
 
 
-Depth = Callable[[Arguments, Recorded, Path], Below]
-"""Makes it of the command line and the record; the folder is for what is not kept. Raises ReplayError."""
+@dataclass(frozen=True)
+class Depth:
+    """A depth below the skills.
+
+    Attributes:
+        below: makes what answers, of the command line and the record; the folder is for what is not kept. Raises ReplayError.
+        alone: replays a bag that belongs to no mission, and tells what came of it; returns the exit code. None: it can't.
+    """
+
+    below: Callable[[Arguments, Recorded, Path], Below]
+    alone: Callable[[Arguments, Path], int] | None = None
+
+
 Depths = Mapping[str, Depth]
 SKILLS = "skills"
 NO_DEPTHS: Depths = {}
@@ -99,6 +111,9 @@ def parse(words: Sequence[str], depths: Depths = NO_DEPTHS) -> Arguments:
 
 def replay(given: Arguments, folder: Path, depths: Depths) -> int:
     """Replay as asked and tell; return the exit code; raises ReplayError. ``folder`` is for what is not kept."""
+    depth = depths.get(given.depth)
+    if depth is not None and depth.alone is not None and given.run.suffix == ".bag" and not given.run.with_name(FILE).exists():
+        return depth.alone(given, folder)
     expectations = None if given.expect is None else load_expectations(given.expect)
     recorded = load(given.run)
     # Expectations are held against a record.
@@ -118,7 +133,7 @@ def decide_again(given: Arguments, recorded: Recorded, folder: Path, out: Path |
     """Decide at the depth that was asked for; raises ReplayError."""
     mission = read_mission(recorded, tree=given.tree, models=given.model, behaviour=given.behaviour)
     depth = depths.get(given.depth)
-    below = Below(None, given.fail, given.settings) if depth is None else depth(given, recorded, folder)
+    below = Below(None, given.fail, given.settings) if depth is None else depth.below(given, recorded, folder)
     return decide(mission, Conditions(below.answers, below.fail, below.settings, go_on=given.on, rate=given.rate, out=out))
 
 

@@ -1,29 +1,37 @@
 """``alula run SCENARIO --mock``: run a mission over mocks, in virtual time, and make its report. It needs no ROS and nothing generated.
 
-Ends with 0 (accomplished, also when degraded), 1 (given up or aborted), 2 (could not start; then nothing is written).
+1. read the command line       3. write what failed when, and how fast it was
+2. run the mission             4. make the report, and say how it went
+
+Ends with 0 (accomplished, also when degraded), 1 (given up or aborted), 2 (could not start; then nothing is written). The first Ctrl-C
+has the robot come to rest, the second ends everything at once.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import uuid
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 
-from alula.campaign import mock_run
-from alula.common.faults import FaultError
+from alula.campaign.mock_flights import load_flights
+from alula.commands.run_options import check_seed, run_folder, run_parser, world_file
+from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula.common.files import write_json
 from alula.common.robots import RobotError
-from alula.common.runs import runs_folder
-from alula.common.scenarios import ScenarioError, scenario_names
+from alula.common.scenarios import ScenarioError
+from alula.common.signals import Interrupts
+from alula.live.spec import FILE, RequestError, RunSpec
 from alula.missions.director import EXIT_CODES, Outcome
+from alula.missions.mocked import MockedMission
 from alula.missions.plan import InputError
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
+from alula.report.ends import ended_by_signal, note_end
 from alula.report.facts import RunFacts
 from alula.report.live import LiveEvents
 from alula.report.making import make_report
@@ -33,56 +41,89 @@ CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
 
 
 def parse(words: Sequence[str]) -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(prog="alula run", description="Run a scenario of the robot over mocks, in virtual time.")
-    parser.add_argument("scenario", help="one of the robot's")
-    parser.add_argument("--mock", action="store_true", help="over mocks; other runs need an installation with ROS (./alula setup)")
-    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[:HOW][@SECONDS[-SECONDS]]", help="a fault of the mocks")
-    parser.add_argument("--world", default="", metavar="FILE|NAME", help="where the mission's inputs come from (default: the scenario's)")
+    """Read the command line; raises RequestError."""
+    parser = run_parser("Run a scenario of the robot over mocks, in virtual time.")
     parser.add_argument("--behaviour", type=Path, action="append", default=[], metavar="FILE", help="of the mocks, on top of the robot's")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the mocks' chance (default 0)")
-    parser.add_argument("--out", type=Path, help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
-    parser.add_argument("--monitor", action="store_true", help="hold every event against the models")
-    given = parser.parse_args(words)
+    given, others = parser.parse_known_args(words)
     if not given.mock:
-        known = ", ".join(scenario_names())
-        parser.error(f"without --mock a run needs an installation with ROS (./alula setup of a checkout); there are {known}")
+        raise RequestError("without --mock a run needs an installation with ROS: ./alula of a checkout has it")
+    if others:
+        raise RequestError(f"{others[0]}: a run over mocks has no such option; leave it out, or --mock")
     return given
 
 
-def run_folder(wanted: Path | None, scenario: str) -> Path:
-    """Return an absolute path that holds no run yet; raises AnalysisError where the wanted one does."""
-    if wanted is not None:
-        folder = wanted.expanduser().absolute()
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise AnalysisError(f"--out {wanted}: exists and is not an empty folder; choose another, a run never overwrites")
-        return folder
-    base = runs_folder().absolute() / f"{datetime.now(tz=UTC).astimezone():%Y%m%d-%H%M%S}-{scenario}"
-    candidates = (base, *(base.with_name(f"{base.name}-{n}") for n in range(2, 1000)))
-    return next(folder for folder in candidates if not folder.exists())
+def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
+    """Read what the run needs, and make its folder; return the mission, and what the run is.
+
+    Raises:
+        AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError: it can't be run; nothing was written.
+    """
+    out, seed = run_folder(given.out, given.scenario), check_seed(given.seed)
+    flights = load_flights(given.scenario, given.behaviour, world=given.world)
+    faults = [parse_fault(text) for text in given.fail]
+    flights.check(faults)
+    world, plan = world_file(flights.scenario, given.world), flights.plan()
+    out.mkdir(parents=True, exist_ok=True)
+    spec = RunSpec(
+        scenario=given.scenario,
+        out_dir=str(out),
+        run_id=uuid.uuid4().hex,
+        seed=seed,
+        faults=tuple(map(str, faults)),
+        world=world,
+        monitor=given.monitor,
+        own={"mock": True},
+    )
+    spec.save(out / FILE)
+    return MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, seed=seed, out=out), spec
 
 
 def run(given: argparse.Namespace) -> int:
-    """Run and report; return the exit code.
-
-    Raises:
-        AnalysisError, FaultError, RobotError, ScenarioError, InputError: it can't be run; nothing was written.
-    """
-    out = given.out = run_folder(given.out, given.scenario)
-    mission, faults = mock_run.prepare(given)
-    asked = {"scenario": given.scenario, "out_dir": str(out), "run_id": uuid.uuid4().hex, "seed": given.seed, "world": given.world}
-    write_json(out / "run.json", {**asked, "faults": [str(fault) for fault in faults], "mock": True, "domain": 0})
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, _frame: mission.abort(f"told to end by {signal.Signals(received).name}"))
+    """Run and report; return the exit code. Raises what `prepare` does."""
+    mission, spec = prepare(given)
+    out = Path(spec.out_dir)
+    _say(f"running '{spec.scenario}' over mocks, seed {spec.seed}{''.join(f', failing {one}' for one in spec.faults)}; results in {out}")
+    _abort_on_signals(mission, out)
     end = mission.run()
-    mock_run.write_account(out / "mock.json", mission, faults)
     monitor = Monitor(models_of(dict.fromkeys(event.skillset for event in mission.events))) if given.monitor else None
     LiveEvents(out, _say, monitor).show_new()
+    try:
+        write_account(out / "mock.json", mission, [parse_fault(text) for text in spec.faults])
+    except OSError as error:
+        _say(f"mock.json could not be written: {error.strerror}")
     code = EXIT_CODES[end.outcome]
     conformance = None if monitor is None else monitor.verdict.as_dict()
-    summary = make_report(RunFacts(given.scenario, given.seed, out, given.fail, (), code, mock=True, conformance=conformance))
+    summary = make_report(RunFacts(spec.scenario, spec.seed, out, spec.faults, (), code, mock=True, conformance=conformance))
     sys.stdout.write("\n".join(verdict_lines(summary, (), out)) + "\n")
     return code
+
+
+def _abort_on_signals(mission: MockedMission, out: Path) -> None:
+    def first() -> None:
+        note_end(out, ended_by_signal(interrupts.first))
+        mission.abort(f"told to end by {interrupts.first.name if interrupts.first else 'a signal'}")
+
+    def second() -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    interrupts = Interrupts(first, second)
+    interrupts.install()
+
+
+def write_account(path: Path, mission: MockedMission, faults: Sequence[FaultRequest]) -> None:
+    """Write ``mock.json``; times are mission clock, but for ``wall_s``."""
+    simulated_s, lift_off_s = mission.world.now_s, mission.departure_s
+    spans = spans_of(faults, begun_s=0.0, lift_off_s=lift_off_s, ended_s=simulated_s, first_s=mission.robot.faults)
+    content = {
+        "simulated_s": simulated_s,
+        "wall_s": mission.wall_s,
+        "factor": simulated_s / mission.wall_s,
+        "lift_off_s": lift_off_s,
+        "faults": [vars(change) for change in changes_of(spans, simulated_s, MOCKED)],
+        "notes": mission.notes,
+    }
+    write_json(path, content)
 
 
 def _say(line: str) -> None:
@@ -93,7 +134,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run; return the exit code."""
     try:
         return run(parse(sys.argv[1:] if words is None else words))
-    except (AnalysisError, FaultError, RobotError, ScenarioError, InputError, OSError) as error:
+    except (AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError, OSError) as error:
         sys.stderr.write(f"alula run: {error}\n")
         return CANNOT_START
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+import contextlib
+import signal
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-FILE = "deaths.jsonl"
+from alula.report.run_log import DEATH, note, read
+
 DIED = "died"
 """The way of failing of a process that ended without being told to."""
 
@@ -30,12 +32,22 @@ class Death:
         return f"{self.name} died ({self.how}){when}{again}"
 
 
-def read_deaths(path: Path) -> list[Death]:
-    """Read what the supervisor wrote; a line cut off by a crash is left out."""
+def describe_exit(code: int | None) -> str:
+    """Return ``signal SIGKILL`` or ``exit code 1``."""
+    if code is not None and code < 0:
+        return f"signal {signal.Signals(-code).name}"
+    return f"exit code {code}"
+
+
+def note_death(out: Path, death: Death) -> None:
+    """Write down that a process of a run died."""
+    note(out, DEATH, asdict(death))
+
+
+def read_deaths(out: Path) -> list[Death]:
+    """Return which processes of a run died."""
     deaths = []
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        try:
-            deaths.append(Death(**json.loads(line)))
-        except (json.JSONDecodeError, TypeError):
-            continue
+    for values in read(out, DEATH):
+        with contextlib.suppress(TypeError):
+            deaths.append(Death(**values))
     return deaths

@@ -1,4 +1,4 @@
-"""Show a flight while it happens: a line for every skill that starts or ends and for every resource that changes."""
+"""Show a run while it happens: a line for every skill that starts or ends and for every resource that changes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from alula.model.execution_state import ExecutionState
 from alula.records.conformance import Monitor
 from alula.records.run import departure
 from alula.report.deaths import read_deaths
-from alula.report.waits import read_waits
+from alula.report.run_log import read_waits
 from alula.runtime.core.events import EngineEvent, TransitionEvent, read_event
 
 
@@ -30,7 +30,7 @@ def event_line(event: EngineEvent, lift_off_s: float | None = None, begun_s: flo
 
 
 class LiveEvents:
-    """Follows ``skills.mcap``, ``deaths.jsonl`` and ``waits.jsonl`` of a run's folder.
+    """Follows ``skills.mcap`` and ``run_log.jsonl`` of a run's folder.
 
     A ``monitor`` is given each event, and what it finds is said.
     """
@@ -54,7 +54,7 @@ class LiveEvents:
         for wait in waits[self._waits_shown :]:
             self._say(f"waiting for {wait}")
         self._waits_shown = len(waits)
-        deaths = read_deaths(self._out / "deaths.jsonl")
+        deaths = read_deaths(self._out)
         for death in deaths[self._deaths_shown :]:
             self._say(death.sentence())
         self._deaths_shown = len(deaths)

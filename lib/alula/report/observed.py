@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from alula.common.faults import FaultChange
 from alula.report.files import finite, mapping, sequence
-
-PROCESS_FAULTS = "process_faults.jsonl"
-"""What the supervisor did to processes, a line each."""
+from alula.report.run_log import FAULT, read
 
 
 @dataclass(frozen=True)
@@ -47,12 +43,8 @@ class Observed:
 
 
 def read_process_faults(folder: Path) -> tuple[FaultChange, ...]:
-    """Read what the supervisor did to processes, as far as it is whole; nothing where it did nothing."""
-    path, lines = folder / PROCESS_FAULTS, []
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-        with contextlib.suppress(ValueError):
-            lines.append(json.loads(line))
-    return tuple(fault_changes(lines))
+    """Return what the supervisor did to processes."""
+    return tuple(fault_changes(read(folder, FAULT)))
 
 
 def fault_changes(value: object) -> Iterator[FaultChange]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from alula.report.deaths import DIED, Death
 from alula.report.ends import SIGNAL, Ended, read_end
-from alula.report.waits import read_waits
+from alula.report.run_log import read_waits
 
 MEANING = {
     "accomplished": "mission accomplished",

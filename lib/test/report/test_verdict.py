@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 
 from alula.report.deaths import Death
 from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, Ended, ended_by_signal, note_end, read_end
+from alula.report.run_log import FILE, note_wait
 from alula.report.verdict import verdict_lines
 
 LATER = {"detected_s": 40.5, "fallback_running_s": None, "moving_again_s": None}
@@ -82,7 +82,7 @@ NO_CLOCK = "the mission clock did not begin within 120 s: nothing came from Ardu
     [
         ("aborted", SIGINT, Ended(SUPERVISOR, NO_CLOCK), f"mission ended by the supervisor: {NO_CLOCK}"),
         ("aborted", SIGINT, Ended(OPERATOR, "Ctrl-C"), "mission aborted by the operator: Ctrl-C"),
-        ("aborted", SIGINT, Ended(SIGNAL, "SIGTERM to ./alula fly"), "mission aborted from outside: SIGTERM to ./alula fly"),
+        ("aborted", SIGINT, Ended(SIGNAL, "SIGTERM to alula run"), "mission aborted from outside: SIGTERM to alula run"),
         ("aborted", SIGTERM, None, "mission aborted from outside: told to end by SIGTERM"),
         ("aborted", "aborted by the operator", None, "mission aborted by the operator"),
         ("aborted", "the tree raised ValueError: x", None, "mission aborted: the tree raised ValueError: x"),
@@ -105,12 +105,10 @@ def test_a_mission_that_had_come_to_its_end_keeps_its_outcome(tmp_path: Path) ->
 
 
 def test_what_a_run_still_waited_for_at_its_end_is_told(tmp_path: Path) -> None:
-    waits = [
-        {"for": "ArduPilot on UDP 9002", "over": False},
-        {"for": "the autopilot", "over": False},
-        {"for": "the autopilot", "over": True},
-    ]
-    (tmp_path / "waits.jsonl").write_text("".join(json.dumps(wait) + "\n" for wait in waits) + '{"for": "cut', encoding="utf-8")
+    for what, over in (("ArduPilot on UDP 9002", False), ("the autopilot", False), ("the autopilot", True)):
+        note_wait(tmp_path, what, over=over)
+    with (tmp_path / FILE).open("a", encoding="utf-8") as file:
+        file.write('{"kind": "wait", "for": "cut')
     lines = verdict_lines({"outcome": "not_started", "reason": "the mission clock stands still", "landed": None}, [], tmp_path)
     assert lines[1:] == ["the mission could not start: the mission clock stands still", "  it still waited for ArduPilot on UDP 9002"]
 
@@ -118,14 +116,14 @@ def test_what_a_run_still_waited_for_at_its_end_is_told(tmp_path: Path) -> None:
 def test_a_folder_that_is_gone_or_holds_nonsense_ends_nothing_else(tmp_path: Path) -> None:
     note_end(tmp_path / "gone", Ended(OPERATOR, "Ctrl-C"))
     assert read_end(tmp_path / "gone") is None
-    for nonsense in ("", "[]", '{"by": 1}', '{"who": "x"}'):
-        (tmp_path / "ended.json").write_text(nonsense, encoding="utf-8")
+    for nonsense in ("", "[]", '{"kind": "end", "by": 1}', '{"kind": "end", "who": "x"}'):
+        (tmp_path / FILE).write_text(nonsense, encoding="utf-8")
         assert read_end(tmp_path) is None
 
 
 def test_a_signal_to_the_command_is_the_operators_when_it_is_ctrl_c() -> None:
     assert ended_by_signal(signal.SIGINT) == Ended(OPERATOR, "Ctrl-C")
-    assert ended_by_signal(signal.SIGHUP) == Ended(SIGNAL, "SIGHUP to ./alula fly")
+    assert ended_by_signal(signal.SIGHUP) == Ended(SIGNAL, "SIGHUP to alula run")
 
 
 def test_an_outcome_is_told_with_its_reason() -> None:

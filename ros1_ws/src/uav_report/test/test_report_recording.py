@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from pathlib import Path
@@ -13,11 +12,11 @@ import pytest
 from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
 from alula.console.entries import FAULT, HEALTH, PATH
+from alula.report import run_log
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History
 from alula.report.making import fault_entries
-from alula.report.observed import PROCESS_FAULTS
 from alula.report.part import Run
 from uav_report.flight import FlightReport
 from uav_report.page import page_entries
@@ -65,7 +64,7 @@ def test_what_the_page_is_told_of_the_bag(tmp_path):
 def test_the_page_is_told_of_sensors_and_processes_that_were_made_to_fail_in_the_order_of_time(tmp_path):
     faults = [{"sensor": "zed", "mode": mode, "t_s": LIFT_OFF_S + t_s} for mode, t_s in (("dark", 3.0), ("ok", 7.0))]
     write_bag(tmp_path / "functional.bag", poses=STRAIGHT, states=[{**STATE, "faults": faults}])
-    (tmp_path / PROCESS_FAULTS).write_text(json.dumps({"sensor": "encoder", "mode": "killed", "t_s": LIFT_OFF_S + 5.0}) + "\n")
+    run_log.note(tmp_path, run_log.FAULT, {"sensor": "encoder", "mode": "killed", "t_s": LIFT_OFF_S + 5.0})
     run = Run(RunFacts("mapping", 0, tmp_path, (), (), None), load_scenario("mapping"), History(), Problems())
     entries = fault_entries(FlightReport(run).observe(run))
     told = [(t_s - LIFT_OFF_S, value["sensor"], value["mode"]) for topic, t_s, value in entries if topic == FAULT]

@@ -12,7 +12,7 @@ import pytest
 
 from alula.common.record import FILE as RECORD
 from alula.records.errors import AnalysisError
-from alula.report import making
+from alula.report import making, run_log
 from alula.report.facts import RunFacts
 from alula.report.making import make_report
 
@@ -167,7 +167,7 @@ def test_a_process_that_nothing_hung_on_dies_without_a_recovery(tmp_path):
 
 def test_a_process_that_a_fault_has_ended_is_told_once(tmp_path):
     applied = {"sensor": "encoder", "mode": "killed", "t_s": LIFT_OFF_S + 20.0}
-    (tmp_path / "process_faults.jsonl").write_text(json.dumps(applied) + "\n")
+    run_log.note(tmp_path, run_log.FAULT, applied)
     summary = report(tmp_path, flight(scenario="inspection"), scenario="inspection", died={"video_stream": 20.1, "perception": 25.0})
     assert [(one["sensor"], one["mode"]) for one in summary["answers"]] == [("encoder", "killed"), ("perception", "died")]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.campaign import mock_run
+from alula.commands import run as over_mocks
 from alula.common.faults import FaultRequest
 from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
 from alula.missions.director import Outcome
@@ -172,11 +172,11 @@ WITHOUT_EYES = [
 
 
 def arguments(out: Path, *more: str) -> list[str]:
-    return ["mapping", "--out", str(out), *more]
+    return ["mapping", "--mock", "--out", str(out), *more]
 
 
 def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
-    assert mock_run.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
+    assert over_mocks.main(arguments(tmp_path / "run", "--fail", "zed@8", "--fail", "lidar@8")) == 1
     mission = json.loads((tmp_path / "run/mission.json").read_text())
     assert (mission["outcome"], mission["waypoints_reached"]) == ("given_up", 1)
     record = read_record(tmp_path / "run")
@@ -205,10 +205,9 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
 
 
 def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run/skills.mcap").symlink_to("/dev/full")
-    assert mock_run.main(arguments(tmp_path / "run")) == 0
-    mission = json.loads((tmp_path / "run/mission.json").read_text())
+    (tmp_path / "skills.mcap").symlink_to("/dev/full")
+    assert MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(INPUTS), out=tmp_path).run().outcome is Outcome.ACCOMPLISHED
+    mission = json.loads((tmp_path / "mission.json").read_text())
     assert mission["outcome"] == "accomplished"
     assert mission["problems"] == ["skills.mcap ends early: No space left on device"]
 
@@ -223,14 +222,14 @@ def test_a_folder_that_goes_away_in_flight_does_not_end_it(tmp_path):
 
 
 def test_a_wrong_request_ends_2_and_writes_nothing(tmp_path, capsys):
-    assert mock_run.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
-    assert capsys.readouterr().err == "there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, control\n"
+    assert over_mocks.main(arguments(tmp_path / "run", "--fail", "imu@8")) == 2
+    assert capsys.readouterr().err == "alula run: there is no fault 'imu' in the behaviour; it has zed, lidar, pilot, control\n"
     assert not (tmp_path / "run").exists()
 
 
 def test_no_ros_is_needed(tmp_path):
     code = (
-        "import sys; from alula.campaign.mock_run import main; code = main(sys.argv[1:]);"
+        "import sys; from alula.commands.run import main; code = main(sys.argv[1:]);"
         "assert not {m for m in sys.modules if m.startswith(('rclpy', 'rospy', 'geometry_msgs'))}; sys.exit(code)"
     )
     subprocess.run([sys.executable, "-c", code, *arguments(tmp_path / "run")], check=True, env=dict(os.environ), timeout=60)

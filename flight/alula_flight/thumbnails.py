@@ -1,6 +1,6 @@
-"""The album of a flight: small pictures of what the depth camera measures and of what the telepilot sees, for the operator's page.
+"""Thumbnails of the robot's cameras, for the operator's page.
 
-Images are large, so each camera is subscribed to for one image at a time; nothing in the flight waits for it.
+Images are large, so each camera is subscribed to for one image at a time; nothing in the run waits for it.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import base64
 import json
 import logging
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from queue import Queue
 from typing import Any
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 
 from alula.console.entries import PICTURES_FILE
 
-CAMERAS = {"depth": "/zed_depth/depth", "screen": "/ground_station/screen"}
 WIDTH_PX = 256
 QUALITY = 55
 DEPTH_M = 20.0
@@ -29,7 +29,7 @@ STEADY_S = 300.0
 """Later than so long after its first picture, a camera's pictures become rarer in proportion: hours fit into some megabytes."""
 COLOURS = {"rgb8": cv2.COLOR_RGB2BGR, "bgr8": None, "mono8": cv2.COLOR_GRAY2BGR}
 
-log = logging.getLogger("alula.album")
+log = logging.getLogger("alula.thumbnails")
 
 
 def pixels_of(message: Any) -> NDArray[np.uint8]:
@@ -86,17 +86,17 @@ def next_image(topic: str) -> Any:
         subscriber.unregister()
 
 
-class Album:
+class Thumbnails:
     """Writes ``pictures.jsonl`` into a run's folder: ``{stamp_s, camera, jpeg}``, mission clock and base64. Needs an initialised rospy."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / PICTURES_FILE
         self._lock = threading.Lock()
 
-    def listen(self) -> None:
-        """Begin; ends with the process."""
-        for camera, topic in CAMERAS.items():
-            threading.Thread(target=self._follow, args=(camera, topic), name=f"album {camera}", daemon=True).start()
+    def listen(self, cameras: Mapping[str, str]) -> None:
+        """Begin with the topics of some cameras; ends with the process."""
+        for camera, topic in cameras.items():
+            threading.Thread(target=self._follow, args=(camera, topic), name=f"thumbnails {camera}", daemon=True).start()
 
     def _follow(self, camera: str, topic: str) -> None:
         import rospy

@@ -1,4 +1,4 @@
-"""The front of ``./alula fly``: checks the request, starts the supervisor, shows what happens, and never leaves anything running.
+"""The front of a live ``alula run``: checks the request, starts the supervisor, shows what happens, and never leaves anything running.
 
 1. read the command line                  4. when it is over, end whatever is left of the run
 2. claim folder, ports and DDS domain     5. make the report from what was recorded
@@ -10,41 +10,37 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import psutil
 
-from alula.common.network import DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain, udp_ports_of
+from alula.common.network import DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
 from alula.common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
-from alula.common.scenarios import load_scenario
+from alula.common.robots import RobotError
+from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.shared_memory import sweep_shared_memory
 from alula.common.signals import Interrupts
+from alula.live.part import part_of_robot
+from alula.live.spec import FILE, RequestError, RunSpec
 from alula.records.conformance import Monitor
 from alula.records.models import models_of
-from alula.report.deaths import Death
+from alula.report.deaths import Death, describe_exit, note_death
 from alula.report.ends import FRONT, Ended, ended_by_signal, note_end
 from alula.report.live import LiveEvents
-from alula_flight.autopilot import body_port, command_of_ardupilot, read_connection
 from alula_flight.beside import page_beside
-from alula_flight.command_line import parse
-from alula_flight.deaths import DeathRecord, describe_exit
+from alula_flight.command_line import parse, with_domain
 from alula_flight.ending import CANNOT_START, GIVEN_UP, finish
-from alula_flight.mocked import STOPPING, MockFront
-from alula_flight.spec import RequestError, RunSpec
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
-MISSION_TIMEOUT_S = 150.0  # wall clock; stop, hover, land
+MISSION_TIMEOUT_S = 150.0  # wall clock; to bring the robot to rest
 TIMEOUT_S = 3.0  # wall clock, for what is left of a run to end by itself
 MISSION_NODE = "mission"
-RADIO_PORT, RADIO_PORTS = 20_000, 10
-SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
+STOPPING = "stopping: the robot comes to rest first; Ctrl-C again ends everything at once"
 
 
 def _die_with_parent() -> None:
@@ -78,17 +74,17 @@ def start_supervisor(spec: RunSpec, spec_path: Path, claim: DomainClaim) -> subp
 
 
 class Front:
-    """Watches the supervisor; the first Ctrl-C lands the vehicle, the second ends everything at once."""
+    """Watches the supervisor; the first Ctrl-C has the robot come to rest, the second ends everything at once."""
 
     def __init__(self, spec: RunSpec, claim: DomainClaim, say: Callable[[str], None], monitor: Monitor | None = None) -> None:
         self._spec = spec
         self._claim = claim
         self._say = say
         self._monitor = monitor
-        self._interrupts = Interrupts(self._land, lambda: say("ending everything at once"))
+        self._interrupts = Interrupts(self._stop, lambda: say("ending everything at once"))
         self._supervisor: subprocess.Popen[bytes] | None = None
 
-    def fly(self, spec_path: Path) -> int:
+    def run(self, spec_path: Path) -> int:
         """Run the supervisor to its end and return the mission's exit code; the run's processes are gone afterwards."""
         self._interrupts.install()
         supervisor = self._supervisor = start_supervisor(self._spec, spec_path, self._claim)
@@ -102,24 +98,24 @@ class Front:
                 self._supervisor_died(supervisor.returncode, live)
             live.show_new()
         finally:
-            # At the second Ctrl-C the run is ended at once: a supervisor that is told politely would still try to land.
+            # At the second Ctrl-C the run is ended at once: a supervisor that is told politely would still bring the robot to rest.
             end_run(self._spec.run_id, timeout_s=0.0 if self._interrupts.at_once else TIMEOUT_S)
             supervisor.wait()
             sweep_shared_memory()
         return supervisor.returncode if supervisor.returncode in {0, GIVEN_UP, CANNOT_START} else GIVEN_UP
 
-    def _land(self) -> None:
+    def _stop(self) -> None:
         self._say(STOPPING)
         note_end(Path(self._spec.out_dir), ended_by_signal(self._interrupts.first))
         if self._supervisor is not None and self._supervisor.poll() is None:
             self._supervisor.send_signal(signal.SIGINT)
 
     def _supervisor_died(self, code: int, live: LiveEvents) -> None:
-        """Let the mission land the vehicle; it lives in a session of its own and knows nothing of its parents."""
-        record = DeathRecord(Path(self._spec.out_dir) / "deaths.jsonl")
-        record.add(Death("supervisor", describe_exit(code), None))
-        note_end(Path(self._spec.out_dir), Ended(FRONT, "the supervisor died"))
-        self._say("the supervisor died; the mission lands the vehicle")
+        """Let the mission bring the robot to rest; it lives in a session of its own and knows nothing of its parents."""
+        out = Path(self._spec.out_dir)
+        note_death(out, Death("supervisor", describe_exit(code), None))
+        note_end(out, Ended(FRONT, "the supervisor died"))
+        self._say("the supervisor died; the mission brings the robot to rest")
         missions = [process for process in processes_of_run(self._spec.run_id) if node_name(process) == MISSION_NODE]
         for mission in missions:
             with contextlib.suppress(psutil.NoSuchProcess):
@@ -131,44 +127,30 @@ class Front:
 
 
 def main(arguments: list[str]) -> int:
-    """Fly; return 0 accomplished, 1 given up, 2 could not start."""
+    """Run; return 0 accomplished, 1 given up, 2 could not start."""
     try:
-        request = parse(arguments)
-        if request.mock:
-            return fly_mocked(request)
+        part = part_of_robot()
+        request = parse(arguments, part)
         claim = claim_domain()
-        spec = with_ports(request, claim.domain)
-    except (RequestError, NoFreeDomainError, NoFreePortError) as error:
-        sys.stderr.write(f"alula fly: {error}\n")
+        spec = with_domain(request, claim.domain, part)
+    except (RequestError, RobotError, ScenarioError, NoFreeDomainError, NoFreePortError) as error:
+        sys.stderr.write(f"alula run: {error}\n")
         return CANNOT_START
     out = Path(spec.out_dir)
     try:
         (out / "logs").mkdir(parents=True)
+        spec.save(out / FILE)
     except OSError as error:
-        sys.stderr.write(f"alula fly: can't make the folder {out}: {error.strerror}; choose another with --out\n")
+        sys.stderr.write(f"alula run: can't make the folder {out}: {error.strerror}; choose another with --out\n")
         return CANNOT_START
-    spec_path = out / "run.json"
-    spec.save(spec_path)
     say = announce(spec)
-    if spec.body_port:
-        command = command_of_ardupilot(read_connection(spec.autopilot or ""), spec.body_port)
-        say(f"ArduPilot, where it does not run yet, is started with: {command}")
-    if spec.record == "sensors":
-        say(sensors_words(out))
+    for line in part.words(spec):
+        say(line)
     monitor = monitor_of(spec)
     with page_beside(out, say) if spec.console else contextlib.nullcontext():
-        code = Front(spec, claim, say, monitor).fly(spec_path)
+        code = Front(spec, claim, say, monitor).run(out / FILE)
         say("making the report")
         return finish(spec, code, monitor)
-
-
-def with_ports(request: RunSpec, domain: int) -> RunSpec:
-    """Return the run with its domain, and the UDP ports that only it takes; raises RequestError, NoFreePortError."""
-    port = request.body_port
-    if request.sensors == "simulated" and request.autopilot is not None and not port:
-        port = body_port(read_connection(request.autopilot), domain)
-    radio_port = udp_ports_of(domain, first=RADIO_PORT, step=RADIO_PORTS, count=RADIO_PORTS)
-    return replace(request, domain=domain, body_port=port, radio_port=radio_port)
 
 
 def monitor_of(spec: RunSpec) -> Monitor | None:
@@ -176,35 +158,8 @@ def monitor_of(spec: RunSpec) -> Monitor | None:
     return Monitor(models_of(load_scenario(spec.scenario).skillsets)) if spec.monitor else None
 
 
-def sensors_words(out: Path) -> str:
-    """Return how much the raw measurements will take, and how much there is."""
-    free_gb, minutes_gb = shutil.disk_usage(out).free / 1e9, 120 * SENSORS_MB_S / 1e3
-    return (
-        f"functional.bag will hold raw measurements: about {SENSORS_MB_S:g} MB a second of flight, {minutes_gb:.1f} GB for two minutes; "
-        f"{free_gb:.0f} GB are free, and the last one is left alone"
-    )
-
-
-def fly_mocked(spec: RunSpec) -> int:
-    """Fly over mocks; raise RequestError when that can't be, and leave nothing behind then."""
-    say = announce(spec)
-    monitor = monitor_of(spec)
-    code, words = MockFront(spec, say, monitor).fly()
-    out = Path(spec.out_dir)
-    if code == CANNOT_START and not (out / "mission.json").exists():
-        raise RequestError(words.strip() or "the mission could not start")
-    try:
-        spec.save(out / "run.json")
-        (out / "logs").mkdir(exist_ok=True)
-        (out / "logs" / "mission.log").write_text(words, encoding="utf-8")
-    except OSError as error:
-        say(f"{error.filename} could not be written: {error.strerror}")
-    say("making the report")
-    return finish(spec, code, monitor)
-
-
 def announce(spec: RunSpec) -> Callable[[str], None]:
-    """Say what is going to be flown; return what says a line with the seconds since then."""
+    """Say what is going to be run; return what says a line with the seconds since then."""
     started = time.monotonic()
 
     def say(line: str) -> None:
@@ -212,7 +167,7 @@ def announce(spec: RunSpec) -> Callable[[str], None]:
         sys.stderr.flush()
 
     failing = f", failing {', '.join(spec.faults)}" if spec.faults else ""
-    say(f"flying '{spec.scenario}'{' over mocks' if spec.mock else ''}, seed {spec.seed}{failing}; results in {spec.out_dir}")
+    say(f"running '{spec.scenario}', seed {spec.seed}{failing}; results in {spec.out_dir}")
     return say
 
 

@@ -7,17 +7,22 @@ import socket
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from genpy import Time
+from rosgraph_msgs.msg import Clock
+from uav_flight_requests import flight_of, launch_arguments, parse, with_domain
 
 from alula.common.network import NoFreePortError, free_port, udp_port_is_free, udp_ports_of
+from alula.live.spec import RequestError, RunSpec
 from alula.report.live import LiveEvents
-from alula.report.waits import read_waits
-from alula_flight.autopilot import body_port, check_connection, command_of_ardupilot, read_connection, read_sensors
-from alula_flight.command_line import parse
-from alula_flight.fly import RADIO_PORTS, main, with_ports
-from alula_flight.spec import RequestError, RunSpec
-from alula_flight.waits import Beginning, waits_of
+from alula.report.run_log import read_waits
+from alula_flight.mission_clock import MissionClock
+from alula_flight.run import main
+from alula_flight.waits import Beginning
+from uav_flight.autopilot import body_port, check_connection, command_of_ardupilot, read_connection, read_sensors
+from uav_flight.part import RADIO_PORTS, DronePart, Flight
 
 EPHEMERAL = int(Path("/proc/sys/net/ipv4/ip_local_port_range").read_text(encoding="utf-8").split()[0])
 DOMAIN = 77
@@ -38,7 +43,7 @@ def instance() -> int:
 
 def spec_of(tmp_path: Path, autopilot: str, *more: str, sensors: str = "simulated") -> RunSpec:
     words = ["mapping", "--autopilot", autopilot, "--sensors", sensors, "--out", str(tmp_path / "run"), *more]
-    return with_ports(parse(words), DOMAIN)
+    return with_domain(parse(words), DOMAIN)
 
 
 # --- ports -------------------------------------------------------------------------------------------------------------------
@@ -46,21 +51,21 @@ def spec_of(tmp_path: Path, autopilot: str, *more: str, sensors: str = "simulate
 
 def test_the_radios_ports_are_a_runs_own_and_no_outgoing_connection_gets_them(tmp_path: Path) -> None:
     request = parse(["inspection", "--out", str(tmp_path / "run")])
-    first = {domain: with_ports(request, domain).radio_port for domain in range(1, 102)}
+    first = {domain: flight_of(request, domain).radio_port for domain in range(1, 102)}
     ports = {port + n for port in first.values() for n in range(RADIO_PORTS)}
     assert len(ports) == RADIO_PORTS * len(first), "no two runs meet"
     assert max(ports) < EPHEMERAL
-    assert f"radio_port:={first[DOMAIN]}" in with_ports(request, DOMAIN).launch_arguments()
+    assert f"radio_port:={first[DOMAIN]}" in launch_arguments(with_domain(request, DOMAIN))
 
 
 @pytest.mark.parametrize("nth", [0, 4, 9])
 def test_ports_that_another_program_holds_are_left_to_it(nth: int, holder: socket.socket, tmp_path: Path) -> None:
     request = parse(["inspection", "--out", str(tmp_path / "run")])
-    before = with_ports(request, DOMAIN).radio_port
+    before = flight_of(request, DOMAIN).radio_port
     holder.bind(("127.0.0.1", before + nth))
-    after = with_ports(request, DOMAIN).radio_port
+    after = flight_of(request, DOMAIN).radio_port
     assert all(udp_port_is_free(after + n) for n in range(RADIO_PORTS))
-    assert after not in {with_ports(request, other).radio_port for other in range(1, 102) if other != DOMAIN}
+    assert after not in {flight_of(request, other).radio_port for other in range(1, 102) if other != DOMAIN}
 
 
 def test_ports_that_are_all_held_are_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -79,20 +84,21 @@ def test_the_body_is_where_the_instance_looks_for_it(more: int, instance: int, t
     """ArduPilot's instance N has MAVLink on TCP 5760 + 10 N and the next ports, and looks for the body on UDP 9002 + 10 N."""
     url = f"tcp:127.0.0.1:{5760 + 10 * instance + more}"
     spec = spec_of(tmp_path, url)
-    assert f"ardupilot_port:={9002 + 10 * instance}" in spec.launch_arguments()
-    said = command_of_ardupilot(read_connection(url), spec.body_port)
+    assert f"ardupilot_port:={9002 + 10 * instance}" in launch_arguments(spec)
+    said = command_of_ardupilot(read_connection(url), Flight.of(spec).body_port)
     assert said.startswith(f"arducopter -w --model JSON:127.0.0.1 -I{instance} --speedup 100 --defaults ")
 
 
 def test_an_autopilot_behind_a_port_that_is_no_instances_is_told_which_it_is(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, "tcp:127.0.0.1:15760")
-    assert (spec.body_port - 9002) % 10 == 0
-    assert f" -I{(spec.body_port - 9002) // 10} --speedup " in command_of_ardupilot(read_connection("tcp:127.0.0.1:15760"), spec.body_port)
+    port = Flight.of(spec).body_port
+    assert (port - 9002) % 10 == 0
+    assert f" -I{(port - 9002) // 10} --speedup " in command_of_ardupilot(read_connection("tcp:127.0.0.1:15760"), port)
 
 
 def test_two_flights_whose_autopilots_send_to_a_port_get_bodies_apart(tmp_path: Path) -> None:
     request = parse(["mapping", "--autopilot", f"udpin:127.0.0.1:{free_port()}", "--sensors", "simulated", "--out", str(tmp_path / "run")])
-    ports = {with_ports(request, domain).body_port for domain in range(1, 102)}
+    ports = {flight_of(request, domain).body_port for domain in range(1, 102)}
     assert len(ports) == 101
     assert {port % 10 for port in ports} == {2}
 
@@ -105,7 +111,7 @@ def test_a_body_port_that_is_held_is_refused_with_what_to_do(holder: socket.sock
     with pytest.raises(RequestError, match=f"--physics-port {held}: UDP port {held}"):
         spec_of(tmp_path, url, "--physics-port", f"{held}")
     port = free_port()
-    assert spec_of(tmp_path, url, "--physics-port", str(port)).body_port == port
+    assert Flight.of(spec_of(tmp_path, url, "--physics-port", str(port))).body_port == port
     assert f" -I{instance} --sim-port-out {port} " in command_of_ardupilot(read_connection(url), port)
     assert body_port(read_connection("udpin:127.0.0.1:14550"), DOMAIN) != held
 
@@ -138,41 +144,52 @@ def test_a_port_to_listen_on_that_is_held_is_refused(holder: socket.socket) -> N
 # --- what a run waits for ----------------------------------------------------------------------------------------------------
 
 
+def told(spec: RunSpec, **own: object) -> RunSpec:
+    """Return a run of which something is otherwise."""
+    return replace(spec, own={**spec.own, **own})
+
+
 def test_it_is_said_for_what_a_run_waits(tmp_path: Path) -> None:
+    part = DronePart()
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.bind(("127.0.0.1", 0))
         url = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-        spec = replace(spec_of(tmp_path, url), body_port=9772)
-        clock, refused = "ArduPilot on UDP 9772, whose first step begins the mission clock", f"the autopilot at {url}: connection refused"
-        assert waits_of(spec, clock=False, link=False) == [clock, f"{refused}, nothing listens there"]
+        spec = told(spec_of(tmp_path, url), body_port=9772)
+        assert part.clock_source(spec) == "ArduPilot on UDP 9772"
+        assert part.waits(spec, clock=False) == [f"the autopilot at {url}: connection refused, nothing listens there"]
         server.listen(1)
-        assert waits_of(spec, clock=False, link=False) == [clock]
-        assert waits_of(spec, clock=True, link=False) == [f"the autopilot at {url}: no heartbeat has come"]
-        assert waits_of(spec, clock=True, link=True) == []
+        assert part.waits(spec, clock=False) == []
+        assert part.waits(spec, clock=True) == [f"the autopilot at {url}: no heartbeat has come"]
+        part._hear_guidance(SimpleNamespace(link=True))
+        assert part.waits(spec, clock=True) == []
     udp = f"udpin:127.0.0.1:{free_port()}"
-    real = replace(spec, autopilot=udp, sensors="")
-    assert waits_of(real, clock=True, link=False) == [f"the autopilot at {udp}: no heartbeat has come there"]
-    followed = replace(spec, autopilot=udp, sensors="followed:udpin:127.0.0.1:14551")
-    where = "the autopilot that is followed, at udpin:127.0.0.1:14551"
-    assert waits_of(followed, clock=False, link=False) == [f"{where}, whose first step begins the mission clock"]
-    simulated = replace(spec, autopilot=None, sensors="")
-    assert waits_of(simulated, clock=True, link=False) == []
+    real = told(spec, autopilot=udp, sensors="")
+    assert DronePart().waits(real, clock=True) == [f"the autopilot at {udp}: no heartbeat has come there"]
+    followed = told(spec, autopilot=udp, sensors="followed:udpin:127.0.0.1:14551")
+    assert part.clock_source(followed) == "the autopilot that is followed, at udpin:127.0.0.1:14551"
+    simulated = told(spec, autopilot=None, sensors="")
+    assert (part.clock_source(simulated), DronePart().waits(simulated, clock=True)) == ("the simulator", [])
 
 
 def test_each_wait_is_shown_once_and_remembered_until_it_is_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("alula_flight.waits.LOOK_S", 0.0)
+    monkeypatch.setattr("alula_flight.waits.TELL_CLOCK_S", 0.0)
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
         server.bind(("127.0.0.1", 0))
         url = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-        spec = replace(spec_of(tmp_path, url), body_port=9772, out_dir=str(tmp_path))
-        beginning, said = Beginning(spec), list[str]()
+        spec = replace(told(spec_of(tmp_path, url), body_port=9772), out_dir=str(tmp_path))
+        clock = MissionClock()
+        clock.begin(simulated=True)
+        beginning, said = Beginning(spec, DronePart(), clock), list[str]()
         live = LiveEvents(tmp_path, said.append)
-        for clock in (False, False, True, True):
-            beginning.look(clock=clock)
+        for tick in (False, False, True, True):
+            if tick:
+                clock._tick(Clock(clock=Time(1)))
+            beginning.look()
             live.show_new()
         waited = ["ArduPilot on UDP 9772", f"the autopilot at {url}: connection refused"]
         assert [line.partition(",")[0] for line in said] == [f"waiting for {what}" for what in waited]
         assert list(read_waits(tmp_path).values()) == [True, False]
         server.listen(1)
-        beginning.look(clock=True)
+        beginning.look()
         assert list(read_waits(tmp_path).values()) == [True, True, False], "it listens, but has said nothing yet"

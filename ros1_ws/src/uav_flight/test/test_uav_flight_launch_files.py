@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 from roslaunch.config import ROSLaunchConfig, load_config_default
+from uav_flight_requests import launch_arguments, parse, with_domain
 
 from alula.common.scenarios import load_scenario, scenario_names
-from alula_flight.command_line import parse
-from alula_flight.fly import with_ports
+from uav_flight.part import Flight
 
-LAUNCH = Path(__file__).parents[2] / "ros1_ws/src/uav_bringup/launch"
+LAUNCH = Path(__file__).parents[2] / "uav_bringup/launch"
 
 
 def launched(scenario: str, tmp_path: Path, *arguments: str) -> ROSLaunchConfig:
@@ -34,22 +34,26 @@ def test_simulated_time_waits_only_for_nodes_that_the_scenario_starts(scenario: 
 def test_what_the_command_line_asks_for_reaches_the_nodes(scenario: str, tmp_path: Path) -> None:
     words = ["--autopilot", "tcp:127.0.0.1:15760", "--sensors", "simulated", "--imperfections", "realistic", "--record", "sensors"]
     words += ["--seed", "7", "--rate", "3", "--fail", "zed@30", "--world", "forest", "--out", str(tmp_path / "run")]
-    spec = with_ports(parse([scenario, *words]), 77)
-    config = launched(scenario, tmp_path, *spec.launch_arguments())
+    spec = with_domain(parse([scenario, *words]), 77)
+    config = launched(scenario, tmp_path, *launch_arguments(spec))
     given = {name.rpartition("/")[2]: param.value for name, param in config.params.items() if name.startswith("/uav_simulator/")}
     expected = {"seed": 7, "rate": 3.0, "faults": "zed@30", "vehicle": "ardupilot", "imperfections": "realistic", "world": spec.world}
-    expected |= {"ardupilot_port": spec.body_port, "mavlink_port": spec.mavlink_port}
+    flight = Flight.of(spec)
+    expected |= {"ardupilot_port": flight.body_port, "mavlink_port": flight.mavlink_port}
     assert {name: given[name] for name in expected} == expected
-    assert config.params["/uav_guidance/url"].value == spec.autopilot
+    assert config.params["/uav_guidance/url"].value == flight.autopilot
     (record,) = [node for node in config.nodes if node.name == "record"]
     assert "/zed/left/image_raw" in record.args
 
 
 def test_the_radios_faults_and_ports_reach_the_nodes(tmp_path: Path) -> None:
-    spec = with_ports(parse(["inspection", "--fail", "radio@40", "--fail", "control@50", "--out", str(tmp_path / "run")]), 77)
-    params = {name: param.value for name, param in launched("inspection", tmp_path, *spec.launch_arguments()).params.items()}
+    spec = with_domain(parse(["inspection", "--fail", "radio@40", "--fail", "control@50", "--out", str(tmp_path / "run")]), 77)
+    params = {name: param.value for name, param in launched("inspection", tmp_path, *launch_arguments(spec)).params.items()}
     assert params["/radio_link/faults"] == "radio@40,control@50"
-    ports = [params[name] - spec.radio_port for name in ("/radio_link/base_port", "/ground_station/video_port", "/uav_simulator/gcs_port")]
+    ports = [
+        params[name] - Flight.of(spec).radio_port
+        for name in ("/radio_link/base_port", "/ground_station/video_port", "/uav_simulator/gcs_port")
+    ]
     assert ports == [0, 1, 5]
 
 
@@ -58,7 +62,7 @@ def test_every_argument_of_a_run_is_declared_and_has_one_default(tmp_path: Path)
     texts = [path.read_text(encoding="utf-8") for path in LAUNCH.glob("*.launch")]
     declared = {name for text in texts for name in re.findall(r'<arg name="(\w+)" (?:default="[^"]*" )?doc="[^"]+"/>', text)}
     spec = parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", "--out", str(tmp_path / "run")])
-    assert {word.partition(":=")[0] for word in spec.launch_arguments()} <= declared
+    assert {word.partition(":=")[0] for word in launch_arguments(spec)} <= declared
     defaults = Counter(name for text in texts for name in set(re.findall(r'<arg name="(\w+)" default=', text)))
     # Each scenario has a world of its own, and the radio has a seed, too.
     assert {name for name, count in defaults.items() if count > 1} <= {"world", "seed"}

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from alula_flight.album import CAMERAS, DEPTH_M, WIDTH_PX, Album, depth_picture, period_s, pixels_of, thumbnail
+from alula_flight.thumbnails import DEPTH_M, WIDTH_PX, Thumbnails, depth_picture, period_s, pixels_of, thumbnail
 
 
 def image(pixels: np.ndarray, encoding: str) -> SimpleNamespace:
@@ -86,13 +86,13 @@ class Camera:
 def test_a_camera_is_subscribed_to_for_one_image_a_second(ros_master: str, tmp_path: Path) -> None:
     written: Queue[float] = Queue()
 
-    class Watched(Album):
+    class Watched(Thumbnails):
         def add(self, camera: str, stamp_s: float, message: object) -> None:
             super().add(camera, stamp_s, message)
             written.put(stamp_s)
 
-    Watched(tmp_path).listen()
-    camera = Camera(CAMERAS["depth"])
+    Watched(tmp_path).listen({"depth": "/camera/depth"})
+    camera = Camera("/camera/depth")
     stamps_s = [written.get(timeout=60.0) for _ in range(2)]
     lines = [json.loads(line) for line in (tmp_path / "pictures.jsonl").read_text().splitlines()]
     assert [line["camera"] for line in lines] == ["depth"] * 2

@@ -1,4 +1,4 @@
-"""``python3 -m sensor_replay BAG OUT [--fail zed@20] [--set zed_depth.NAME=VALUE]``: perceive a recorded flight again.
+"""``python3 -m uav_flight.sensor_replay BAG OUT [--fail zed@20] [--set zed_depth.NAME=VALUE]``: perceive a recorded flight again.
 
 The real nodes zed_depth, lidar_obstacles and lidar_mapping get the measurements of a bag (``./alula fly --record sensors``); OUT is the
 bag with what they say now in place of what they said then. Ends with 0, or 2 with one line on standard error.
@@ -23,9 +23,9 @@ import rospy
 import yaml
 
 from alula.common.faults import FaultError
-from sensor_replay import offline
-from sensor_replay.faults import TOPICS, Faults, read_faults
-from sensor_replay.nodes import NODES, node_and_parameter
+from uav_flight.sensor_replay import offline
+from uav_flight.sensor_replay.faults import TOPICS, Faults, read_faults
+from uav_flight.sensor_replay.nodes import NODES, node_and_parameter
 
 AGAIN = ("/perception/transition", "/mapping/transition")
 """Calls that the nodes make again."""
@@ -163,7 +163,7 @@ class Perception:
 
 def main(words: Sequence[str] | None = None) -> int:
     """Perceive again; return the exit code."""
-    parser = argparse.ArgumentParser(prog="sensor_replay", description="Perceive a recorded flight again.")
+    parser = argparse.ArgumentParser(prog="uav_flight.sensor_replay", description="Perceive a recorded flight again.")
     parser.add_argument("bag", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--fail", action="append", default=[])

@@ -1,0 +1,31 @@
+"""What roslaunch is asked to start for a run: a scenario's launch file, and its arguments."""
+
+from __future__ import annotations
+
+from alula.common.faults import parse_fault
+from alula.common.scenarios import Scenario, load_scenario
+from alula.live.part import RunPart
+from alula.live.spec import RequestError, RunSpec
+
+
+def launch_file(scenario: Scenario) -> str:
+    """Return the file that a scenario names; raises RequestError."""
+    from roslib.packages import find_resource  # late: importing this module needs no ROS
+
+    if not scenario.launch:
+        raise RequestError(
+            f"the scenario {scenario.name} names no `launch`, so there is nothing to start; add `launch: package/file.launch`, or --mock"
+        )
+    found: list[str] = find_resource(*scenario.launch.split("/"))
+    if not found:
+        raise RequestError(f"the scenario {scenario.name} names {scenario.launch}, which no ROS 1 package of the robot has")
+    return found[0]
+
+
+def launch_arguments(spec: RunSpec, part: RunPart) -> list[str]:
+    """Return the arguments of the scenario's launch file; faults of processes are the supervisor's own."""
+    processes = dict(load_scenario(spec.scenario).processes)
+    faults = [fault for fault in spec.faults if parse_fault(fault).what not in processes]
+    of_every_robot = {"scenario": spec.scenario, "out": spec.out_dir, "seed": spec.seed, "faults": ",".join(faults)}
+    world = {"world": spec.world} if spec.world else {}
+    return [f"{name}:={value}" for name, value in {**of_every_robot, **world, **part.launch_arguments(spec)}.items()]

@@ -1,0 +1,59 @@
+"""The command line of ``alula run``: what live runs and runs over mocks have in common."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import UTC, datetime
+from pathlib import Path
+
+from alula.common.robots import find_robot, wrong_world
+from alula.common.runs import runs_folder
+from alula.common.scenarios import Scenario, scenario_names
+from alula.live.spec import RequestError
+
+FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
+MAX_SEED = 2**31 - 1
+
+
+def run_parser(about: str) -> argparse.ArgumentParser:
+    """Return a parser with the options of every run."""
+    parser = argparse.ArgumentParser(prog="alula run", description=about)
+    parser.add_argument("scenario", help=f"what to run: {', '.join(scenario_names())}")
+    parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="what fails, seconds after the departure")
+    parser.add_argument("--world", default="", metavar="FILE|NAME", help="where: what stands there, inputs (default: the scenario's)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all that is drawn at random (default 0)")
+    parser.add_argument("--out", type=Path, help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
+    parser.add_argument("--monitor", action="store_true", help="hold every event against the models")
+    parser.add_argument("--mock", action="store_true", help="over mocks in virtual time: no simulator, no ROS, a second")
+    return parser
+
+
+def check_seed(seed: int) -> int:
+    """Return a seed that launch files can carry; raises RequestError."""
+    if not 0 <= seed <= MAX_SEED:
+        raise RequestError(f"--seed {seed}: must lie between 0 and {MAX_SEED}")
+    return seed
+
+
+def world_file(scenario: Scenario, wanted: str) -> str:
+    """Return the file of the world that is wanted, or the scenario's; empty where it has none. Raises RequestError."""
+    name = wanted or scenario.world
+    if not name:
+        return ""
+    robot = find_robot()
+    path = robot.world(name)
+    if not path.is_file():
+        raise RequestError(f"--world: {wrong_world(robot, name)}")
+    return str(path.absolute())
+
+
+def run_folder(wanted: Path | None, scenario: str) -> Path:
+    """Return an absolute path that holds no run yet; raises RequestError where the wanted one does."""
+    if wanted is not None:
+        folder = wanted.expanduser().absolute()
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise RequestError(f"--out {wanted}: exists and is not an empty folder; choose another, a run never overwrites")
+        return folder
+    base = runs_folder().absolute() / f"{datetime.now(tz=UTC).astimezone():%Y%m%d-%H%M%S}-{scenario}"
+    candidates = (base, *(base.with_name(f"{base.name}-{n}") for n in range(2, 1000)))
+    return next(folder for folder in candidates if not folder.exists())

@@ -1,0 +1,60 @@
+"""What a live run is asked to be, checked before anything starts, and handed from process to process as one file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from alula.common.files import write_json
+
+FILE = "run.json"
+
+
+class RequestError(Exception):
+    """The command line asks for something that can't be; the message names it and the remedy in one line."""
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """One run.
+
+    Attributes:
+        scenario: its name.
+        out_dir: its folder, absolute.
+        run_id: what all of its processes carry in their environment.
+        seed: of whatever is drawn at random in it.
+        faults: what is to fail, as on the command line.
+        world: file of the world; empty: the scenario has none.
+        master_port: TCP port of its ROS 1 master, on loopback.
+        domain: DDS domain; 0 until it is claimed.
+        console: the operator's page is served beside it.
+        monitor: every event is held against the models.
+        own: what the robot's part has made of its own options, by name; in the file these values stand beside the others.
+    """
+
+    scenario: str
+    out_dir: str
+    run_id: str
+    seed: int = 0
+    faults: tuple[str, ...] = ()
+    world: str = ""
+    master_port: int = 0
+    domain: int = 0
+    console: bool = False
+    monitor: bool = False
+    own: Mapping[str, Any] = field(default_factory=dict)
+
+    def save(self, path: Path) -> None:
+        """Write the specification beside the results."""
+        values = asdict(self)
+        write_json(path, {**values.pop("own"), **values})
+
+    @classmethod
+    def load(cls, path: Path) -> RunSpec:
+        """Read what `save` wrote."""
+        values = json.loads(path.read_text(encoding="utf-8"))
+        own = {name: values.pop(name) for name in set(values) - {one.name for one in fields(cls)}}
+        return cls(**{**values, "faults": tuple(values["faults"]), "own": own})

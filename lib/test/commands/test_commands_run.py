@@ -1,0 +1,70 @@
+"""``alula run SCENARIO --mock``: what does not go together with mocks, what is refused, and who ended it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from alula.commands import run
+from alula.common.record import FILE
+from alula.report.ends import OPERATOR, Ended, read_end
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["mapping"], "without --mock a run needs an installation with ROS"),
+        (["mapping", "--mock", "--autopilot", "tcp:127.0.0.1:5760"], "--autopilot: a run over mocks has no such option"),
+        (["mapping", "--mock", "--rate", "2"], "--rate: a run over mocks has no such option"),
+        (["mapping", "--mock", "--console"], "--console: a run over mocks has no such option"),
+        (["mapping", "--mock", "--fail", "zed@x"], "write WHAT"),
+        (["mapping", "--mock", "--fail", "imu"], "there is no fault 'imu'"),
+        (["mapping", "--mock", "--world", "nowhere"], "there is no world nowhere"),
+        (["mapping", "--mock", "--seed", "-1"], "--seed -1"),
+        (["nosuch", "--mock"], "there is no scenario 'nosuch'"),
+    ],
+)
+def test_what_can_not_be_is_one_line_and_leaves_nothing(words: list[str], complaint: str, tmp_path: Path, capsys) -> None:
+    assert run.main([*words, "--out", str(tmp_path / "run")]) == run.CANNOT_START
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert said.startswith("alula run: ")
+    assert complaint in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_it_leaves_what_a_live_run_leaves(tmp_path: Path, capsys) -> None:
+    out = tmp_path / "run"
+    assert run.main(["mapping", "--mock", "--monitor", "--fail", "zed@20", "--seed", "3", "--out", str(out)]) == 0
+    asked = json.loads((out / "run.json").read_text())
+    assert (asked["scenario"], asked["seed"], asked["faults"], asked["mock"], asked["domain"]) == ("mapping", 3, ["zed@20"], True, 0)
+    assert Path(asked["world"]).is_file()
+    assert {path.name for path in out.iterdir()} >= {FILE, "summary.json", "report.html", "timeline.svg", "tree.svg"}
+    told = capsys.readouterr()
+    assert "mission accomplished in degraded mode" in told.out
+    assert "  perception.zed_status: OK -> BROKEN" in told.err
+
+
+def test_ctrl_c_is_the_operators(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    script = (
+        "import os, signal, sys; from alula.commands import run; from alula.missions.mocked import MockedMission\n"
+        "begin = MockedMission.run\n"
+        "def interrupted(self):\n"
+        "    self.world.clock.after(30.0, lambda: os.kill(os.getpid(), signal.SIGINT))\n"
+        "    return begin(self)\n"
+        "MockedMission.run = interrupted\n"
+        "sys.exit(run.main(sys.argv[1:]))"
+    )
+    words = [sys.executable, "-c", script, "mapping", "--mock", "--out", str(out)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120, env=dict(os.environ))
+    assert done.returncode == 1, done.stderr
+    assert read_end(out) == Ended(OPERATOR, "Ctrl-C")
+    assert "mission aborted by the operator: Ctrl-C" in done.stdout
+    assert json.loads((out / "mission.json").read_text())["reason"] == f"told to end by {signal.SIGINT.name}"

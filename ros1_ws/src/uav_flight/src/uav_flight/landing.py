@@ -1,0 +1,63 @@
+"""Lands the vehicle through the guidance when no mission decides any more."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import Any
+
+import rospy
+from std_msgs.msg import Header
+from uav_msgs.msg import GuidanceState
+from uav_msgs.srv import Command
+
+from alula.live.part import Clock
+
+LANDING_TIMEOUT_S = 90.0  # mission clock; a landing from 20 m takes about 40 s
+STATE_TIMEOUT_S = 30.0  # wall clock until the guidance, perhaps just started again, says how things are
+FOR_EVER_S = 2**31
+
+log = logging.getLogger("alula.landing")
+
+
+class Landing:
+    """One landing. Nothing is done where the vehicle is down already, or where the pilot has it."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._heard, self._down = threading.Event(), threading.Event()
+        self._commanded, self._reference = False, ""
+        self._heartbeat: Any = None
+
+    def land(self) -> None:
+        """Return when the vehicle is down, or when it takes too long."""
+        if self._clock.simulated:
+            self._end_heartbeats()
+        rospy.Subscriber("/uav_guidance/state", GuidanceState, self._look, queue_size=1)
+        if not self._heard.wait(STATE_TIMEOUT_S) or self._down.is_set() or not self._commanded:
+            return
+        end_s = (self._clock.now_s or 0.0) + LANDING_TIMEOUT_S
+        # Again where something else is followed instead: a skill that was running may have answered the first with a hover.
+        while not self._down.is_set() and (self._clock.now_s or 0.0) < end_s and not self._clock.stands_still:
+            if self._reference != "land" and self._commanded:
+                self._command()
+            self._down.wait(1.0)
+
+    def _look(self, state: Any) -> None:
+        self._commanded, self._reference = state.authority, state.reference
+        if not state.armed:
+            self._down.set()
+        self._heard.set()
+
+    def _command(self) -> None:
+        try:
+            rospy.wait_for_service("/uav_guidance/land", timeout=10.0)
+            answer = rospy.ServiceProxy("/uav_guidance/land", Command)()
+            log.info("landing: %s %s", answer.accepted, answer.reason)
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            log.error("the guidance could not be told to land: %s", error)
+
+    def _end_heartbeats(self) -> None:
+        """Have simulated time wait no more for a mission that has ended: its heartbeats came over the bridge, which goes on."""
+        self._heartbeat = rospy.Publisher("/mission/heartbeat", Header, queue_size=1, latch=True)
+        self._heartbeat.publish(Header(stamp=rospy.Time(FOR_EVER_S), frame_id="supervisor"))

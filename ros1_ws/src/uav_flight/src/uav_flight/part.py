@@ -1,0 +1,188 @@
+"""The drone's part of its runs, as ``robot.yaml`` names it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from alula.common.faults import parse_fault
+from alula.common.network import udp_ports_of
+from alula.common.scenarios import Scenario, load_scenario
+from alula.live.part import Clock, Consequence, RunPart
+from alula.live.spec import RequestError, RunSpec
+from uav_flight.autopilot import LISTENS, body_port, command_of_ardupilot, read_connection
+from uav_flight.options import Options, add_options, read_options
+from uav_simulator.errors import ConfigError
+from uav_simulator.sensors.faults import FAULTS
+from uav_simulator.settings import FOLLOWED
+from uav_simulator.world.config import load_world
+
+RADIO_PORT, RADIO_PORTS = 20_000, 10
+SENSORS_MB_S = 4.0  # stereo pair, LiDAR and IMU, compressed; measured in the yard
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What a run knows of the drone.
+
+    Attributes:
+        rate: simulated seconds per second at most; 0: no limit.
+        record: what ``functional.bag`` holds: "functional", or "sensors" for the raw measurements, too.
+        autopilot: MAVLink connection; None for the simulated vehicle.
+        sensors: with an autopilot, "simulated" where the simulator has the body that it flies and the sensors, "followed:URL" where it has
+            the sensors only, which are where the autopilot says over this connection, "" where real drivers run.
+        imperfections: of the simulated autopilot and sensors.
+        mavlink_port: TCP port of the simulated autopilot.
+        body_port: UDP port where ArduPilot's simulator looks for the body, with sensors "simulated"; 0 until the run's domain is known.
+        radio_port: the first of the radio's ten; 0 until then.
+    """
+
+    rate: float = 1.0
+    record: str = "functional"
+    autopilot: str | None = None
+    sensors: str = ""
+    imperfections: str = "off"
+    mavlink_port: int = 0
+    body_port: int = 0
+    radio_port: int = 0
+
+    @classmethod
+    def of(cls, spec: RunSpec) -> Flight:
+        """Return that of a run."""
+        return cls(**{one.name: spec.own[one.name] for one in fields(cls) if one.name in spec.own})
+
+    @property
+    def simulated(self) -> bool:
+        """Tell whether the simulator takes part, with its clock, its truth and its sensors."""
+        return self.autopilot is None or bool(self.sensors)
+
+
+class DronePart(RunPart):
+    """What the drone adds to a run."""
+
+    faults = FAULTS
+    consequences: Mapping[str, Consequence] = {"uav_simulator": Consequence.END}
+    cameras: Mapping[str, str] = {"depth": "/zed_depth/depth", "screen": "/ground_station/screen"}
+
+    def __init__(self) -> None:
+        self._linked = False
+        self._subscribers: list[Any] = []
+
+    # --- in the front -------------------------------------------------------------------------------------------------
+
+    def add_options(self, parser: ArgumentParser) -> None:
+        """Add rate, recording, autopilot, sensors and imperfections."""
+        add_options(parser)
+
+    def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:
+        """Check them."""
+        return read_options(Options(**vars(given)), scenario)
+
+    def check_world(self, path: str) -> None:
+        """Refuse what the simulator can't build."""
+        try:
+            load_world(Path(path))
+        except ConfigError as error:
+            raise RequestError(f"--world: {error}") from None
+
+    def claim(self, spec: RunSpec) -> Mapping[str, Any]:
+        """Take the UDP ports that only this run takes."""
+        flight = Flight.of(spec)
+        port = flight.body_port
+        if flight.sensors == "simulated" and flight.autopilot is not None and not port:
+            port = body_port(read_connection(flight.autopilot), spec.domain)
+        radio_port = udp_ports_of(spec.domain, first=RADIO_PORT, step=RADIO_PORTS, count=RADIO_PORTS)
+        return asdict(replace(flight, body_port=port, radio_port=radio_port))
+
+    def words(self, spec: RunSpec) -> list[str]:
+        """Say how ArduPilot is started, and how much raw measurements will take."""
+        flight, words = Flight.of(spec), []
+        if flight.body_port:
+            command = command_of_ardupilot(read_connection(flight.autopilot or ""), flight.body_port)
+            words.append(f"ArduPilot, where it does not run yet, is started with: {command}")
+        if flight.record == "sensors":
+            words.append(sensors_words(Path(spec.out_dir)))
+        return words
+
+    # --- in the supervisor --------------------------------------------------------------------------------------------
+
+    def launch_arguments(self, spec: RunSpec) -> Mapping[str, object]:
+        """Return what the launch files of ``uav_bringup`` take."""
+        flight, scenario = Flight.of(spec), load_scenario(spec.scenario)
+        others = [fault for fault in spec.faults if parse_fault(fault).what in dict(scenario.faults)]
+        radio = [fault for fault in others if parse_fault(fault).what not in dict(scenario.processes)]
+        arguments: dict[str, object] = {
+            # The autopilot that is followed has its own pace: a limit here would fall behind it.
+            "rate": f"{0.0 if flight.sensors.startswith(FOLLOWED) else flight.rate:g}",
+            "record": flight.record,
+            "faults": ",".join(fault for fault in spec.faults if fault not in others),
+            "radio_faults": ",".join(radio),
+            "radio_port": flight.radio_port,
+            "mavlink_port": flight.mavlink_port,
+            "ardupilot_port": flight.body_port,
+            "imperfections": flight.imperfections,
+        }
+        if flight.autopilot is None:
+            return arguments
+        vehicle = {"": {"simulate": "false"}, "simulated": {"vehicle": "ardupilot"}}.get(flight.sensors, {"vehicle": flight.sensors})
+        return {**arguments, **vehicle, "autopilot": flight.autopilot}
+
+    def listen(self, spec: RunSpec, departed: Callable[[float], None]) -> None:
+        """Hear of the simulator's lift-off, and from the guidance whether the autopilot's heartbeats arrive."""
+        import rospy
+        from std_msgs.msg import String
+        from uav_msgs.msg import GuidanceState
+
+        def look(message: Any) -> None:
+            lift_off_s = json.loads(message.data).get("lift_off_s")
+            if lift_off_s is not None:
+                departed(lift_off_s)
+
+        self._subscribers = [rospy.Subscriber("/sim/state", String, look, queue_size=5)]
+        if Flight.of(spec).autopilot is not None:
+            self._subscribers.append(rospy.Subscriber("/uav_guidance/state", GuidanceState, self._hear_guidance, queue_size=1))
+
+    def _hear_guidance(self, state: Any) -> None:
+        self._linked = self._linked or state.link
+
+    def clock_source(self, spec: RunSpec) -> str:
+        """Say where ``/clock`` comes from."""
+        flight = Flight.of(spec)
+        if flight.autopilot is None:
+            return "the simulator"
+        if flight.sensors.startswith(FOLLOWED):
+            return f"the autopilot that is followed, at {flight.sensors.removeprefix(FOLLOWED)}"
+        return f"ArduPilot on UDP {flight.body_port}"
+
+    def waits(self, spec: RunSpec, *, clock: bool) -> list[str]:
+        """Say that nothing has come from a real autopilot."""
+        flight = Flight.of(spec)
+        if flight.autopilot is None or self._linked:
+            return []
+        connection = read_connection(flight.autopilot)
+        if connection.refused:
+            return [f"the autopilot at {connection.text}: connection refused, nothing listens there"]
+        if clock or not flight.simulated:
+            return [f"the autopilot at {connection.text}: no heartbeat has come{' there' if connection.kind in LISTENS else ''}"]
+        return []
+
+    def bring_to_rest(self, clock: Clock) -> None:
+        """Land."""
+        if clock.now_s is not None:
+            from uav_flight.landing import Landing  # late: it needs ROS
+
+            Landing(clock).land()
+
+
+def sensors_words(out: Path) -> str:
+    """Return how much the raw measurements will take, and how much there is."""
+    free_gb, minutes_gb = shutil.disk_usage(out).free / 1e9, 120 * SENSORS_MB_S / 1e3
+    return (
+        f"functional.bag will hold raw measurements: about {SENSORS_MB_S:g} MB a second of flight, {minutes_gb:.1f} GB for two minutes; "
+        f"{free_gb:.0f} GB are free, and the last one is left alone"
+    )
