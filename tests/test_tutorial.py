@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -61,13 +62,20 @@ def passed(output: str) -> int:
 @pytest.mark.timeout(0)  # builds a robot's interfaces: as long as the machine needs
 def test_the_tutorial_works(tmp_path):
     home = Home(tmp_path)
-    new, check, test, run, check_again, test_again = COMMANDS
+    new, check, test, run, live, check_again, test_again = COMMANDS
     assert "skillsets/mock.yaml" in home.run(new)
     home.run(check)
     untouched = passed(home.run(test))
     assert untouched >= 8
     assert "mission accomplished" in home.run(run)
     assert len(list(home.robot.glob("runs/*-patrol/report.html"))) == 1
+    assert "mission accomplished in degraded mode: rover.drive: RESOURCE_INVARIANT_VIOLATED way_stays_clear" in home.run(live)
+    flown = max(home.robot.glob("runs/*-patrol"), key=lambda run: (run / "report.html").stat().st_mtime)
+    summary = json.loads((flown / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["mock"], summary["problems"], summary["died"]) == (None, [], [])
+    assert [(one["skill"], one["result"]) for one in summary["skills"]] == [("drive", "way_stays_clear"), ("back_off", "CLEAR_OF_IT")]
+    assert summary["bridge"]["/rover/odom"]["count"] > 0
+    assert (flown / "functional.bag").is_file()
     home.run(f"{ALULA_ROOT}/setup/in_ros2 ruff check {home.robot}")
 
     home.insert(MODEL, "  // `alula check` proves this.\n", BLOCKS["skill"] + "\n")

@@ -99,7 +99,7 @@ def duration_s(history: History, observed: Observed, phases: Phases) -> float | 
 
 def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
     """Say what the numbers alone would hide: a run without a departure, faults that never came."""
-    if not phases.departed:
+    if not phases.departed and home() is not None:
         problems.note(f"no lift-off is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(observed)}
     scenario = load_scenario(facts.scenario)

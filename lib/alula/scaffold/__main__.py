@@ -55,6 +55,8 @@ def write(folder: Path, files: dict[str, str]) -> None:
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")
+        if text.startswith("#!"):
+            target.chmod(0o755)
     if importlib.util.find_spec("ruff") is not None:  # an installation that builds nothing goes without
         for command in (["check", "--quiet", "--select", "I", "--fix"], ["format", "--quiet"]):
             subprocess.run([sys.executable, "-m", "ruff", *command, "."], cwd=folder, check=True)

@@ -59,7 +59,8 @@ def test_the_radios_faults_and_ports_reach_the_nodes(tmp_path: Path) -> None:
 
 def test_every_argument_of_a_run_is_declared_and_has_one_default(tmp_path: Path) -> None:
     """An argument reaches all files that are included: roslaunch would not tell of one that no file knows."""
-    texts = [path.read_text(encoding="utf-8") for path in LAUNCH.glob("*.launch")]
+    general = LAUNCH.parents[1] / "skillset_ros1/launch/decision.launch"
+    texts = [path.read_text(encoding="utf-8") for path in (*LAUNCH.glob("*.launch"), general)]
     declared = {name for text in texts for name in re.findall(r'<arg name="(\w+)" (?:default="[^"]*" )?doc="[^"]+"/>', text)}
     spec = parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", "--out", str(tmp_path / "run")])
     assert {word.partition(":=")[0] for word in launch_arguments(spec)} <= declared
