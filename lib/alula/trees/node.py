@@ -1,0 +1,347 @@
+"""What all nodes are: one tick of a node with its pre- and postconditions, its halt, its ports.
+
+A node is a py_trees Behaviour, for what looks at trees (names, children, status, ``iterate``); it is ticked here and not by py_trees, which
+has neither answers that are no state (SKIPPED) nor BehaviorTree.CPP's halts: a parent halts the child that runs, and resets all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
+
+from py_trees.behaviour import Behaviour
+
+from alula.trees.blackboard import Blackboard, Clock, Entry
+from alula.trees.document import Element
+from alula.trees.errors import TickError
+from alula.trees.palette import Category, NodeType, Port
+from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer, Status
+
+NANOSECONDS_PER_MS = 1_000_000
+Watcher = Callable[["Node", Status, Status], None]
+"""Told of a node, what it was, and what it is now: at each change, in their order."""
+
+
+class Script(Protocol):
+    """A script that was read, over a node's blackboard; raises TickError."""
+
+    def run(self) -> object:
+        """Run it, and return its value."""
+        ...
+
+    def holds(self) -> bool:
+        """Run it, and return whether its value is true."""
+        ...
+
+
+@dataclass
+class Shared:
+    """What all nodes of one tree share."""
+
+    clock: Clock
+    watchers: list[Watcher] = field(default_factory=list)
+    woken: bool = False
+    """A node that only gave the flow back wants the next tick at once."""
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What a node is made of: ``ports`` are those that the file gives or that have a default, as text."""
+
+    type: NodeType
+    name: str
+    uid: int
+    path: str
+    element: Element
+    ports: Mapping[str, str]
+    blackboard: Blackboard
+    shared: Shared
+    compile: Callable[[str, str], Script]
+    """Makes a script of text over this node's blackboard, for the attribute that it stands in; raises FileError."""
+    enums: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Before:
+    """The preconditions of a node, None where it has none; asked when it is idle, ``while_true`` while it runs, too."""
+
+    failure_if: Script | None = None
+    success_if: Script | None = None
+    skip_if: Script | None = None
+    while_true: Script | None = None
+
+
+@dataclass(frozen=True)
+class After:
+    """What is run when a node has ended."""
+
+    on_halted: Script | None = None
+    on_failure: Script | None = None
+    on_success: Script | None = None
+    always: Script | None = None
+
+
+def pointer(text: str, name: str) -> str | None:
+    """Return the entry that the text of a port names (``{entry}``, ``{=}`` for the port's own name), None for a plain value."""
+    stripped = text.strip(" ")
+    if stripped in {"{=}", "="}:
+        return name
+    return stripped[1:-1] if len(stripped) >= 3 and stripped[0] == "{" and stripped[-1] == "}" else None
+
+
+class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
+    """One node of a tree. A class of one's own derives from one of those below, and declares its ports."""
+
+    category: ClassVar[Category]
+    ports: ClassVar[tuple[Port, ...]] = ()
+    child_count: ClassVar[tuple[int, int | None] | None] = None
+    """How many children it may have, from and to; None: as its category."""
+    status: Status
+    children: list[Node]
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring.name)
+        self.wiring = wiring
+        self.before: Before | None = None
+        self.after: After | None = None
+        self.uid = wiring.uid
+        self._shared = wiring.shared
+        self._constants: dict[str, object] = {}
+
+    # --- ticks ---------------------------------------------------------------------------------------------------------
+
+    def execute(self) -> Answer:
+        """Tick the node once, with its conditions."""
+        before = self.before
+        answer = None if before is None else self._guarded(before)
+        if answer is None:
+            answer = self.update()
+        if answer is SKIPPED:
+            return answer
+        if self.after is not None and answer is not RUNNING:
+            self._ended(self.after, answer)
+        self.become(answer)
+        return answer
+
+    def update(self) -> Answer:
+        """Do what this type of node does in a tick; never called when a condition has decided."""
+        raise NotImplementedError
+
+    def halt(self) -> None:
+        """Stop what it does, and be idle; what has a memory of its tick forgets it here."""
+        raise NotImplementedError
+
+    def halt_node(self) -> None:
+        """Halt it, and run what its file says for that."""
+        self.halt()
+        if self.after is not None and self.after.on_halted is not None:
+            self.after.on_halted.run()
+
+    def become(self, status: Answer) -> None:
+        """Have another status, and tell those who watch."""
+        previous = self.status
+        if status is not previous and isinstance(status, Status):
+            self.status = status
+            for watcher in self._shared.watchers:
+                watcher(self, previous, status)
+
+    def give_way(self) -> Answer:
+        """Return RUNNING, and have the tree ticked again at once: a long chain of quick nodes can be halted in between."""
+        self._shared.woken = True
+        return RUNNING
+
+    def _guarded(self, before: Before) -> Answer | None:
+        if self.status is RUNNING:
+            if before.while_true is not None and not before.while_true.holds():
+                self.halt_node()
+                return SKIPPED
+            return None
+        if self.status is not IDLE:
+            return None
+        if before.failure_if is not None and before.failure_if.holds():
+            return FAILURE
+        if before.success_if is not None and before.success_if.holds():
+            return SUCCESS
+        if before.skip_if is not None and before.skip_if.holds():
+            return SKIPPED
+        return SKIPPED if before.while_true is not None and not before.while_true.holds() else None
+
+    def _ended(self, after: After, answer: Answer) -> None:
+        script = after.on_success if answer is SUCCESS else after.on_failure if answer is FAILURE else None
+        if script is not None:
+            script.run()
+        if after.always is not None:
+            after.always.run()
+
+    # --- py_trees ------------------------------------------------------------------------------------------------------
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the node once, as py_trees has it."""
+        self.execute()
+        yield self
+
+    def stop(self, new_status: Status = IDLE) -> None:
+        """Halt what runs and be idle, as py_trees has it; ``new_status`` is what it says elsewhere."""
+        if self.status is RUNNING:
+            self.halt_node()
+        self.become(new_status)
+
+    # --- ports ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def blackboard(self) -> Blackboard:
+        """The blackboard of the tree that the node stands in."""
+        return self.wiring.blackboard
+
+    @property
+    def now_ns(self) -> int:
+        """Mission clock."""
+        return self._shared.clock()
+
+    def given(self, port: str) -> bool:
+        """Tell whether a port has a text, of the file or by default."""
+        return port in self.wiring.ports
+
+    def get(self, port: str) -> object:
+        """Return the value of an input, of its port's type; raises TickError when it has none, or another's."""
+        constants = self._constants
+        if port in constants:
+            return constants[port]
+        text = self.wiring.ports.get(port)
+        if text is None:
+            raise TickError(f"{self.place()}: the port '{port}' is not given")
+        key = pointer(text, port)
+        type_ = self.wiring.type.ports[port].type
+        try:
+            if key is None:
+                constants[port] = type_.parse(text)
+                return constants[port]
+            value = self.blackboard.get(key)
+            if value is None:
+                raise TickError(f"{self.place()}: the port '{port}' reads '{key}', which nothing has written")
+            return type_.read(value)
+        except ValueError as error:
+            raise TickError(f"{self.place()}: the port '{port}': {error}") from None
+
+    def number(self, port: str) -> int:
+        """Return the value of an input that is a whole number."""
+        value = self.get(port)
+        if isinstance(value, int):
+            return value
+        raise TickError(f"{self.place()}: the port '{port}' is no whole number")
+
+    def put(self, port: str, value: object) -> None:
+        """Write an output; nothing is written where the file gives no entry for it."""
+        text = self.wiring.ports.get(port)
+        if text is None:
+            return
+        key = pointer(text, port)
+        if key is None:
+            raise TickError(f"{self.place()}: the port '{port}' is written, so it has to name an entry, as {{{text}}}")
+        self.blackboard.set(key, value, self.wiring.type.ports[port].type)
+
+    def entry(self, port: str) -> Entry | None:
+        """Return the entry that a port names, None when there is none."""
+        text = self.wiring.ports.get(port, "")
+        return self.blackboard.entry(pointer(text, port) or text)
+
+    def place(self) -> str:
+        """Return what messages call the node: its place in the file and its name."""
+        return f"{self.wiring.element.place} ({self.name})"
+
+
+class Leaf(Node):
+    """A node without children that ends in each tick."""
+
+    category = Category.ACTION
+
+    def halt(self) -> None:
+        """Be idle."""
+        self.become(IDLE)
+
+
+class SyncAction(Leaf):
+    """An action that is done in one tick."""
+
+    def execute(self) -> Answer:
+        """Tick it; raises TickError when it answers RUNNING."""
+        answer = super().execute()
+        if answer is RUNNING:
+            raise TickError(f"{self.place()}: an action that ends in each tick answers RUNNING")
+        return answer
+
+
+class Condition(Leaf):
+    """A leaf that asks, and changes nothing."""
+
+    category = Category.CONDITION
+
+
+class Action(Leaf):
+    """An action that may take several ticks."""
+
+    def update(self) -> Answer:
+        """Start it, or follow it."""
+        return self.on_running() if self.status is RUNNING else self.on_start()
+
+    def halt(self) -> None:
+        """Have it interrupted while it runs."""
+        if self.status is RUNNING:
+            self.on_halted()
+        self.become(IDLE)
+
+    def on_start(self) -> Answer:
+        """Begin; called in the first tick."""
+        raise NotImplementedError
+
+    def on_running(self) -> Answer:
+        """Look; called in each further tick."""
+        raise NotImplementedError
+
+    def on_halted(self) -> None:
+        """Interrupt what runs; must not wait for its end."""
+
+
+class Control(Node):
+    """A node with children."""
+
+    category = Category.CONTROL
+
+    def halt(self) -> None:
+        """Halt what runs."""
+        self.reset_children()
+        self.become(IDLE)
+
+    def reset_children(self, first: int = 0) -> None:
+        """Halt those that run, and have all idle, from one on."""
+        for child in self.children[first:] if first else self.children:
+            if child.status is RUNNING:
+                child.halt_node()
+            child.become(IDLE)
+
+    def reset_child(self, index: int) -> None:
+        """Halt one when it runs, and have it idle."""
+        child = self.children[index]
+        if child.status is RUNNING:
+            child.halt_node()
+        child.become(IDLE)
+
+
+class Decorator(Control):
+    """A node with one child."""
+
+    category = Category.DECORATOR
+
+    def execute(self) -> Answer:
+        """Tick it; a child that has ended is idle afterwards."""
+        answer = super().execute()
+        child = self.child
+        if child.status is SUCCESS or child.status is FAILURE:
+            child.become(IDLE)
+        return answer
+
+    @property
+    def child(self) -> Node:
+        """Its child."""
+        return self.children[0]

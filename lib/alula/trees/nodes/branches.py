@@ -1,0 +1,196 @@
+"""Nodes that choose one of their children."""
+
+from __future__ import annotations
+
+from alula.trees.errors import TickError
+from alula.trees.node import Control, Wiring
+from alula.trees.palette import input_port
+from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.values import BOOL, STRING
+
+EPSILON = 2.0**-23
+"""Of a C float: within it two numbers are one."""
+
+
+class IfThenElse(Control):
+    """Ticks the first child until it has ended; then the second if it succeeded, else the third, and answers as that one."""
+
+    child_count = (2, 3)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._chosen = 0
+
+    def update(self) -> Answer:
+        """Ask, or follow what was chosen."""
+        self.become(RUNNING)
+        if not self._chosen:
+            answer = self.children[0].execute()
+            if answer is RUNNING:
+                return RUNNING
+            if answer is FAILURE and len(self.children) == 2:
+                return FAILURE
+            if answer is SKIPPED:
+                raise TickError(f"{self.place()}: its condition was skipped, so there is nothing to choose by")
+            self._chosen = 1 if answer is SUCCESS else 2
+        answer = self.children[self._chosen].execute()
+        if answer is not RUNNING:
+            self.reset_children()
+            self._chosen = 0
+        return answer
+
+    def halt(self) -> None:
+        """Ask again the next time."""
+        self._chosen = 0
+        super().halt()
+
+
+class WhileDoElse(Control):
+    """Asks the first child in each tick: the second runs while it succeeds, the third while it fails."""
+
+    child_count = (2, 3)
+
+    def update(self) -> Answer:
+        """Ask, and tick one of the others."""
+        self.become(RUNNING)
+        asked = self.children[0].execute()
+        if asked is RUNNING:
+            return RUNNING
+        if asked is SKIPPED:
+            raise TickError(f"{self.place()}: its condition was skipped, so there is nothing to choose by")
+        chosen = 1 if asked is SUCCESS else 2
+        answer: Answer = FAILURE
+        if chosen < len(self.children):
+            if len(self.children) == 3:
+                self.reset_child(3 - chosen)
+            answer = self.children[chosen].execute()
+        if answer is not RUNNING:
+            self.reset_children()
+        return answer
+
+
+class Switch(Control):
+    """Ticks the child of the case that equals the variable, else the last child; asks again in each tick."""
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._running: int | None = None
+
+    def update(self) -> Answer:
+        """Choose, halt what was chosen before, and tick."""
+        chosen = self._chosen()
+        if self._running not in {None, chosen}:
+            self.reset_child(self._running or 0)
+        answer = self.children[chosen].execute()
+        self._running = chosen if answer is RUNNING else None
+        if answer is SUCCESS or answer is FAILURE:
+            self.reset_children()
+        return answer
+
+    def halt(self) -> None:
+        """Choose anew the next time."""
+        self._running = None
+        super().halt()
+
+    def _chosen(self) -> int:
+        last = len(self.children) - 1
+        variable = self._text("variable")
+        if variable is not None:
+            for index in range(last):
+                case = self._text(f"case_{index + 1}")
+                if case is not None and equal(variable, case, self.wiring.enums):
+                    return index
+        return last
+
+    def _text(self, port: str) -> str | None:
+        try:
+            return str(self.get(port))
+        except TickError:
+            return None
+
+
+def equal(one: str, other: str, enums: object) -> bool:
+    """Tell whether two texts are the same text, the same enumerator, or the same number."""
+    if one == other:
+        return True
+    numbers = [_number(text, enums) for text in (one, other)]
+    return None not in numbers and abs((numbers[0] or 0.0) - (numbers[1] or 0.0)) <= EPSILON
+
+
+def _number(text: str, enums: object) -> float | None:
+    if isinstance(enums, dict) and text in enums:
+        return float(enums[text])
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _switch(cases: int) -> type[Switch]:
+    ports = [input_port("variable", STRING, doc="what is compared")]
+    ports += [input_port(f"case_{number}", STRING, doc=f"of child {number}") for number in range(1, cases + 1)]
+    content = {"ports": tuple(ports), "child_count": (cases + 1, cases + 1), "__doc__": Switch.__doc__, "__module__": __name__}
+    return type(f"Switch{cases}", (Switch,), content)
+
+
+SWITCHES = tuple(_switch(cases) for cases in range(2, 7))
+
+
+class TryCatch(Control):
+    """Ticks all but the last child as a Sequence; when one fails, the last one cleans up, and it fails."""
+
+    child_count = (2, None)
+    ports = (input_port("catch_on_halt", BOOL, "false", "have the last child tick once when it is halted, too"),)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._index = 0
+        self._skipped = 0
+        self._cleans_up = False
+
+    def update(self) -> Answer:
+        """Go on with the sequence, or clean up."""
+        if self.status is not RUNNING:
+            self._skipped = 0
+            self._cleans_up = False
+        self.become(RUNNING)
+        if not self._cleans_up:
+            answer = self._try()
+            if not self._cleans_up:
+                return answer
+        if self.children[-1].execute() is RUNNING:
+            return RUNNING
+        self.reset_children()
+        self._forget()
+        return FAILURE
+
+    def _try(self) -> Answer:
+        last = len(self.children) - 1
+        while self._index < last:
+            answer = self.children[self._index].execute()
+            if answer is RUNNING:
+                return RUNNING
+            if answer is FAILURE:
+                self.reset_children()
+                self._index = 0
+                self._cleans_up = True
+                return RUNNING
+            self._skipped += answer is SKIPPED
+            self._index += 1
+        skipped = self._skipped == last
+        self.reset_children()
+        self._forget()
+        return SKIPPED if skipped else SUCCESS
+
+    def halt(self) -> None:
+        """Clean up for one tick when it is asked for, and begin with the first child the next time."""
+        if self.status is RUNNING and not self._cleans_up and self.get("catch_on_halt"):
+            for index in range(len(self.children) - 1):
+                self.reset_child(index)
+            self.children[-1].execute()
+        self._forget()
+        super().halt()
+
+    def _forget(self) -> None:
+        self._index = self._skipped = 0
+        self._cleans_up = False

@@ -1,0 +1,223 @@
+"""Nodes with one child: what it answers, how often it is ticked, and when."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from alula.trees.node import NANOSECONDS_PER_MS, Decorator, Script, Wiring
+from alula.trees.palette import input_port
+from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.values import BOOL, INT, STATUS, STRING, UINT
+
+
+class _Changed(Decorator):
+    """Answers something else than its child."""
+
+    instead: ClassVar[dict[Answer, Answer]] = {}
+
+    def update(self) -> Answer:
+        """Tick the child."""
+        self.become(RUNNING)
+        answer = self.child.execute()
+        if answer is SUCCESS or answer is FAILURE:
+            self.reset_children()
+            return self.instead[answer]
+        return answer
+
+
+class Inverter(_Changed):
+    """Fails when its child succeeds, and the other way round."""
+
+    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: FAILURE, FAILURE: SUCCESS}
+
+
+class ForceSuccess(_Changed):
+    """Succeeds when its child has ended."""
+
+    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: SUCCESS, FAILURE: SUCCESS}
+
+
+class ForceFailure(_Changed):
+    """Fails when its child has ended."""
+
+    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: FAILURE, FAILURE: FAILURE}
+
+
+class KeepRunningUntilFailure(_Changed):
+    """Runs its child again and again, and fails with it."""
+
+    instead: ClassVar[dict[Answer, Answer]] = {SUCCESS: RUNNING, FAILURE: FAILURE}
+
+    def update(self) -> Answer:
+        """Tick the child; one that is skipped is asked again in the next tick."""
+        answer = super().update()
+        return RUNNING if answer is SKIPPED else answer
+
+
+class _Again(Decorator):
+    """Ticks its child again after one of its answers, so often at most; the count survives skipping."""
+
+    again: ClassVar[Answer]
+    port: ClassVar[str]
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._count = 0
+
+    def update(self) -> Answer:
+        """Tick the child as long as it ends and is to begin again."""
+        most = self.number(self.port)
+        self.become(RUNNING)
+        while self._count < most or most == -1:
+            fresh = self.child.status is IDLE
+            answer = self.child.execute()
+            if answer is RUNNING:
+                return RUNNING
+            self.reset_children()
+            if answer is SKIPPED:
+                return SKIPPED
+            if answer is not self.again:
+                self._count = 0
+                return answer
+            self._count += 1
+            most = self.number(self.port) if self.again is FAILURE else most
+            if fresh and (self._count < most or most == -1):
+                return self.give_way()
+        self._count = 0
+        return self.again
+
+    def halt(self) -> None:
+        """Count anew the next time."""
+        self._count = 0
+        super().halt()
+
+
+class Repeat(_Again):
+    """Runs its child so many times as long as it succeeds; -1: for ever."""
+
+    again = SUCCESS
+    port = "num_cycles"
+    ports = (input_port("num_cycles", INT, doc="how often; -1: for ever"),)
+
+
+class RetryUntilSuccessful(_Again):
+    """Runs its child so many times until it succeeds; -1: for ever."""
+
+    again = FAILURE
+    port = "num_attempts"
+    ports = (input_port("num_attempts", INT, doc="how often; -1: for ever"),)
+
+
+class RunOnce(Decorator):
+    """Runs its child once in the life of the tree."""
+
+    ports = (input_port("then_skip", BOOL, "true", "skip afterwards; else answer as the first time"),)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._answer: Answer | None = None
+
+    def update(self) -> Answer:
+        """Tick the child until it has ended once."""
+        if self._answer is not None:
+            return SKIPPED if self.get("then_skip") else self._answer
+        self.become(RUNNING)
+        answer = self.child.execute()
+        if answer is SUCCESS or answer is FAILURE:
+            self._answer = answer
+            self.reset_children()
+        return answer
+
+
+class Precondition(Decorator):
+    """Ticks its child when a script says yes; it is asked until the child runs."""
+
+    ports = (input_port("if", STRING, doc="the script"), input_port("else", STATUS, "FAILURE", "what it answers when the script says no"))
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._begun = False
+        self._text = ""
+        self._script: Script | None = None
+
+    def update(self) -> Answer:
+        """Ask, and tick the child."""
+        if not self._begun and not self._asked().holds():
+            return _answer(self.get("else"))
+        self._begun = True
+        answer = self.child.execute()
+        if answer is SUCCESS or answer is FAILURE:
+            self.reset_children()
+            self._begun = False
+        return answer
+
+    def _asked(self) -> Script:
+        text = str(self.get("if"))
+        if self._script is None or text != self._text:
+            self._script, self._text = self.wiring.compile(text, "if"), text
+        return self._script
+
+
+def _answer(value: object) -> Answer:
+    if isinstance(value, type(SUCCESS) | type(SKIPPED)):
+        return value
+    raise TypeError(value)
+
+
+class Delay(Decorator):
+    """Ticks its child after some time."""
+
+    ports = (input_port("delay_msec", UINT, doc="after how long", unit="ms"),)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._until_ns: int | None = None
+
+    def update(self) -> Answer:
+        """Wait, or tick the child."""
+        if self._until_ns is None:
+            self._until_ns = self.now_ns + self.number("delay_msec") * NANOSECONDS_PER_MS
+            self.become(RUNNING)
+        if self.now_ns < self._until_ns:
+            return RUNNING
+        answer = self.child.execute()
+        if answer is SUCCESS or answer is FAILURE:
+            self._until_ns = None
+            self.reset_children()
+        return answer
+
+    def halt(self) -> None:
+        """Wait anew the next time."""
+        self._until_ns = None
+        super().halt()
+
+
+class Timeout(Decorator):
+    """Halts its child and fails when it runs for longer; 0: never."""
+
+    ports = (input_port("msec", UINT, doc="for how long at most", unit="ms"),)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._until_ns: int | None = None
+
+    def update(self) -> Answer:
+        """Tick the child, or halt it when its time is over."""
+        limit_ms = self.number("msec")
+        if self._until_ns is None:
+            self._until_ns = self.now_ns + limit_ms * NANOSECONDS_PER_MS
+            self.become(RUNNING)
+        elif limit_ms > 0 and self.now_ns >= self._until_ns and self.child.status is RUNNING:
+            self._until_ns = None
+            self.reset_children()
+            return FAILURE
+        answer = self.child.execute()
+        if answer is SUCCESS or answer is FAILURE:
+            self._until_ns = None
+            self.reset_children()
+        return answer
+
+    def halt(self) -> None:
+        """Count anew the next time."""
+        self._until_ns = None
+        super().halt()

@@ -1,0 +1,93 @@
+"""Leaves that need no robot."""
+
+from __future__ import annotations
+
+from alula.trees.node import NANOSECONDS_PER_MS, Action, Condition, Node, Script, SyncAction, Wiring
+from alula.trees.palette import input_port
+from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
+from alula.trees.values import STRING, UINT
+
+CODE = (input_port("code", STRING, doc="the script"),)
+
+
+class AlwaysSuccess(SyncAction):
+    """Succeeds."""
+
+    def update(self) -> Answer:
+        """Succeed."""
+        return SUCCESS
+
+
+class AlwaysFailure(SyncAction):
+    """Fails."""
+
+    def update(self) -> Answer:
+        """Fail."""
+        return FAILURE
+
+
+class _Code:
+    """The script of a node, read again when its text is another one."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._text = ""
+        self._script: Script | None = None
+        if not node.wiring.ports.get("code", "").lstrip().startswith("{"):
+            self.script()  # what is wrong in it is told when the tree is made
+
+    def script(self) -> Script:
+        """Return it."""
+        text = str(self._node.get("code"))
+        if self._script is None or text != self._text:
+            self._script, self._text = self._node.wiring.compile(text, "code"), text
+        return self._script
+
+
+class ScriptNode(SyncAction):
+    """Runs a script, and succeeds."""
+
+    ports = CODE
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._code = _Code(self)
+
+    def update(self) -> Answer:
+        """Run it."""
+        self._code.script().run()
+        return SUCCESS
+
+
+class ScriptCondition(Condition):
+    """Succeeds when a script says yes."""
+
+    ports = CODE
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._code = _Code(self)
+
+    def update(self) -> Answer:
+        """Ask."""
+        return SUCCESS if self._code.script().holds() else FAILURE
+
+
+class Sleep(Action):
+    """Runs for some time, then succeeds."""
+
+    ports = (input_port("msec", UINT, doc="for how long", unit="ms"),)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._until_ns = 0
+
+    def on_start(self) -> Answer:
+        """Begin to wait."""
+        duration_ns = self.number("msec") * NANOSECONDS_PER_MS
+        self._until_ns = self.now_ns + duration_ns
+        return RUNNING if duration_ns else SUCCESS
+
+    def on_running(self) -> Answer:
+        """Wait."""
+        return RUNNING if self.now_ns < self._until_ns else SUCCESS

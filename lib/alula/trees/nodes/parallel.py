@@ -1,0 +1,97 @@
+"""Nodes that tick all their children in each tick."""
+
+from __future__ import annotations
+
+from alula.trees.errors import TickError
+from alula.trees.node import Control, Wiring
+from alula.trees.palette import input_port
+from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.values import INT
+
+
+class _AtOnce(Control):
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._done: set[int] = set()
+        self._failed = 0
+
+    def halt(self) -> None:
+        """Begin with all children the next time."""
+        self._forget()
+        super().halt()
+
+    def _forget(self) -> None:
+        self._done.clear()
+        self._failed = 0
+
+    def _threshold(self, port: str, never: str) -> int:
+        """Return a number of children; one below zero counts from all of them, -1 for all."""
+        given, count = self.number(port), len(self.children)
+        threshold = max(count + given + 1, 0) if given < 0 else given
+        if threshold > count:
+            raise TickError(f"{self.place()}: {port} is {given} and it has {count} children: it can never {never}")
+        return threshold
+
+
+class Parallel(_AtOnce):
+    """Ticks all children until enough have succeeded or failed; halts the others then."""
+
+    ports = (
+        input_port("success_count", INT, "-1", "how many have to succeed; -1: all"),
+        input_port("failure_count", INT, "1", "how many have to fail for it to fail"),
+    )
+
+    def update(self) -> Answer:
+        """Tick those that have not ended."""
+        enough, too_many = self._threshold("success_count", "succeed"), self._threshold("failure_count", "fail")
+        lenient, count = self.number("success_count") < 0, len(self.children)
+        self.become(RUNNING)
+        skipped = 0
+        for index, child in enumerate(self.children):
+            if index not in self._done:
+                answer = child.execute()
+                if answer is SKIPPED:
+                    skipped += 1
+                elif answer is not RUNNING:
+                    self._done.add(index)
+                    self._failed += answer is FAILURE
+            succeeded = len(self._done) - self._failed
+            if succeeded >= enough or (lenient and succeeded + skipped >= enough):
+                return self._end(SUCCESS)
+            if count - self._failed < enough or self._failed == too_many:
+                return self._end(FAILURE)
+        return SKIPPED if skipped == count else RUNNING
+
+    def _end(self, answer: Answer) -> Answer:
+        self._forget()
+        self.reset_children()
+        return answer
+
+
+class ParallelAll(_AtOnce):
+    """Ticks all children until each has ended; fails when too many failed."""
+
+    ports = (input_port("max_failures", INT, "1", "how many have to fail for it to fail; -1: all"),)
+
+    def update(self) -> Answer:
+        """Tick those that have not ended."""
+        too_many, count = self._threshold("max_failures", "fail"), len(self.children)
+        self.become(RUNNING)
+        skipped = 0
+        for index, child in enumerate(self.children):
+            if index in self._done:
+                continue
+            answer = child.execute()
+            if answer is SKIPPED:
+                skipped += 1
+            elif answer is not RUNNING:
+                self._done.add(index)
+                self._failed += answer is FAILURE
+        if skipped == count:
+            return SKIPPED
+        if skipped + len(self._done) < count:
+            return RUNNING
+        answer = FAILURE if self._failed >= too_many else SUCCESS
+        self.reset_children()
+        self._forget()
+        return answer

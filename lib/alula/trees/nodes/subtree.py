@@ -1,0 +1,22 @@
+"""The place where another tree of the files stands in."""
+
+from __future__ import annotations
+
+from alula.trees.node import Decorator
+from alula.trees.palette import Category
+from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
+
+
+class SubTree(Decorator):
+    """Another tree of the files."""
+
+    category = Category.SUBTREE
+
+    def update(self) -> Answer:
+        """Tick it."""
+        if self.status is IDLE:
+            self.become(RUNNING)
+        answer = self.child.execute()
+        if answer is SUCCESS or answer is FAILURE:
+            self.reset_children()
+        return answer

@@ -1,0 +1,136 @@
+"""The types of node that a tree may have, without any tree: for the factory, the checker, Groot2's palette, drawings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from alula.trees.values import ANY, PortType
+
+if TYPE_CHECKING:
+    from alula.trees.node import Node, Wiring
+
+
+class Category(Enum):
+    """As BehaviorTree.CPP writes them in files."""
+
+    ACTION = "Action"
+    CONDITION = "Condition"
+    CONTROL = "Control"
+    DECORATOR = "Decorator"
+    SUBTREE = "SubTree"
+
+
+class Direction(Enum):
+    """Whether a port is read, written, or both; as in a TreeNodesModel."""
+
+    INPUT = "input_port"
+    OUTPUT = "output_port"
+    INOUT = "inout_port"
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port: ``default`` is text as in a file, None where there is none; ``unit`` is of a number, as ``m/s``."""
+
+    name: str
+    type: PortType = ANY
+    direction: Direction = Direction.INPUT
+    default: str | None = None
+    doc: str = ""
+    unit: str = ""
+    required: bool = False
+    """A file has to give it; else a node does without it, or says so when it is ticked."""
+
+
+def input_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
+    """Return a port that is read."""
+    return Port(name, type_, Direction.INPUT, default, doc, unit)
+
+
+def output_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
+    """Return a port that is written; it has to name an entry of the blackboard."""
+    return Port(name, type_, Direction.OUTPUT, default, doc, unit)
+
+
+def inout_port(name: str, type_: PortType = ANY, default: str | None = None, doc: str = "", *, unit: str = "") -> Port:
+    """Return a port that is read and written."""
+    return Port(name, type_, Direction.INOUT, default, doc, unit)
+
+
+@dataclass(frozen=True)
+class NodeType:
+    """A type of node: ``make`` makes a node of its wiring (None: known from a model only, so it can be drawn and checked)."""
+
+    name: str
+    category: Category
+    ports: Mapping[str, Port] = field(default_factory=dict)
+    doc: str = ""
+    make: type[Node] | None = None
+    children: tuple[int, int | None] = (0, 0)
+    """How many it may have, from and to; None: any number."""
+
+    def wired(self, wiring: Wiring) -> Node:
+        """Make a node."""
+        if self.make is None:
+            msg = f"{self.name} is known from a model only, there is nothing to tick"
+            raise TypeError(msg)
+        return self.make(wiring)
+
+
+CHILDREN: Mapping[Category, tuple[int, int | None]] = {
+    Category.ACTION: (0, 0),
+    Category.CONDITION: (0, 0),
+    Category.CONTROL: (1, None),
+    Category.DECORATOR: (1, 1),
+    Category.SUBTREE: (0, 0),
+}
+
+
+def node_type(
+    name: str, category: Category, ports: Iterable[Port] = (), *, doc: str = "", children: tuple[int, int | None] | None = None
+) -> NodeType:
+    """Return a type that nothing can be made of yet, with the number of children that its category has."""
+    return NodeType(name, category, {port.name: port for port in ports}, doc, None, children or CHILDREN[category])
+
+
+class Palette:
+    """Types of node by their names."""
+
+    def __init__(self, types: Iterable[NodeType] = ()) -> None:
+        self._types: dict[str, NodeType] = {}
+        for one in types:
+            self.add(one)
+
+    def add(self, one: NodeType) -> None:
+        """Add a type; a name is given once only, unless the one before was known from a model only."""
+        known = self._types.get(one.name)
+        if known is not None and known.make is not None:
+            msg = f"the node {one.name} is registered already"
+            raise ValueError(msg)
+        self._types[one.name] = one
+
+    def register(self, make: type[Node], name: str = "") -> NodeType:
+        """Add a class of one's own under a name, that of the class unless another is given; its ports are what it declares."""
+        doc = (make.__doc__ or "").strip().partition("\n")[0]
+        ports = {port.name: port for port in make.ports}
+        one = NodeType(name or make.__name__, make.category, ports, doc, make, make.child_count or CHILDREN[make.category])
+        self.add(one)
+        return one
+
+    def get(self, name: str) -> NodeType | None:
+        """Return a type, None where there is none of that name."""
+        return self._types.get(name)
+
+    def names(self) -> list[str]:
+        """Return all names."""
+        return list(self._types)
+
+    def __iter__(self) -> Iterator[NodeType]:
+        return iter(self._types.values())
+
+    def __or__(self, other: Palette) -> Palette:
+        """Return one with the types of both."""
+        return Palette([*self, *other])

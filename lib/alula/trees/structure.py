@@ -1,0 +1,117 @@
+"""What can be wrong in files of trees before anything is built of them: types of nodes, their children, their ports, cycles."""
+
+from __future__ import annotations
+
+from alula.trees.document import Attribute, Element
+from alula.trees.errors import Problem, Report, did_you_mean, refuse
+from alula.trees.node import pointer
+from alula.trees.palette import Direction, NodeType, Palette
+from alula.trees.reading import CATEGORIES, TreeFiles, is_port, type_name
+
+
+def verify(files: TreeFiles, palette: Palette, report: Report = refuse) -> None:
+    """Report what is wrong with any tree of the files."""
+    for name, tree in files.trees.items():
+        if palette.get(name) is not None:
+            report(Problem(tree.place_of("ID"), f"the tree '{name}' has the name of a node", "call it otherwise"))
+        for top in tree.children:
+            for element in top.iterate():
+                _verify_node(element, files, palette, report)
+    _verify_cycles(files, report)
+
+
+def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: Report) -> None:
+    name = type_name(element)
+    if not name:
+        report(Problem(element.place, f"<{element.tag}> has no ID", "it names the type of the node"))
+    elif element.tag == "SubTree":
+        _verify_subtree(element, files, report)
+    else:
+        known = palette.get(name)
+        if known is None:
+            cure = did_you_mean(name, [*palette.names()]) or "see `alula palette`"
+            place = element.place_of("ID") if element.tag in CATEGORIES else element.place
+            report(Problem(place, f"unknown node '{name}'", cure))
+        else:
+            _verify_children(element, known, report)
+            for attribute in element.attributes.values():
+                _verify_attribute(attribute, known, element, report)
+            _verify_given(element, known, report)
+
+
+def _verify_subtree(element: Element, files: TreeFiles, report: Report) -> None:
+    name = type_name(element)
+    if name not in files.trees:
+        report(Problem(element.place_of("ID"), f"there is no tree '{name}'", did_you_mean(name, files.trees)))
+    if element.children:
+        report(Problem(element.children[0].place, f"<SubTree> '{name}' has children", "they belong into the tree itself"))
+    model = files.models.get(name)
+    if model is not None and not _is_true(element.get("_autoremap")):
+        for port in model.ports.values():
+            if port.default is None and port.name not in element.attributes:
+                report(Problem(element.place, f"the subtree '{name}' needs the port '{port.name}'", f'add {port.name}="..."'))
+
+
+def _is_true(text: str) -> bool:
+    return text.lower() in {"1", "true"}
+
+
+def _verify_children(element: Element, known: NodeType, report: Report) -> None:
+    count, (least, most) = len(element.children), known.children
+    if count < least or (most is not None and count > most):
+        expected = "none" if most == 0 else str(least) if most == least else f"{least} or more" if most is None else f"{least} to {most}"
+        place = element.place if count < least or most is None else element.children[most].place
+        report(Problem(place, f"'{known.name}' has {count or 'no'} {'child' if count == 1 else 'children'}", f"it takes {expected}"))
+
+
+def _verify_attribute(attribute: Attribute, known: NodeType, element: Element, report: Report) -> None:
+    if attribute.name == "ID" and element.tag not in CATEGORIES:
+        report(Problem(attribute.place, f"<{element.tag}> takes no ID", 'the tag is its type; call it by name="..."'))
+    if not is_port(attribute.name):
+        return
+    port = known.ports.get(attribute.name)
+    if port is None:
+        report(Problem(attribute.place, f"'{known.name}' has no port '{attribute.name}'", did_you_mean(attribute.name, known.ports)))
+        return
+    key = pointer(attribute.value, port.name)
+    if key is None and port.direction is Direction.OUTPUT:
+        report(Problem(attribute.place, f"the port '{port.name}' is written", f'it names an entry: {port.name}="{{...}}"'))
+    elif key is None:
+        try:
+            port.type.parse(attribute.value)
+        except ValueError as error:
+            report(Problem(attribute.value_place or attribute.place, f"the port '{port.name}': {error}"))
+
+
+def _verify_given(element: Element, known: NodeType, report: Report) -> None:
+    for port in known.ports.values():
+        if port.required and port.name not in element.attributes:
+            report(Problem(element.place, f"'{known.name}' needs the port '{port.name}'", f'add {port.name}="..."'))
+
+
+def _verify_cycles(files: TreeFiles, report: Report) -> None:
+    """Report trees that contain themselves, each cycle at one place."""
+    done: set[str] = set()
+    for start in files.trees:
+        stack: list[tuple[str, list[Element]]] = [(start, _subtrees(files, start))]
+        while stack:
+            name, left = stack[-1]
+            if name in done or not left:
+                done.add(name)
+                stack.pop()
+                continue
+            element = left.pop()
+            inner = type_name(element)
+            if inner in {above for above, _ in stack}:
+                way = " in ".join(f"'{one}'" for one in [inner, *[above for above, _ in reversed(stack)][: _depth(stack, inner)]])
+                report(Problem(element.place, f"a tree contains itself: {way}", "a loop is what Repeat and its like are for"))
+            elif inner in files.trees:
+                stack.append((inner, _subtrees(files, inner)))
+
+
+def _depth(stack: list[tuple[str, list[Element]]], name: str) -> int:
+    return next(number for number, (above, _) in enumerate(reversed(stack), start=1) if above == name)
+
+
+def _subtrees(files: TreeFiles, name: str) -> list[Element]:
+    return [one for top in files.trees[name].children for one in top.iterate() if one.tag == "SubTree"]

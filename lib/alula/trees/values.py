@@ -1,0 +1,130 @@
+"""Types of ports and of entries of the blackboard: how their text is read, and what other values are taken for one of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from alula.trees.status import ANSWERS, NAMES, Skipped, Status
+
+LARGEST_UINT = 2**32 - 1
+LARGEST_INT = 2**31 - 1
+BOOLEANS = {"0": False, "1": True, "false": False, "true": True, "False": False, "True": True, "FALSE": False, "TRUE": True}
+
+
+@dataclass(frozen=True, eq=False)
+class PortType:
+    """A type: ``parse`` reads text, ``cast`` takes a value that is no text; both raise ValueError."""
+
+    name: str
+    parse: Callable[[str], object] = field(repr=False)
+    cast: Callable[[object], object] = field(repr=False)
+
+    def read(self, value: object) -> object:
+        """Return a value of this type made of any other; raises ValueError."""
+        return self.parse(value) if isinstance(value, str) else self.cast(value)
+
+
+def _wrong(value: object, name: str) -> ValueError:
+    return ValueError(f"{shown(value)} is no {name}")
+
+
+def shown(value: object) -> str:
+    """Return a value as messages and texts have it."""
+    if isinstance(value, Status | Skipped):
+        return NAMES[value]
+    return f"'{value}'" if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _whole(name: str, least: int, largest: int) -> PortType:
+    def cast(value: object) -> int:
+        if not isinstance(value, int | float) or not math.isfinite(value) or value != int(value) or not least <= value <= largest:
+            raise _wrong(value, name)
+        return int(value)
+
+    def parse(text: str) -> int:
+        try:
+            return cast(int(text))
+        except ValueError:
+            raise _wrong(text, name) from None
+
+    return PortType(name, parse, cast)
+
+
+def _parse_double(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise _wrong(text, "double") from None
+
+
+def _cast_double(value: object) -> float:
+    if isinstance(value, int | float):
+        return float(value)
+    raise _wrong(value, "double")
+
+
+def _parse_bool(text: str) -> bool:
+    if text not in BOOLEANS:
+        raise _wrong(text, "bool")
+    return BOOLEANS[text]
+
+
+def truth(value: object) -> bool:
+    """Return a number as yes or no: what a condition's script answers; raises ValueError."""
+    if isinstance(value, int | float):
+        return value != 0
+    raise _wrong(value, "bool")
+
+
+def as_text(value: object) -> str:
+    """Return a value as a port of text gives it: a double as C writes it, with six digits."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, int | float):
+        return f"{value:f}" if isinstance(value, float) else str(value)
+    raise _wrong(value, "std::string")
+
+
+def _parse_status(text: str) -> object:
+    if text not in ANSWERS:
+        raise _wrong(text, "BT::NodeStatus")
+    return ANSWERS[text]
+
+
+def _cast_status(value: object) -> object:
+    if isinstance(value, Status | Skipped):
+        return value
+    raise _wrong(value, "BT::NodeStatus")
+
+
+def _same(value: object) -> object:
+    return value
+
+
+INT = _whole("int", -LARGEST_INT - 1, LARGEST_INT)
+UINT = _whole("unsigned int", 0, LARGEST_UINT)
+DOUBLE = PortType("double", _parse_double, _cast_double)
+BOOL = PortType("bool", _parse_bool, truth)
+STRING = PortType("std::string", str, as_text)
+STATUS = PortType("BT::NodeStatus", _parse_status, _cast_status)
+ANY = PortType("BT::AnyTypeAllowed", _same, _same)
+TYPES = {one.name: one for one in (INT, UINT, DOUBLE, BOOL, STRING, STATUS, ANY)}
+
+
+def list_of(item: PortType) -> PortType:
+    """Return the type of a list, whose items stand in text between semicolons."""
+    name = f"std::vector<{item.name}>"
+
+    def parse(text: str) -> object:
+        return [item.read(part) for part in text.split(";")] if text else []
+
+    def cast(value: object) -> object:
+        if isinstance(value, list | tuple):
+            return [item.read(part) for part in value]
+        raise _wrong(value, name)
+
+    return PortType(name, parse, cast)
