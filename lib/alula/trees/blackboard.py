@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from alula.trees.errors import TickError
-from alula.trees.values import ANY, STRING, PortType, shown
+from alula.trees.values import ANY, DOUBLE, STRING, PortType, shown
 
 Clock = Callable[[], int]
 """Mission clock in nanoseconds."""
@@ -116,7 +116,9 @@ class Blackboard:
             if not create:
                 raise KeyError(key)
             entry = self.create(key)
-        self._write(entry, value if entry.type is ANY else self._as(entry, key, value))
+        # A number is not held against the type, as in BehaviorTree.CPP: a port that reads it converts it.
+        text_anew = isinstance(value, str) and not isinstance(entry.value, str)
+        self._write(entry, self._as(entry, key, value) if text_anew else value)
 
     def unset(self, key: str) -> None:
         """Take an entry of its own away; one above stays."""
@@ -143,3 +145,8 @@ class Blackboard:
             return entry.type.read(value)
         except ValueError as error:
             raise TickError(f"the blackboard's entry '{key}': {error}") from None
+
+
+def type_of(value: object) -> PortType:
+    """Return the type of a value that a script has made."""
+    return STRING if isinstance(value, str) else DOUBLE if isinstance(value, int | float) else ANY

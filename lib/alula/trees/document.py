@@ -18,7 +18,7 @@ from alula.trees.errors import FileError, Place, Problem
 DEEPEST = 256
 """Levels of nesting in one file; BehaviorTree.CPP has the same limit."""
 LONGEST_BYTES = 16 << 20
-MOST_ELEMENTS = 100_000
+MOST_ELEMENTS = 30_000
 ATTRIBUTE = re.compile(rb"""(\s+)([^\s=/>]+)(\s*=\s*)("[^"]*"|'[^']*')""")
 CHARACTER = re.compile(r"&[^;]*;|\r\n|.", re.DOTALL)
 

@@ -282,8 +282,10 @@ class Action(Leaf):
     """An action that may take several ticks."""
 
     def update(self) -> Answer:
-        """Start it, or follow it."""
-        return self.on_running() if self.status is RUNNING else self.on_start()
+        """Start it, or follow it; one that has ended, and that its parent has not reset, answers the same again."""
+        if self.status is RUNNING:
+            return self.on_running()
+        return self.on_start() if self.status is IDLE else self.status
 
     def halt(self) -> None:
         """Have it interrupted while it runs."""

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from alula.trees.document import Attribute, Element
+from collections.abc import Iterator
+
+from alula.trees.document import DEEPEST, Attribute, Element
 from alula.trees.errors import Problem, Report, did_you_mean, refuse
 from alula.trees.node import pointer
 from alula.trees.palette import Direction, NodeType, Palette
 from alula.trees.reading import CATEGORIES, TreeFiles, is_port, type_name
+
+MOST_NODES = 65_535
+"""A node's uid has 16 bits in Groot2's protocol."""
 
 
 def verify(files: TreeFiles, palette: Palette, report: Report = refuse) -> None:
@@ -17,7 +22,7 @@ def verify(files: TreeFiles, palette: Palette, report: Report = refuse) -> None:
         for top in tree.children:
             for element in top.iterate():
                 _verify_node(element, files, palette, report)
-    _verify_cycles(files, report)
+    _Sizes(files, report).verify()
 
 
 def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: Report) -> None:
@@ -37,6 +42,7 @@ def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: R
             for attribute in element.attributes.values():
                 _verify_attribute(attribute, known, element, report)
             _verify_given(element, known, report)
+            _verify_reactive(element, report)
 
 
 def _verify_subtree(element: Element, files: TreeFiles, report: Report) -> None:
@@ -89,29 +95,61 @@ def _verify_given(element: Element, known: NodeType, report: Report) -> None:
             report(Problem(element.place, f"'{known.name}' needs the port '{port.name}'", f'add {port.name}="..."'))
 
 
-def _verify_cycles(files: TreeFiles, report: Report) -> None:
-    """Report trees that contain themselves, each cycle at one place."""
-    done: set[str] = set()
-    for start in files.trees:
-        stack: list[tuple[str, list[Element]]] = [(start, _subtrees(files, start))]
-        while stack:
-            name, left = stack[-1]
-            if name in done or not left:
-                done.add(name)
-                stack.pop()
-                continue
-            element = left.pop()
-            inner = type_name(element)
-            if inner in {above for above, _ in stack}:
-                way = " in ".join(f"'{one}'" for one in [inner, *[above for above, _ in reversed(stack)][: _depth(stack, inner)]])
-                report(Problem(element.place, f"a tree contains itself: {way}", "a loop is what Repeat and its like are for"))
-            elif inner in files.trees:
-                stack.append((inner, _subtrees(files, inner)))
+def _verify_reactive(element: Element, report: Report) -> None:
+    if type_name(element) == "ReactiveSequence":
+        slow = [child for child in element.children if type_name(child) == "AsyncSequence"]
+        for child in slow[1:]:
+            report(Problem(child.place, "a second AsyncSequence in a ReactiveSequence", "only one child may take several ticks"))
 
 
-def _depth(stack: list[tuple[str, list[Element]]], name: str) -> int:
-    return next(number for number, (above, _) in enumerate(reversed(stack), start=1) if above == name)
+class _Sizes:
+    """Goes down from each tree into those that it contains, with a stack: a file may have thousands, one in the other."""
+
+    def __init__(self, files: TreeFiles, report: Report) -> None:
+        self._files = files
+        self._report = report
+        self._sizes: dict[str, tuple[int, int]] = {}
+        self._inner = {name: [one for one, _ in _levels(tree) if one.tag == "SubTree"] for name, tree in files.trees.items()}
+
+    def verify(self) -> None:
+        """Report trees that contain themselves, and those that grow beyond the limits."""
+        for start in self._files.trees:
+            stack = [start]
+            while stack:
+                name = stack[-1]
+                if name in self._sizes or not self._inner[name]:
+                    stack.pop()
+                    if name not in self._sizes:
+                        self._sizes[name] = self._size(name)
+                    continue
+                element = self._inner[name].pop()
+                inner = type_name(element)
+                if inner in stack:
+                    way = " in ".join(f"'{one}'" for one in [inner, *reversed(stack[stack.index(inner) :])])
+                    self._report(Problem(element.place, f"a tree contains itself: {way}", "a loop is what Repeat and its like are for"))
+                elif inner in self._files.trees:
+                    stack.append(inner)
+
+    def _size(self, name: str) -> tuple[int, int]:
+        """Return how many nodes and how many levels a tree has with those that it contains; beyond a limit: as if it had none."""
+        tree, nodes, depth = self._files.trees[name], 0, 0
+        for element, level in _levels(tree):
+            count, levels = self._sizes.get(type_name(element), (0, 0)) if element.tag == "SubTree" else (0, 0)
+            nodes, depth = nodes + 1 + count, max(depth, level + levels)
+        if nodes > MOST_NODES:
+            message = f"the tree '{name}' has with its subtrees {nodes} nodes, more than {MOST_NODES}"
+        elif depth > DEEPEST:
+            message = f"the tree '{name}' is with its subtrees {depth} levels deep, more than {DEEPEST}"
+        else:
+            return nodes, depth
+        self._report(Problem(tree.place, message, "use a tree less often, or in fewer of the others"))
+        return 0, 0
 
 
-def _subtrees(files: TreeFiles, name: str) -> list[Element]:
-    return [one for top in files.trees[name].children for one in top.iterate() if one.tag == "SubTree"]
+def _levels(tree: Element) -> Iterator[tuple[Element, int]]:
+    """Yield the nodes of a tree, each with its level from 1."""
+    left = [(child, 1) for child in tree.children]
+    while left:
+        element, level = left.pop()
+        yield element, level
+        left += [(child, level + 1) for child in element.children]

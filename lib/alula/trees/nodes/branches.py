@@ -5,7 +5,7 @@ from __future__ import annotations
 from alula.trees.errors import TickError
 from alula.trees.node import Control, Wiring
 from alula.trees.palette import input_port
-from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
 from alula.trees.values import BOOL, STRING
 
 EPSILON = 2.0**-23
@@ -57,6 +57,7 @@ class WhileDoElse(Control):
         if asked is RUNNING:
             return RUNNING
         if asked is SKIPPED:
+            self.reset_children()
             raise TickError(f"{self.place()}: its condition was skipped, so there is nothing to choose by")
         chosen = 1 if asked is SUCCESS else 2
         answer: Answer = FAILURE
@@ -150,7 +151,7 @@ class TryCatch(Control):
 
     def update(self) -> Answer:
         """Go on with the sequence, or clean up."""
-        if self.status is not RUNNING:
+        if self.status is IDLE:
             self._skipped = 0
             self._cleans_up = False
         self.become(RUNNING)

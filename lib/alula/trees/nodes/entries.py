@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from alula.trees.blackboard import type_of
 from alula.trees.errors import TickError
 from alula.trees.node import Decorator, SyncAction, Wiring, pointer
 from alula.trees.palette import inout_port, input_port
 from alula.trees.status import FAILURE, RUNNING, SKIPPED, SUCCESS, Answer
-from alula.trees.values import ANY, STRING, PortType
+from alula.trees.values import ANY, STRING, shown
 
 
 class SetBlackboard(SyncAction):
@@ -19,19 +20,20 @@ class SetBlackboard(SyncAction):
     def update(self) -> Answer:
         """Write."""
         key, text = str(self.get("output_key")), self.wiring.ports.get("value", "")
+        known = self.blackboard.entry(key)
         source = pointer(text, "value")
-        value: object = text
-        type_: PortType = STRING
-        if source is not None:
-            entry = self.blackboard.entry(source)
-            if entry is None:
-                raise TickError(f"{self.place()}: the blackboard has no entry '{source}'")
-            if self.blackboard.entry(key) is None:
-                self.blackboard.create(key, entry.type)
-            value, type_ = entry.value, entry.type
-        if value is None:
+        if source is None:
+            self.blackboard.set(key, text, STRING if known is None else ANY)
+            return SUCCESS
+        entry = self.blackboard.entry(source)
+        if entry is None:
+            raise TickError(f"{self.place()}: the blackboard has no entry '{source}'")
+        known = known or self.blackboard.create(key, entry.type)
+        if entry.value is None:
             return FAILURE
-        self.blackboard.set(key, value, type_)
+        if known.type is not ANY and known.type is not type_of(entry.value):
+            raise TickError(f"{self.place()}: the entry '{key}' is a {known.type.name}, and '{source}' is {shown(entry.value)}")
+        self.blackboard.set(key, entry.value)
         return SUCCESS
 
 

@@ -25,7 +25,7 @@ class _InTurn(Control):
 
     def update(self) -> Answer:
         """Tick the child whose turn it is, and those after it as long as they end."""
-        if self.status is not RUNNING:
+        if self.status is IDLE:
             self._skipped = 0
         self.become(RUNNING)
         children = self.children

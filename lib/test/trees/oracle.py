@@ -1,0 +1,101 @@
+"""Ticks a file with BehaviorTree.CPP itself and with ours, with leaves whose answers are given, and writes down what happens."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import behaviortreepy
+from oracle_leaves import Act, Answers, Ask, Story, tell
+
+from alula.trees.errors import TreeError
+from alula.trees.factory import make_tree
+from alula.trees.nodes import entries
+from alula.trees.palette import Palette
+from alula.trees.reading import read_text
+from alula.trees.standard import standard_palette
+from alula.trees.status import NAMES
+
+RAISED = "raised"
+
+
+class Theirs:
+    """BehaviorTree.CPP; one factory for many files, because making one is what takes most of the time."""
+
+    def __init__(self) -> None:
+        self._story = Story({})
+        status = behaviortreepy.NodeStatus.__members__
+        self._factory = behaviortreepy.BehaviorTreeFactory()
+
+        def ask(call):
+            return lambda node: status[self._story.answer(call, node.full_path(), node.name())]
+
+        halted = lambda node: self._story.halted(node.full_path())  # noqa: E731
+        self._factory.register_simple_stateful_action("Act", ask("start"), ask("tick"), halted)
+        self._factory.register_simple_condition("Ask", ask("start"))
+
+    def play(self, text: str, answers: Answers, ticks: int, halts: Sequence[int]) -> Story:
+        """Tick a file so often, halted before some of the ticks."""
+        story = self._story = Story(answers)
+        try:
+            tree = self._factory.create_tree_from_text(text)
+        except (RuntimeError, ValueError) as error:
+            story.error = str(error)
+            story.ticked(RAISED)
+            return story
+        for number in range(ticks):
+            try:
+                if number in halts:
+                    tree.root_node().halt_node()
+                root = tree.tick_exactly_once().name
+            except (RuntimeError, ValueError) as error:
+                story.error = str(error)
+                story.ticked(RAISED)
+                break
+            story.ticked(root)
+        self._story = Story(answers)  # what a tree does as it goes is nobody's
+        return story
+
+
+class SkipUnlessUpdated(entries.SkipUnlessUpdated):
+    """As of version 4.8: halted, it leaves its child running (docs/trees.md)."""
+
+    def halt(self) -> None:
+        self._running = False
+
+
+class WaitValueUpdate(entries.WaitValueUpdate):
+    """As of version 4.8: halted, it leaves its child running (docs/trees.md)."""
+
+    def halt(self) -> None:
+        self._running = False
+
+
+AS_OF_4_8 = (SkipUnlessUpdated, WaitValueUpdate)
+PALETTE = Palette(one for one in standard_palette() if one.name not in {node.__name__ for node in AS_OF_4_8})
+for node in AS_OF_4_8:
+    PALETTE.register(node)
+PALETTE.register(Act)
+PALETTE.register(Ask)
+
+
+def ours(text: str, answers: Answers, ticks: int, halts: Sequence[int]) -> Story:
+    """Tick a file with the trees of this library, as `Theirs.play` does."""
+    story = Story(answers)
+    tell(story)
+    try:
+        tree = make_tree(read_text(text), PALETTE, lambda: 0)
+    except TreeError as error:
+        story.error = str(error)
+        story.ticked(RAISED)
+        return story
+    for number in range(ticks):
+        try:
+            if number in halts:
+                tree.root.halt_node()
+            root = NAMES[tree.tick()]
+        except TreeError as error:
+            story.error = str(error)
+            story.ticked(RAISED)
+            break
+        story.ticked(root)
+    return story

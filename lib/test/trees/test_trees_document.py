@@ -1,0 +1,144 @@
+"""Files: places, a round trip that keeps all, and nothing in them that harms or hangs."""
+
+from __future__ import annotations
+
+import random
+import time
+
+import pytest
+
+from alula.trees.document import DEEPEST, parse_document
+from alula.trees.errors import FileError, Problem, TreeError
+from alula.trees.factory import make_tree
+from alula.trees.reading import read_files, read_text
+from alula.trees.standard import standard_palette
+
+GROOT = """\ufeff<?xml version="1.0" encoding="UTF-8"?>
+<!-- made by an editor -->
+<root BTCPP_format="4"
+      main_tree_to_execute='Main' project_name="Project">
+  <BehaviorTree ID="Main" editor_version="5">
+    <!-- why: the ä counts as one character -->
+    <Sequence name="ä &amp; &quot;b&quot;" _fullpath="" _collapsed="true">
+      <Script code="x := 1;&#10;y := 'a'" /><AlwaysSuccess  name = 'n'/>
+      text &amp; <![CDATA[more < text]]>
+    </Sequence >
+  </BehaviorTree>
+  <!-- Description of Node Models (used by Groot) -->
+  <TreeNodesModel>
+    <Action ID="Go"><input_port name="to" type="std::string">where</input_port></Action>
+  </TreeNodesModel>
+</root>
+<!-- the end -->
+"""
+
+
+def test_a_file_is_written_as_it_was_read():
+    assert parse_document(GROOT).text() == GROOT
+    assert parse_document(GROOT.replace("\n", "\r\n")).text() == GROOT.replace("\n", "\r\n")
+
+
+def test_what_is_changed_is_written_and_read_again():
+    document = parse_document(GROOT)
+    sequence = document.root.children[0].children[0]
+    sequence.set("name", 'c < "d" &\n')
+    sequence.set("_uid", "1")
+    again = parse_document(document.text())
+    assert again.root.children[0].children[0].get("name") == 'c < "d" &\n'
+    assert again.text() == document.text()
+    assert GROOT.replace('"ä &amp; &quot;b&quot;"', "?") == document.text().replace('"c &lt; &quot;d&quot; &amp;&#10;"', "?").replace(
+        ' _uid="1"', ""
+    )
+
+
+def test_places_are_lines_and_characters_of_the_file():
+    sequence = parse_document(GROOT, "f.xml").root.children[0].children[0]
+    script = sequence.children[0].attributes["code"]
+    assert str(sequence.place) == "f.xml:7:5"
+    assert str(sequence.place_of("_fullpath")) == "f.xml:7:44"
+    assert str(script.place_of(0)) == "f.xml:8:21"
+    assert str(script.place_of(8)) == "f.xml:8:33"  # behind &#10;, five characters of the file
+
+
+LEVELS = "".join(f'<!ENTITY {name} "{f"&{inner};" * 10}">' for inner, name in ("ab", "bc", "cd", "de", "ef", "fg", "gh"))
+BOMB = f'<!DOCTYPE a [<!ENTITY a "{"b" * 100}">{LEVELS}'
+REFUSED = {
+    BOMB + "]><root>&h;</root>": "f.xml:1:13: has a document type (<!DOCTYPE>)",
+    "<a>" * 3_400_000: f"f.xml:1:{DEEPEST * 3 + 1}: is nested deeper than 256 levels",
+    "<root>" + "<a/>" * 200_000 + "</root>": "has more than 30000 elements",
+    "": "f.xml:1:1: is no XML: no element found",
+    "<root>\n<a></b></root>": "f.xml:2:6: is no XML: mismatched tag",
+    "<root a='1' a='2'/>": "duplicate attribute",
+    "<root>&nbsp;</root>": "undefined entity",
+    "<other/>": "f.xml:1:1: begins with <other>",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED.items(), ids=[str(number) for number in range(len(REFUSED))])
+def test_what_is_no_file_of_trees_is_refused_at_its_place(text, message):
+    begun = time.process_time()
+    with pytest.raises(FileError) as error:
+        read_text(text, "f.xml")
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+    assert time.process_time() - begun < 60  # far below what a bomb takes
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    path = tmp_path / "f.xml"
+    path.write_bytes(b"<root>\n<a b='\xe4'/></root>")
+    with pytest.raises(FileError, match=r"f.xml:2:7: is not UTF-8; save it as UTF-8"):
+        read_files(path)
+    with pytest.raises(FileError, match="can't be read: No such file"):
+        read_files(tmp_path / "other.xml")
+    with pytest.raises(FileError, match="can't be read: Is a directory"):
+        read_files(tmp_path)
+
+
+def test_includes_are_read_once_and_from_their_own_folder(tmp_path):
+    (tmp_path / "parts").mkdir()
+    main = '<root BTCPP_format="4" main_tree_to_execute="Main"><include path="parts/a.xml"/><include path="parts/b.xml"/>'
+    (tmp_path / "main.xml").write_text(main + '<BehaviorTree ID="Main"><SubTree ID="A"/></BehaviorTree></root>')
+    part = '<root BTCPP_format="4"><include path="{0}.xml"/><BehaviorTree ID="{1}"><AlwaysSuccess/></BehaviorTree></root>'
+    (tmp_path / "parts/a.xml").write_text(part.format("b", "A"))
+    (tmp_path / "parts/b.xml").write_text('<root BTCPP_format="4"><BehaviorTree ID="B"><AlwaysSuccess/></BehaviorTree></root>')
+    files = read_files(tmp_path / "main.xml")
+    assert (list(files.trees), len(files.documents), files.main) == (["B", "A", "Main"], 3, "Main")
+    (tmp_path / "parts/b.xml").write_text(part.format("a", "B"))
+    with pytest.raises(FileError, match=r"b.xml:1:24: a.xml includes itself"):
+        read_files(tmp_path / "main.xml")
+    (tmp_path / "parts/b.xml").write_text(part.format("c", "B"))
+    with pytest.raises(FileError, match=r"b.xml:1:33: there is no file .*parts/c.xml"):
+        read_files(tmp_path / "main.xml")
+
+
+def test_a_checker_gets_all_that_is_wrong():
+    problems: list[Problem] = []
+    read_text('<root BTCPP_format="3"><include/><BehaviorTree/><BehaviorTree ID="a"/></root>', "f.xml", problems.append)
+    assert [str(problem) for problem in problems] == [
+        "f.xml:1:7: is of BehaviorTree.CPP 3; format 4 is read",
+        'f.xml:1:24: <include> has no path; write <include path="other.xml"/>',
+        "f.xml:1:34: <BehaviorTree> has no ID; name it: the file has several",
+        "f.xml:1:34: the tree '' has 0 nodes at its top; it needs one",
+        "f.xml:1:49: the tree 'a' has 0 nodes at its top; it needs one",
+        'f.xml:1:1: has several trees, and does not say which is the main one; add main_tree_to_execute="..."',
+    ]
+
+
+def test_a_file_with_anything_changed_is_read_or_refused_in_one_line():
+    """1,000 files with characters and tags replaced, doubled, or gone: a good line or a tree, never another error."""
+    rng = random.Random(4)  # noqa: S311
+    source = GROOT.replace("<AlwaysSuccess", '<Repeat num_cycles="2"><AlwaysSuccess').replace("'n'/>", "'n'/></Repeat>").lstrip("\ufeff")
+    pieces = ["<", ">", '"', "/", "&", "{", "}", "<Sequence>", "</Sequence>", "<SubTree ID='Main'/>", "\0", "ü", " _while='", "{=}", "ID="]
+    read = 0
+    for _ in range(1000):
+        text = source
+        for _ in range(rng.randint(1, 3)):
+            at, length = rng.randrange(len(text)), rng.choice([0, 1, 1, 5, 30])
+            text = text[:at] + rng.choice([*pieces, "", text[at : at + 20]]) + text[at + length :]
+        try:
+            make_tree(read_text(text), standard_palette(), lambda: 0).tick()
+            read += 1
+        except TreeError as error:
+            assert "\n" not in str(error), text  # noqa: PT017 - either is right
+    assert read > 50
