@@ -49,7 +49,7 @@ LEVELS = 2  # of the pyramid in which it is followed from view to view: some ten
 
 @dataclass(frozen=True)
 class ScaleLimits:
-    """When the scale of the depths is not believed; measured in rendered flights, see docs/perception.md.
+    """When the scale of the depths is not believed; measured in rendered flights, docs/experiments/perception.md.
 
     ``max_error`` is of the depth. The last ``estimates`` within ``window_s`` must be there, each surer than ``max_sigma``.
     """

@@ -26,7 +26,7 @@ SHARPNESS_FELL = 0.6  # from image to image of a good camera it falls to 0.9 at 
 
 @dataclass(frozen=True)
 class ImageLimits:
-    """Grey levels (0..255) and shares (0..1); measured on real images, see docs/perception.md.
+    """Grey levels (0..255) and shares (0..1); measured on real images, docs/experiments/perception.md.
 
     ``min_contrast``: deviation of the averaged image; a dark image (mean below ``dark_mean``) needs twice as much. ``min_changed``: share
     of the pixels that differ from the image before; noise alone changes most of them.

@@ -40,7 +40,7 @@ STRONGEST = 99.5  # percentile of the gradient: the edges that are looked at
 
 @dataclass(frozen=True)
 class ViewLimits:
-    """Pixels of the image that is matched, and shares (0..1); measured on real images, see docs/perception.md.
+    """Pixels of the image that is matched, and shares (0..1); measured on real images, docs/experiments/perception.md.
 
     Of the features ``max_negative`` have a negative disparity where the cameras are swapped, ``max_beyond`` one of less than -``beyond_px``
     where one of them is turned aside: what is far away seems to be beyond infinity.

@@ -1,0 +1,128 @@
+"""What the documents name exists: links, anchors, files, folders, modules and what they define. Pages on history name what was."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ALULA_ROOT = Path(__file__).resolve().parents[1]
+ROOMS = sorted(path.name for path in ALULA_ROOT.iterdir() if path.is_dir() and path.name[0] != "." and path.name != "runs")
+SOURCES = [
+    ALULA_ROOT / "lib",
+    ALULA_ROOT / "tests/support",
+    ALULA_ROOT / "flight",
+    ALULA_ROOT / "tools",
+    *(path for path in (ALULA_ROOT / "ros2_ws/src").iterdir() if path.is_dir()),
+    *(ALULA_ROOT / "ros1_ws/src").glob("*/src"),
+    ALULA_ROOT / "bridge/ros_bridge",
+]
+"""Folders that Python's packages are imported from."""
+PAGES = sorted(
+    path
+    for room in (".", *ROOMS)
+    for path in (ALULA_ROOT.glob("*.md") if room == "." else (ALULA_ROOT / room).rglob("*.md"))
+    if path.name != "CHANGELOG.md"
+)
+NAMES = [str(path.relative_to(ALULA_ROOT)) for path in PAGES]
+EXAMPLE = re.compile(r"[A-Z]{3,}|rover|patrol|my_|[<>{}$@]|\.\.\.")
+"""A placeholder, or what a page has its reader write."""
+
+
+def spans(text: str) -> str:
+    """Return what stands in code: between backticks, and in indented or fenced blocks."""
+    fenced = re.findall(r"^```(?!skill|rl|diff|text|mermaid)\w*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    indented = re.findall(r"^ {4,}\S.*$", text, re.MULTILINE)
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    return "\n".join([*fenced, *indented, *re.findall(r"`([^`]+)`", prose)])
+
+
+def headings(text: str) -> set[str]:
+    """Return the anchors of a page's headings, as forges make them."""
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    lines = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", line.lower()).replace(" ", "-") for line in lines}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_links_lead_somewhere(name: str) -> None:
+    page = ALULA_ROOT / name
+    dead = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if re.match(r"\w+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if not file.exists() or (anchor and anchor not in headings(file.read_text())):
+            dead.append(target)
+    assert not dead
+
+
+GENERATED = {"model.py", "inputs.py", "hooks.py", "client.py", "mock.py"}
+"""What a build makes of a model."""
+
+
+@cache
+def files() -> frozenset[str]:
+    """Return the names of all files of the rooms, and of what a build makes."""
+    return frozenset(GENERATED).union(path.name for room in ROOMS for path in (ALULA_ROOT / room).rglob("*") if path.is_file())
+
+
+def missing_paths(page: Path) -> Iterator[str]:
+    """Yield the paths below a room, and the source files, that a page names and that are not there."""
+    code = spans(page.read_text())
+    for path in re.findall(r"(?<![\w/.~$-])(?:\./)?((?:[\w@.+-]+/)+[\w@.*+-]*)", code):
+        if path.split("/")[0] in ROOMS and not EXAMPLE.search(path) and not list(ALULA_ROOT.glob(path.rstrip("./"))):
+            yield path
+    for path in re.findall(r"(?<![\w/.*<@-])((?:\w+/)*\w+\.(?:py|cpp|hpp|launch|srv|msg))\b(?!\.)", code):
+        if not EXAMPLE.search(path) and path.split("/")[-1] not in files():
+            yield path
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_named_files_exist(name: str) -> None:
+    assert not list(missing_paths(ALULA_ROOT / name))
+
+
+@cache
+def packages() -> dict[str, Path]:
+    """Return the folders of the checkout's Python packages by their names."""
+    found = {path.parent.name: path.parent for source in SOURCES for path in source.glob("*/__init__.py")}
+    return found | {path.name: path for path in (ALULA_ROOT / "lib").iterdir() if path.name == "alula"}
+
+
+@cache
+def defined(module: Path) -> frozenset[str]:
+    """Return all names that a module binds, also inside of its classes."""
+    tree = ast.parse(module.read_text())
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    bound = {node.name for node in ast.walk(tree) if isinstance(node, kinds)}
+    bound |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    return frozenset(
+        bound | {alias.asname or alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names}
+    )
+
+
+def exists(dotted: str) -> bool:
+    """Return whether a module is there, and what is named in it."""
+    first, *rest = dotted.split(".")
+    place = packages()[first]
+    while rest and (place / rest[0]).is_dir():
+        place /= rest.pop(0)
+    module = place / "__init__.py"
+    if rest and (place / f"{rest[0]}.py").is_file():
+        module = place / f"{rest.pop(0)}.py"
+    return not rest or (module.is_file() and rest[0] in defined(module))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_named_modules_exist(name: str) -> None:
+    known = "|".join(sorted(packages()))
+    named = re.findall(
+        rf"(?<![\w/.-])((?:{known})(?:\.[A-Za-z_]\w*)+)(?![\w/]|\.(?:yaml|launch|md|py))", spans((ALULA_ROOT / name).read_text())
+    )
+    assert not sorted({dotted for dotted in named if not EXAMPLE.search(dotted) and not exists(dotted)})
