@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from alula.cli import COMMANDS
 from alula_testing.counterexamples import EXAMPLES
 
 ALULA_ROOT = Path(__file__).resolve().parents[1]
@@ -145,6 +146,13 @@ def test_completion_is_a_bash_script_that_knows_commands() -> None:
     complete = "COMP_WORDS=(alula ch); COMP_CWORD=1; _alula; echo ${COMPREPLY[@]}"
     done = subprocess.run(["bash", "-c", f"{script}\n{complete}"], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["check"]
+
+
+def test_the_checkout_has_every_command_of_the_library() -> None:
+    told = alula("help").stdout
+    listed = set(re.findall(r"^  (\w+)", told, re.MULTILINE))
+    assert set(COMMANDS) <= listed
+    assert "language server" in alula("editor", "--help").stdout
 
 
 def test_version_is_the_change_logs() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -126,3 +127,16 @@ def test_named_modules_exist(name: str) -> None:
         rf"(?<![\w/.-])((?:{known})(?:\.[A-Za-z_]\w*)+)(?![\w/]|\.(?:yaml|launch|md|py))", spans((ALULA_ROOT / name).read_text())
     )
     assert not sorted({dotted for dotted in named if not EXAMPLE.search(dotted) and not exists(dotted)})
+
+
+@cache
+def commands() -> frozenset[str]:
+    """Return the commands and benches that the entry script tells of."""
+    told = subprocess.run([ALULA_ROOT / "alula", "help"], capture_output=True, text=True, check=True).stdout
+    return frozenset(re.findall(r"^  (\w+)", told, re.MULTILINE)) | {"help"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_named_commands_exist(name: str) -> None:
+    named = re.findall(r"(?:^|[\s/])alula ([a-z]\w*)", spans((ALULA_ROOT / name).read_text()))
+    assert not set(named) - commands()
