@@ -79,7 +79,7 @@ def missing_paths(page: Path) -> Iterator[str]:
     for path in re.findall(r"(?<![\w/.~$-])(?:\./)?((?:[\w@.+-]+/)+[\w@.*+-]*)", code):
         if path.split("/")[0] in ROOMS and not EXAMPLE.search(path) and not list(ALULA_ROOT.glob(path.rstrip("./"))):
             yield path
-    for path in re.findall(r"(?<![\w/.*<@-])((?:\w+/)*\w+\.(?:py|cpp|hpp|launch|srv|msg))\b(?!\.)", code):
+    for path in re.findall(r"(?<![\w/.*<@-])((?:\w+/)*\w+\.(?:py|js|cpp|hpp|launch|srv|msg))\b(?!\.)", code):
         if not EXAMPLE.search(path) and path.split("/")[-1] not in files():
             yield path
 
