@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -16,7 +19,8 @@ from alula.missions.director import EXIT_CODES
 
 Row = Mapping[str, Any]
 CODE_OF = {outcome.value: code for outcome, code in EXIT_CODES.items()}
-"""How ``./alula fly`` ends, by a row's outcome."""
+"""How ``alula run`` ends, by a row's outcome."""
+_INCLUDED = re.compile(r"\$\(find (\w+)\)/launch/([\w.]+\.launch)")
 
 
 @dataclass
@@ -104,8 +108,20 @@ def _count(one: Cover, row: Row, response: str, after_s: float | None) -> None:
 
 def processes(scenarios: Iterable[Scenario]) -> list[str]:
     """Return the names of the processes of a run, as the launch files start them; the recorder is none of the robot's."""
-    packages = {scenario.launch.partition("/")[0] for scenario in scenarios if scenario.launch}
-    folders = [place / package / "launch" for place in find_robot().ros1.packages for package in sorted(packages)]
-    files = [file for folder in folders for file in sorted(folder.glob("*.launch"))]
-    nodes = (node.get("name", "") for file in files for node in ET.parse(file).iter("node"))  # noqa: S314 - the robot's own
+    nodes = (node.get("name", "") for file in launch_files(scenarios) for node in ET.parse(file).iter("node"))  # noqa: S314 - our own
     return sorted({name for name in nodes if name and name != "record" and "$" not in name})
+
+
+def launch_files(scenarios: Iterable[Scenario]) -> list[Path]:
+    """Return the launch files of scenarios, and those that they include, as far as they are the robot's or the installation's."""
+    installed = [Path(os.environ["ALULA_ROOT"]) / "ros1_ws/src"] if "ALULA_ROOT" in os.environ else []
+    places = [*find_robot().ros1.packages, *installed]
+    named = [(package, file) for package, _, file in (scenario.launch.partition("/") for scenario in scenarios)]
+    found: dict[tuple[str, str], Path] = {}
+    while named:
+        package, file = named.pop()
+        path = next((path for place in places if (path := place / package / "launch" / file).is_file()), None)
+        if path is not None and (package, file) not in found:
+            found[package, file] = path
+            named += _INCLUDED.findall(path.read_text(encoding="utf-8"))
+    return [found[name] for name in sorted(found)]

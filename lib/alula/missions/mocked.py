@@ -8,7 +8,7 @@ from pathlib import Path
 
 from alula.common.faults import FaultRequest
 from alula.missions.director import Director, End, Outcome
-from alula.missions.leaves import SkillLeaf
+from alula.missions.driver import TICK_PERIOD_S, MissionDriver
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
@@ -19,7 +19,6 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.local import LocalWorld
 from alula.runtime.mock import Behaviour, MockRobot, mock_world
 
-TICK_PERIOD_S = 0.1
 LATENCY_S = 0.005
 LIMIT_S = 3600.0
 """Mission clock after which a mission that goes round in circles is aborted, and after which twice it is left."""
@@ -61,34 +60,35 @@ class MockedMission:
         for fault in faults:
             self.robot.fail(fault)
         self._tick_period_s = tick_period_s
-        self._due = False
-        self._abort_reasons: list[str] = []
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
-        clients = {skillset.name: MissionClient(self.world.client(skillset.name), self._wake, record) for skillset in skillsets}
-        mission, blackboard = plan.make(clients, clock_ns, plan.parameters)
-        self._leaves = [(node, path_of(node)) for node in mission.root.iterate() if isinstance(node, SkillLeaf)]
-        self.director = Director(mission, blackboard)
+        client = lambda name, wake: MissionClient(self.world.client(name), wake, record)  # noqa: E731
+        self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record, soon=self.world.clock.soon)
+        self._leaves = [(leaf, path_of(leaf)) for leaf in self._driver.leaves]
         self.world.on_event(self._on_event)
 
     def run(self) -> End:
         """Run to the end; time is that of the world, so this takes a moment."""
         begun = time.perf_counter()
-        self._tick_regularly()
-        over = lambda: self.director.end is not None  # noqa: E731
+        self._driver.tick_regularly(self.world.clock.after, self._tick_period_s)
+        over = lambda: self._driver.end is not None  # noqa: E731
         if not self.world.run_until(over, timeout_s=LIMIT_S):
-            self.director.abort(f"not over after {LIMIT_S:g} s")
+            self._driver.abort(f"not over after {LIMIT_S:g} s")
             self.world.run_until(over, timeout_s=LIMIT_S)
         self.world.run_for(0.0)
-        end = self.director.end or End(Outcome.ABORTED, "the stop did not end")
+        end = self._driver.end or End(Outcome.ABORTED, "the stop did not end")
         self.wall_s = time.perf_counter() - begun
-        if self._record is not None:
-            self._record.finish(end, self.director, self.world.now_s)
+        self._driver.finish(end)
         return end
 
     def abort(self, reason: str) -> None:
         """Have the robot stop at the next tick; may be called by a signal's handler."""
-        self._abort_reasons.append(reason)
+        self._driver.ask_abort(reason)
+
+    @property
+    def director(self) -> Director:
+        """What drives the tree."""
+        return self._driver.director
 
     @property
     def open_executions(self) -> list[str]:
@@ -109,41 +109,8 @@ class MockedMission:
         """Return what went wrong in the mocks themselves."""
         return [*self.world.errors, *self.robot.host.notes]
 
-    # --- ticks -------------------------------------------------------------------------------------------------------
-
-    def _tick_regularly(self) -> None:
-        if self.director.end is None:
-            self.world.clock.after(self._tick_period_s, self._tick_regularly)
-            self._wake()
-
-    def _wake(self) -> None:
-        """Have the tree ticked once after all that happens at this moment."""
-        if not self._due:
-            self._due = True
-            self.world.clock.soon(self._tick)
-
-    def _tick(self) -> None:
-        self._due = False
-        if self._abort_reasons:
-            self._abort_now(self._abort_reasons.pop())
-        if self._record is not None:
-            self._record.tick(self.director)
-        try:
-            self.director.step()
-        except Exception as error:  # noqa: BLE001 - as over ROS 2: whatever breaks in a tree, the robot has to come to rest
-            self.director.abort(f"the tree raised {type(error).__name__}: {error}")
-        if self._record is not None:
-            self._record.outcome_of_tick(self.director)
-
-    def _abort_now(self, reason: str) -> None:
-        if self._record is not None:
-            self._record.abort(reason)
-        self.director.abort(reason)
-
     def _on_event(self, _skillset: str, event: EngineEvent) -> None:
         self.events.append(event)
         if isinstance(event, ExecutionEvent) and event.state is ExecutionState.REQUESTED:
             self.places[event.id] = next((path for leaf, path in self._leaves if leaf.handle and leaf.handle.id == event.id), ())
-        if self._record is not None:
-            self._record.event(event)
-        self._wake()
+        self._driver.event(event)

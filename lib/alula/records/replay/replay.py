@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,8 @@ from typing import Any
 from alula.common.faults import FaultRequest
 from alula.common.record import OPERATOR, TICKS, Entry
 from alula.missions.director import Director, End, Outcome
+from alula.missions.driver import MissionDriver
+from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient, Recorder
@@ -28,7 +31,6 @@ from alula.runtime.core.events import EngineEvent
 from alula.runtime.handle import SkillHandle
 from alula.runtime.plain import to_plain
 
-TICK_PERIOD_S = 0.1
 LIMIT_S = 3600.0
 """Mission clock after the record's end, after which a mission that goes round in circles is left."""
 MAX_GAP_S = 86400.0
@@ -102,13 +104,12 @@ class Replay:
         self.vehicle = vehicle
         self.decisions: list[Decision] = []
         self._world = self.vehicle.world
-        self._free = False
-        self._due = False
         clock_ns = lambda: self._world.clock.now_ns  # noqa: E731
         self._record = None if record is None else record(clock_ns)
-        clients = {name: ReplayClient(self._world.client(name), self._wake, self, vehicle.handles) for name in plan.skillsets}
-        mission, blackboard = plan.make(clients, clock_ns, parameters)
-        self.director = Director(mission, blackboard)
+        client = lambda name, wake: ReplayClient(self._world.client(name), wake, self, vehicle.handles)  # noqa: E731
+        self._driver = MissionDriver(plan, client, clock_ns, parameters, record=self._record, soon=self._world.clock.soon)
+        self._driver.remembers = True
+        self._driver.woken_by_events = False  # while the record says when it is ticked
         self._comparison = Comparison(recorded, self._knowledge)
         vehicle.differs = lambda why: self._comparison.told(why, self._world.now_s)
         self._world.on_event(self._on_event)
@@ -125,9 +126,7 @@ class Replay:
                 break
         if self._may_go_on():
             self._after_the_record()
-        if self._record is not None:
-            end = self.director.end or End(Outcome.RUNNING)
-            self._record.finish(end, self.director, self._world.now_s)
+        self._driver.finish(self.director.end or End(Outcome.RUNNING))
         notes = [*self._world.errors, *self.vehicle.host.notes]
         return Result(
             decisions=self.decisions,
@@ -157,8 +156,8 @@ class Replay:
 
     def _take(self, entry: Entry) -> None:
         if entry.topic == TICKS:
-            if not self._free and not (self._ticked and entry.value.get("unmet")):
-                self._tick()
+            if not self._driver.woken_by_events and not (self._ticked and entry.value.get("unmet")):
+                self._driver.tick()
         elif entry.topic == OPERATOR:
             if entry.value.get("by") == "mission":
                 self._obey(str(entry.value.get("command")), str(entry.value.get("reason", "")))
@@ -168,9 +167,10 @@ class Replay:
     def _obey(self, command: str, reason: str) -> None:
         """Have the mission do what it was told from outside then, where it can now."""
         if command == "abort":
-            self.director.abort(reason)
-        elif command in {"pause", "resume"} and not self.director.refusal(paused=command == "pause"):
-            (self.director.pause if command == "pause" else self.director.resume)()
+            self._driver.abort(reason)
+        elif command in {"pause", "resume"}:
+            with contextlib.suppress(PauseRefusedError):
+                self._driver.set_paused(paused=command == "pause")
 
     def _after_the_record(self) -> None:
         """Go on without it, where that was asked for; what was expected and did not come is a difference."""
@@ -183,35 +183,16 @@ class Replay:
 
     # --- the tree ----------------------------------------------------------------------------------------------------
 
-    def _tick(self) -> None:
-        self._due = False
-        if self._record is not None:
-            self._record.tick(self.director)
-        try:
-            self.director.step()
-        except Exception as error:  # noqa: BLE001 - as in flight: whatever breaks in a tree, the robot has to come to rest
-            self.director.abort(f"the tree raised {type(error).__name__}: {error}")
-        if self._record is None:
-            self.director.remember()
-        else:
-            self._record.outcome_of_tick(self.director)
-
-    def _wake(self) -> None:
-        """Have the tree ticked once after all that happens at this moment; while the record says when, it is not up to events."""
-        if self._free and not self._due and self.director.end is None:
-            self._due = True
-            self._world.clock.soon(self._tick)
+    @property
+    def director(self) -> Director:
+        """What drives the tree."""
+        return self._driver.director
 
     def _set_free(self) -> None:
         """Let the tree be ticked by the clock and by what happens from now on."""
-        if not self._free:
-            self._free = True
-            self._tick_regularly()
-
-    def _tick_regularly(self) -> None:
-        if self.director.end is None:
-            self._world.clock.after(TICK_PERIOD_S, self._tick_regularly)
-            self._wake()
+        if not self._driver.woken_by_events:
+            self._driver.woken_by_events = True
+            self._driver.tick_regularly(self._world.clock.after)
 
     def _may_go_on(self) -> bool:
         if self._comparison.difference is None:
@@ -245,9 +226,7 @@ class Replay:
             self._record.sample(skillset, data, value, stamp_ns)
 
     def _on_event(self, _skillset: str, event: EngineEvent) -> None:
-        if self._record is not None:
-            self._record.event(event)
-        self._wake()
+        self._driver.event(event)
 
     def _knowledge(self, skill: str) -> Knowledge:
         resources = {

@@ -9,7 +9,7 @@ import json
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,9 @@ from skillset_interfaces.msg import Event
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
-from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, Director, End, Outcome
+from alula.common.signals import on_end_signal
+from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, End, Outcome
+from alula.missions.driver import TICK_PERIOD_S, MissionDriver
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
@@ -30,7 +32,6 @@ from alula.missions.skillset import MissionClient
 from alula.runtime.codecs import event_of
 from skillset_ros2 import NodeExecutor, SkillsetClient
 
-TICK_PERIOD_S = 0.1
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ALL_EVENTS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -44,20 +45,27 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def __init__(self, out: Path, plan: MissionPlan) -> None:
         super().__init__("mission")
-        self.due = False
-        self._plan = plan
-        self._values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
-        self.record = MissionRecord(out, plan, self._clock_ns, self._values)
+        values = {name: self._parameter(name, value) for name, value in plan.parameters.items()}
+        self._record = MissionRecord(out, plan, self._clock_ns, values)
+        self._skillset_clients: list[MissionClient] = []
+        self.driver = MissionDriver(
+            plan,
+            self._make_client,
+            self._clock_ns,
+            values,
+            record=self._record,
+            say=self.get_logger().warning,
+            start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S),
+        )
+        plan.listen(self, self.driver.blackboard)
         self._view_json = ""
-        self._skillsets = {name: MissionClient(SkillsetClient(self, name), self.wake, self.record) for name in plan.skillsets}
-        self.director = self._make_director()
         self._heartbeat: Publisher | None = None
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
         for name in plan.skillsets:
-            self.create_subscription(Event, f"/{name}/events", self._on_event, ALL_EVENTS)
+            self.create_subscription(Event, f"/{name}/events", lambda event: self.driver.event(event_of(event)), ALL_EVENTS)
         self.create_service(Trigger, "/mission/abort", self._on_abort)
         self.create_service(SetBool, "/mission/pause", self._on_pause)
-        self.create_timer(TICK_PERIOD_S, self.wake)
+        self.create_timer(TICK_PERIOD_S, self.driver.wake)
 
     @property
     def now_s(self) -> float:
@@ -67,89 +75,50 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def _clock_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
-    def meet(self) -> None:
-        """Advertise the heartbeats once every skillset can be called: simulated time begins with them."""
-        if self._heartbeat is None and all(client.ready for client in self._skillsets.values()):
-            # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
-            self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", LATCHED)
-
-    def wake(self) -> None:
-        """Have the tree ticked in this turn of the main loop; several events in one turn make one tick."""
-        self.due = True
-
-    def tick(self) -> None:
-        """Do one step and tell the world."""
-        self.due = False
-        self.record.tick(self.director)
-        try:
-            self.director.step()
-        except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
-            self.get_logger().error(f"the tree raised {type(error).__name__}: {error}")
-            self.director.abort(f"the tree raised {type(error).__name__}: {error}")
-        held = self.director.news_of_pause()
-        if held:
-            self.record.told("paused", held)
-        if self._heartbeat is not None:
-            self._heartbeat.publish(Header(stamp=self.get_clock().now().to_msg(), frame_id="mission"))
-        self.record.outcome_of_tick(self.director)
-        self._publish_tree()
-
-    def abort(self, reason: str) -> str:
-        """Stop what runs and bring the robot to rest where it is."""
-        self.record.abort(reason)
-        answer = self.director.abort(reason)
-        self.get_logger().warning(f"{reason}: {answer}")
-        self.wake()
-        return answer
-
-    def set_paused(self, *, paused: bool) -> str:
-        """Pause the mission, or have it go on; return what happens, in words. Raises PauseRefusedError."""
-        refusal = self.director.refusal(paused=paused)
-        if refusal:
-            raise PauseRefusedError(refusal)
-        self.record.told("pause" if paused else "resume", "")
-        if paused:
-            answer = f"the mission is paused: {self.director.pause()}"
-        else:
-            self.director.resume()
-            answer = "the mission goes on"
-        self.get_logger().warning(answer)
-        self.wake()
-        return answer
+    def turn(self) -> None:
+        """Do what is due in this turn of the main loop: several events in one turn make one tick."""
+        self._meet()
+        if self.driver.due or self.driver.abort_asked:
+            self.driver.tick()
+            if self._heartbeat is not None:
+                self._heartbeat.publish(Header(stamp=self.get_clock().now().to_msg(), frame_id="mission"))
+            self._publish_tree()
 
     def finish(self, end: End) -> None:
         """Write what is left to write."""
         self._publish_tree()
-        self.record.finish(end, self.director, self.now_s)
-        for problem in self.record.problems:
+        self.driver.finish(end)
+        for problem in self._record.problems:
             self.get_logger().error(problem)
 
-    def _make_director(self) -> Director:
-        mission, blackboard = self._plan.make(self._skillsets, self._clock_ns, self._values)
-        self._plan.listen(self, blackboard)
-        return Director(mission, blackboard, start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S))
+    def _make_client(self, name: str, wake: Callable[[], None]) -> MissionClient:
+        client = MissionClient(SkillsetClient(self, name), wake, self._record)
+        self._skillset_clients.append(client)
+        return client
+
+    def _meet(self) -> None:
+        """Advertise the heartbeats once every skillset can be called: simulated time begins with them."""
+        if self._heartbeat is None and all(client.ready for client in self._skillset_clients):
+            # Latched: time waits for the first heartbeats, which may be sent before a bridge has connected.
+            self._heartbeat = self.create_publisher(Header, "/mission/heartbeat", LATCHED)
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value
 
     def _publish_tree(self) -> None:
-        view_json = json.dumps(self.director.view().as_dict())
+        view_json = json.dumps(self.driver.director.view().as_dict())
         if view_json != self._view_json:
             self._view_json = view_json
             self._tree.publish(String(data=view_json))
 
-    def _on_event(self, event: Event) -> None:
-        self.record.event(event_of(event))
-        self.wake()
-
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.message = self.abort("aborted by the operator")
-        response.success = self.director.end is None or self.director.end.outcome is Outcome.ABORTED
+        response.message = self.driver.abort("aborted by the operator")
+        response.success = self.driver.end is None or self.driver.end.outcome is Outcome.ABORTED
         return response
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         try:
-            response.success, response.message = True, self.set_paused(paused=request.data)
+            response.success, response.message = True, self.driver.set_paused(paused=request.data)
         except PauseRefusedError as error:
             response.success, response.message = False, str(error)
         return response
@@ -170,37 +139,32 @@ class Standstill:
         return time.monotonic() - self._since > self._timeout_s
 
 
-def tick_to_the_end(node: MissionNode, signals: Sequence[int]) -> End:
+def tick_to_the_end(node: MissionNode, signals: list[signal.Signals]) -> End:
     """Tick until the mission is over; ``signals`` grows when the process is told to end."""
-    executor = NodeExecutor()
+    executor, driver = NodeExecutor(), node.driver
     executor.add_node(node)
     standstill = Standstill(timeout_s=60.0)
-    obeyed = 0
-    while node.director.end is None:
+    while driver.end is None:
         executor.spin_once(timeout_sec=TURN_S)
-        node.meet()
-        if len(signals) > obeyed:
-            obeyed = len(signals)
-            node.abort(f"told to end by {signal.Signals(signals[-1]).name}")
-        if node.due:
-            node.tick()
+        while signals:
+            driver.ask_abort(f"told to end by {signals.pop(0).name}")
+        node.turn()
         if standstill.lasts(node.now_s):
-            return End(Outcome.NOT_STARTED if node.director.start_s is None else Outcome.GIVEN_UP, "the mission clock stands still")
-    end = time.monotonic() + LAST_EVENTS_S
-    while node.record.unended and time.monotonic() < end:
+            return End(Outcome.NOT_STARTED if driver.director.start_s is None else Outcome.GIVEN_UP, "the mission clock stands still")
+    end_s = time.monotonic() + LAST_EVENTS_S
+    while not driver.settled and time.monotonic() < end_s:
         executor.spin_once(timeout_sec=TURN_S)
-    return node.director.end
+    return driver.end
 
 
 def run_mission(plan: MissionPlan, out: Path, arguments: Sequence[str] | None = None) -> int:
     """Run a mission in this process; return the exit code: 0 accomplished, 1 given up or aborted, 2 could not start.
 
-    ``arguments`` (default: the command line) may hold ``--ros-args``. SIGINT and SIGTERM bring the robot to rest first.
+    ``arguments`` (default: the command line) may hold ``--ros-args``. SIGINT, SIGTERM and SIGHUP bring the robot to rest first.
     """
     words = list(sys.argv if arguments is None else arguments)
-    signals: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, _frame: signals.append(received))
+    signals: list[signal.Signals] = []
+    on_end_signal(signals.append)
     # rclpy's own handlers would end the communication that is needed to stop the robot.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
     node = MissionNode(out, plan)

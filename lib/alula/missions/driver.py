@@ -1,0 +1,169 @@
+"""Drives a mission's director and keeps the record of it; the host only says when: rclpy's timers, virtual time, or a recorded clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from alula.missions.director import START_TIMEOUT_S, Director, End
+from alula.missions.leaves import SkillLeaf
+from alula.missions.pausing import PauseRefusedError
+from alula.missions.plan import MissionPlan
+from alula.missions.record import MissionRecord
+from alula.missions.skillset import Client, Clock
+from alula.runtime.core.events import EngineEvent
+
+TICK_PERIOD_S = 0.1
+Job = Callable[[], None]
+MakeClient = Callable[[str, Job], Client]
+"""Makes a skillset's client of its name, and of what has the tree ticked."""
+
+
+def later(_tick: Job) -> None:
+    """Leave a tick that is due to the host, which looks at ``due``."""
+
+
+def say_nothing(_line: str) -> None:
+    """Say nothing."""
+
+
+class MissionDriver:
+    """A mission that runs: its tree is ticked, what comes from outside is obeyed, all of it is written down.
+
+    Args:
+        plan: the mission.
+        client: makes the clients.
+        clock_ns: the mission clock.
+        parameters: of the mission.
+        record: what is written to; None: nothing is.
+        soon: has a tick done once, after all that happens at this moment; without it the host looks at ``due``.
+        say: takes what is worth a line in a log.
+        start_timeout_s: how long the mission waits for what it needs.
+    """
+
+    def __init__(
+        self,
+        plan: MissionPlan,
+        client: MakeClient,
+        clock_ns: Clock,
+        parameters: Mapping[str, float],
+        *,
+        record: MissionRecord | None = None,
+        soon: Callable[[Job], object] = later,
+        say: Callable[[str], None] = say_nothing,
+        start_timeout_s: float = START_TIMEOUT_S,
+    ) -> None:
+        self.due = False
+        self.woken_by_events = True
+        """False: the host alone says when the tree is ticked."""
+        self.remembers = False
+        """Views of the tree are wanted although there is no record."""
+        self.record = record
+        self._clock_ns = clock_ns
+        self._soon = soon
+        self._say = say
+        self._aborts: list[str] = []
+        clients = {name: client(name, self.wake) for name in plan.skillsets}
+        mission, self.blackboard = plan.make(clients, clock_ns, parameters)
+        self.leaves = [node for node in mission.root.iterate() if isinstance(node, SkillLeaf)]
+        self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s)
+
+    @property
+    def end(self) -> End | None:
+        """How the mission ended; None while it runs."""
+        return self.director.end
+
+    # --- when --------------------------------------------------------------------------------------------------------
+
+    def wake(self) -> None:
+        """Have the tree ticked once after all that happens at this moment."""
+        if self.woken_by_events and not self.due and self.end is None:
+            self.due = True
+            self._soon(self.tick)
+
+    def tick_regularly(self, after: Callable[[float, Job], object], period_s: float = TICK_PERIOD_S) -> None:
+        """Have the tree ticked now and every ``period_s`` to the mission's end; ``after`` has a job done after seconds of mission clock."""
+        if self.end is None:
+            after(period_s, lambda: self.tick_regularly(after, period_s))
+            self.wake()
+
+    def tick(self) -> None:
+        """Do one step, and write down what it was."""
+        self.due = False
+        if self._aborts:
+            self.abort(self._aborts.pop())
+            self._aborts.clear()
+        if self.record is not None:
+            self.record.tick(self.director)
+        try:
+            self.director.step()
+        except Exception as error:  # noqa: BLE001 - whatever breaks in a tree, the robot has to come to rest
+            reason = f"the tree raised {type(error).__name__}: {error}"
+            self._say(reason)
+            self.director.abort(reason)
+        self._note_step()
+
+    def _note_step(self) -> None:
+        held = self.director.news_of_pause()
+        if self.record is not None:
+            if held:
+                self.record.told("paused", held)
+            self.record.outcome_of_tick(self.director)
+        elif self.remembers:
+            self.director.remember()
+
+    # --- what comes from outside -------------------------------------------------------------------------------------
+
+    def event(self, event: EngineEvent) -> None:
+        """Take an event of a skillset."""
+        if self.record is not None:
+            self.record.event(event)
+        self.wake()
+
+    def ask_abort(self, reason: str) -> None:
+        """Have the robot come to rest at the next tick; may be called by a signal's handler."""
+        self._aborts.append(reason)
+
+    @property
+    def abort_asked(self) -> bool:
+        """Tell whether the next tick has the robot come to rest."""
+        return bool(self._aborts)
+
+    def abort(self, reason: str) -> str:
+        """Stop what runs and bring the robot to rest where it is; return what happens, in words."""
+        if self.record is not None:
+            self.record.abort(reason)
+        answer = self.director.abort(reason)
+        self._say(f"{reason}: {answer}")
+        if self.end is None:
+            self.wake()
+        else:  # it had not begun: there is no other tick
+            self._note_step()
+        return answer
+
+    def set_paused(self, *, paused: bool) -> str:
+        """Pause the mission, or have it go on; return what happens, in words. Raises PauseRefusedError."""
+        refusal = self.director.refusal(paused=paused)
+        if refusal:
+            raise PauseRefusedError(refusal)
+        if self.record is not None:
+            self.record.told("pause" if paused else "resume", "")
+        if paused:
+            answer = f"the mission is paused: {self.director.pause()}"
+        else:
+            self.director.resume()
+            answer = "the mission goes on"
+        self._say(answer)
+        self.wake()
+        return answer
+
+    # --- the end -----------------------------------------------------------------------------------------------------
+
+    @property
+    def settled(self) -> bool:
+        """Tell whether the events of all that has ended are here; a result may come before its event."""
+        return self.record is None or not self.record.unended
+
+    def finish(self, end: End) -> None:
+        """Write what is left to write."""
+        if self.record is not None:
+            self.record.finish(end, self.director, self._clock_ns() / 1e9)
