@@ -49,13 +49,28 @@ def headings(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", line.lower()).replace(" ", "-") for line in lines}
 
 
+def links(page: Path) -> Iterator[str]:
+    """Yield what a page links to in the checkout."""
+    return (target for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()) if not re.match(r"\w+:", target))
+
+
+def test_each_page_is_found_from_the_readme() -> None:
+    """From the README by links, in any number of steps."""
+    found: set[Path] = set()
+    waiting = [ALULA_ROOT / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        if page not in found and page.suffix == ".md" and page.exists():
+            found.add(page)
+            waiting += [(page.parent / target.partition("#")[0]).resolve() for target in links(page) if target[0] != "#"]
+    assert not [str(path.relative_to(ALULA_ROOT)) for path in PAGES if path not in found]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_links_lead_somewhere(name: str) -> None:
     page = ALULA_ROOT / name
     dead = []
-    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
-        if re.match(r"\w+:", target):
-            continue
+    for target in links(page):
         path, _, anchor = target.partition("#")
         file = (page.parent / path).resolve() if path else page
         if not file.exists() or (anchor and anchor not in headings(file.read_text())):
