@@ -43,7 +43,7 @@ def judge(log: Log, models: Sequence[Path] = ()) -> Verdict:
     except UnsupportedModelError as error:
         raise AnalysisError(str(error)) from None
     for entry in log.entries:
-        monitor.take(entry.event, entry.life)
+        monitor.take(entry.event, entry.instance_id)
     return monitor.verdict
 
 

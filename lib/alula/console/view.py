@@ -126,7 +126,7 @@ class SkillsetView:
             self._readings[name] = _Reading(value_json, stamp_ns, stale)
             self.version += 1
 
-    def heard_life(self, *, alive: bool) -> None:
+    def heard_heartbeat(self, *, alive: bool) -> None:
         """Learn whether the managers can be called."""
         with self._lock:
             if alive == self.alive:

@@ -20,10 +20,10 @@ _SUFFIXES = (".mcap", ".db3", ".bag", ".jsonl", ".json")
 
 @dataclass(frozen=True)
 class Logged:
-    """An event as it was logged; ``life`` names the managers that it is from, empty where the log does not say."""
+    """An event as it was logged; ``instance_id`` is that of its managers, empty where the log does not say."""
 
     event: EngineEvent
-    life: str = ""
+    instance_id: str = ""
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,9 @@ def _log_file(path: Path) -> Path:
     return found[0]
 
 
-def _event(value: dict[str, Any], place: str) -> Logged:
+def _event(value: dict[str, Any], place: str, instance_id: str = "") -> Logged:
     try:
-        return Logged(read_event(value), str(value.get("life", "")))
+        return Logged(read_event(value), instance_id)
     except ValueError as error:
         raise AnalysisError(f"{place}: is no event: {error}") from None
 
@@ -141,7 +141,7 @@ def _from_message(message: Any, path: Path) -> Logged:
     names = ("sequence", "skillset", "skill", "id", "state", "result", "message", "resource", "from_state", "to_state", "cause")
     value = {"stamp_s": stamp_s, "kind": _KINDS.get(message.kind), **{name: getattr(message, name) for name in names}}
     value |= {"result_kind": getattr(message, "result_kind", "")} | dict(_values(message, path))
-    return _event({**value, "life": message.header.frame_id}, str(path))
+    return _event(value, str(path), message.header.frame_id)
 
 
 def _values(message: Any, path: Path) -> Iterator[tuple[str, object]]:

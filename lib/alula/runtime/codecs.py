@@ -137,9 +137,9 @@ def event_of(message: Any) -> EngineEvent:
 
 def states_of(message: Any) -> ResourceStates:
     """Return resource states."""
-    life, _, after = message.header.frame_id.partition(" ")
+    instance_id, _, after = message.header.frame_id.partition(" ")
     values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
-    return ResourceStates(life, int(after or 0), stamp_ns_of(message.header.stamp), values)
+    return ResourceStates(instance_id, int(after or 0), stamp_ns_of(message.header.stamp), values)
 
 
 class Codecs:
@@ -183,7 +183,7 @@ class Codecs:
         event, kind = told.event, self._messages.Event
         message = kind(skillset=skillset, sequence=event.sequence)
         set_stamp(message.header.stamp, event.stamp_ns)
-        message.header.frame_id = told.life
+        message.header.frame_id = told.instance_id
         if isinstance(event, ExecutionEvent):
             message.kind = kind.EXECUTION
             message.skill, message.id, message.state = event.skill, event.id, event.state.value
@@ -204,13 +204,13 @@ class Codecs:
         resources = [self._resource(name, one) for name, one in states.resources.items()]
         message = self._messages.ResourceStates(skillset=skillset, resources=resources)
         set_stamp(message.header.stamp, states.stamp_ns)
-        message.header.frame_id = f"{states.life} {states.after}"
+        message.header.frame_id = f"{states.instance_id} {states.after}"
         return message
 
     def _skills_message(self, skillset: str, states: SkillStates) -> Any:
         message = self._messages.SkillStates(skillset=skillset, skills=[self._skill(name, one) for name, one in states.skills.items()])
         set_stamp(message.header.stamp, states.stamp_ns)
-        message.header.frame_id = states.life
+        message.header.frame_id = states.instance_id
         return message
 
     def _skills_of(self, message: Any) -> SkillStates:

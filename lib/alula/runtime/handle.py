@@ -193,7 +193,7 @@ class Handle(Waitable, Generic[OutputsT, ResultT]):
         self._tell()
 
     def run(self, progress: float = 0.0, outputs: Mapping[str, object] | None = None) -> None:
-        """Take a sign of life of a started execution: progress and outputs."""
+        """Take news of a started execution: progress and outputs."""
         with self._lock:
             if self.done:
                 return

@@ -24,8 +24,8 @@ from alula.runtime.timers import Job, Timer
 from alula.runtime.waiting import Waiter
 
 OnValue = Callable[[Any], None]
-OnSign = Callable[[str, int], None]
-"""Gets the id of the managers' life, and the stamp of the sign (mission clock, ns); 0 where the middleware has none."""
+OnHeartbeat = Callable[[str, int], None]
+"""Gets the instance id of the managers, and the stamp of the heartbeat (mission clock, ns); 0 where the middleware has none."""
 OnReply = Callable[[Any, int], None]
 """Gets the response, and how many requests were sent for it: the response to an earlier one may have got lost."""
 OnError = Callable[[str], None]
@@ -68,9 +68,9 @@ def data_topic(data: Data, type_name: str = "") -> Topic:
 
 @dataclass(frozen=True)
 class ResourceStates:
-    """All resources after a step; ``after``: the last event that they include; ``life``: an id, new at each start of the managers."""
+    """All resources after a step; ``after``: the last event that they include; ``instance_id``: new at each start of the managers."""
 
-    life: str
+    instance_id: str
     after: int
     stamp_ns: int
     resources: Mapping[str, ResourceStatus]
@@ -78,9 +78,9 @@ class ResourceStates:
 
 @dataclass(frozen=True)
 class PublishedEvent:
-    """An event, with the ``life`` of the managers that published it."""
+    """An event, with the ``instance_id`` of the managers that published it."""
 
-    life: str
+    instance_id: str
     event: EngineEvent
 
 
@@ -88,7 +88,7 @@ class PublishedEvent:
 class SkillStates:
     """All skills at one moment."""
 
-    life: str
+    instance_id: str
     stamp_ns: int
     skills: Mapping[str, SkillRecord]
 
@@ -275,15 +275,15 @@ class Middleware(Protocol):
         """Connect to a skill's action."""
         ...
 
-    def announce(self, life: str, on_rival: OnError) -> None:
-        """Give signs of life from now on; ``life`` is the id of this start of the managers.
+    def announce(self, instance_id: str, on_rival: OnError) -> None:
+        """Send heartbeats from now on; ``instance_id`` is new at each start of the managers.
 
         ``on_rival`` is called with the reason when other managers of this skillset run already.
         """
         ...
 
-    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Call ``on_sign`` at each sign of life of the managers, and ``on_doubt()`` when the signs stay away."""
+    def watch(self, on_heartbeat: OnHeartbeat, on_doubt: Job) -> None:
+        """Call ``on_heartbeat`` at each heartbeat of the managers, and ``on_doubt()`` when the heartbeats stay away."""
         ...
 
     def close_hooks(self, timeout_s: float) -> bool:

@@ -73,8 +73,8 @@ class Graph:
         self.heard[topic.name] = callback
         return lambda: True
 
-    def watch(self, on_sign, on_doubt):
-        self.sign, self.doubt = on_sign, on_doubt
+    def watch(self, on_heartbeat, on_doubt):
+        self.heartbeat, self.doubt = on_heartbeat, on_doubt
 
     def call(self, service, request, on_reply, on_error, *, timeout_s=5.0, once=False):
         if self.silent:
@@ -87,14 +87,14 @@ class Graph:
         while self.clock.do_next(until_ns):
             pass
 
-    def states(self, life: str, after: int = 0, **resources: str) -> None:
+    def states(self, instance_id: str, after: int = 0, **resources: str) -> None:
         values = {name: ResourceStatus(state, "", 0) for name, state in resources.items()}
-        self.heard[RESOURCE_STATES.name](ResourceStates(life, after, self.clock.now_ns, values))
+        self.heard[RESOURCE_STATES.name](ResourceStates(instance_id, after, self.clock.now_ns, values))
 
-    def tell(self, life: str, handle, state: ExecutionState, sequence: int = 0) -> None:
+    def tell(self, instance_id: str, handle, state: ExecutionState, sequence: int = 0) -> None:
         self.sequence = sequence or self.sequence + 1
         event = ExecutionEvent(self.sequence, self.clock.now_ns, "takeoff", handle.id, state, "", "", {}, {})
-        self.heard[EVENTS.name](PublishedEvent(life, event))
+        self.heard[EVENTS.name](PublishedEvent(instance_id, event))
 
 
 @pytest.fixture
@@ -105,7 +105,7 @@ def graph():
 @pytest.fixture
 def client(graph):
     client = Client(graph, "flying")
-    graph.sign("one")
+    graph.heartbeat("one")
     graph.states("one", sdk="AVAILABLE")
     assert client.ready
     return client
@@ -182,14 +182,14 @@ def test_what_was_given_up_with_managers_that_were_only_frozen_is_cancelled(grap
     gone(graph)
     assert (handle.state, client.ready, client.resources) == (S.FAILED, False, {})
     assert graph.link.cancelled == []
-    graph.sign("one")
+    graph.heartbeat("one")
     assert graph.link.cancelled == [handle.id]
     assert (client.ready, client.resources) == (True, {"sdk": "AVAILABLE"})
 
 
 def test_managers_that_are_slow_to_describe_themselves_are_asked_until_they_do(graph, client):
     graph.silent = True
-    graph.sign("two")
+    graph.heartbeat("two")
     graph.states("two", sdk="UNAVAILABLE")
     graph.run_for(3 * DESCRIBE_S)
     assert not client.ready
@@ -201,7 +201,7 @@ def test_managers_that_are_slow_to_describe_themselves_are_asked_until_they_do(g
 def test_nothing_is_cancelled_at_managers_that_are_others(graph, client):
     handle = running(graph, client)
     gone(graph)
-    graph.sign("two")
+    graph.heartbeat("two")
     graph.states("two", sdk="UNAVAILABLE")
     assert (graph.link.cancelled, client.ready, client.resources) == ([], True, {"sdk": "UNAVAILABLE"})
     assert handle.state is S.FAILED
@@ -211,7 +211,7 @@ def test_a_goal_that_was_given_up_on_its_way_is_cancelled_at_managers_that_were_
     handle = client.start("takeoff", height=3.0)
     graph.run_for(ACKNOWLEDGE_S + 0.1)
     assert handle.state is S.FAILED
-    graph.sign("two")
+    graph.heartbeat("two")
     graph.states("two", sdk="AVAILABLE")
     graph.tell("two", handle, S.REQUESTED)
     assert graph.link.cancelled == [handle.id]
@@ -222,14 +222,14 @@ def test_a_goal_that_was_given_up_on_its_way_is_cancelled_at_managers_that_were_
 
 def test_managers_that_were_started_anew_do_not_know_what_runs(graph, client):
     handle = running(graph, client)
-    graph.sign("two")
+    graph.heartbeat("two")
     assert (handle.state, "restarted" in handle.message) == (S.FAILED, True)
     graph.states("one", after=99, sdk="BROKEN")  # late, of those that are no more
     assert client.resources == {"sdk": "AVAILABLE"}
 
 
 def test_two_managers_at_a_time_are_told(graph, client):
-    graph.sign("two")
+    graph.heartbeat("two")
     graph.states("one")
     assert graph.errors == []  # late, or not
     graph.run_for(2 * RIVALS_NS / 1e9)
@@ -237,12 +237,12 @@ def test_two_managers_at_a_time_are_told(graph, client):
     assert graph.errors == ["two processes manage the skillset flying; end one of them"]
 
 
-def test_a_late_sign_of_life_of_managers_that_were_killed_is_no_second_process(graph, client):
+def test_a_late_heartbeat_of_managers_that_were_killed_is_no_second_process(graph, client):
     graph.states("two", sdk="AVAILABLE")
     graph.run_for(2 * RIVALS_NS / 1e9)
-    graph.sign("one")  # DDS says that other managers live before it says which
+    graph.heartbeat("one")  # DDS says that other managers live before it says which
     assert graph.errors == []
-    graph.sign("one", graph.clock.now_ns)
+    graph.heartbeat("one", graph.clock.now_ns)
     assert graph.errors == ["two processes manage the skillset flying; end one of them"]
 
 

@@ -36,7 +36,7 @@ def test_managers_that_are_not_there_or_have_gone_leave_no_client_waiting():
     world.run_for(0.5)
     world.kill("flying")
     assert handle.wait(0.0)
-    assert (handle.outcome, handle.message) == ("FAILED", "the managers of flying have gone: they ended, or gave no sign of life")
+    assert (handle.outcome, handle.message) == ("FAILED", "the managers of flying have gone: they ended, or sent no heartbeat")
     assert not client.ready
     assert client.start("takeoff", height=3.0).outcome == "FAILED"
     world.serve(flying_skillset(), timed)

@@ -52,21 +52,21 @@ class SkillsetMonitor:
         self._steps = PossibleSteps(skillset)
         self._begin("")
 
-    def _begin(self, life: str) -> None:
+    def _begin(self, instance_id: str) -> None:
         self._beliefs: list[Belief] = [Belief(semantics.initial(self.skillset))]
         self._last: EngineEvent | None = None
-        self._life = life
+        self._instance_id = instance_id
         self._ended: dict[str, str] = {}
 
-    def take(self, event: EngineEvent, life: str = "") -> Finding | None:
-        """Take the next event; ``life`` names the managers that it is from, where that is known. Return a finding, the first time."""
+    def take(self, event: EngineEvent, instance_id: str = "") -> Finding | None:
+        """Take the next event; ``instance_id`` is that of its managers, where known. Return a finding, the first time."""
         if self.finding is not None:
             return None
         self.events += 1
-        if self._restarted(event, life):
+        if self._restarted(event, instance_id):
             self.restarts.append(event.stamp_s)
-            self._begin(life)
-        self._life = self._life or life
+            self._begin(instance_id)
+        self._instance_id = self._instance_id or instance_id
         why = self._out_of_order(event)
         if not why:
             following = list(self._following(event))
@@ -97,12 +97,12 @@ class SkillsetMonitor:
             return ()
         return tuple(told(happening) for happening in self._beliefs[0].expected)
 
-    def _restarted(self, event: EngineEvent, life: str) -> bool:
+    def _restarted(self, event: EngineEvent, instance_id: str) -> bool:
         """Tell whether an event is the first of managers that were restarted: they count from 1 again, and time has passed."""
         if self._last is None or event.sequence != 1:
             return False
-        if life and self._life:
-            return life != self._life
+        if instance_id and self._instance_id:
+            return instance_id != self._instance_id
         return event.stamp_ns > self._last.stamp_ns
 
     def _out_of_order(self, event: EngineEvent) -> str:

@@ -12,7 +12,7 @@ from alula.runtime.timers import Job
 
 DESCRIBE_S = 5.0
 DOUBT_S = 1.0
-"""Managers that do not answer for so long (wall clock) after their signs of life stayed away are gone."""
+"""Managers that do not answer for so long (wall clock) after their heartbeats stayed away are gone."""
 RIVALS_NS = 1_000_000_000
 """Managers that send a message so long after others had replaced them still live: there are two."""
 
@@ -20,29 +20,29 @@ RIVALS_NS = 1_000_000_000
 class Connection:
     """Follows whether the managers live and can be called, on the middleware's loop; any thread may wait for ``ready``.
 
-    A starved process may only be late: managers whose signs of life stay away are asked, and are gone when they don't answer.
+    A starved process may only be late: managers whose heartbeats stay away are asked, and are gone when they don't answer.
 
     Args:
         middleware: the client's.
         skillset: its name.
         goals: told of feedback and endings of goals.
-        on_life: called when other managers have taken the place of those that were known.
+        on_restart: called when other managers have taken the place of those that were known.
         on_alive: called when managers that were taken for dead are heard of again, or new ones for the first time.
         on_gone: called when managers are gone.
     """
 
-    def __init__(self, middleware: Middleware, skillset: str, goals: GoalListener, *, on_life: Job, on_alive: Job, on_gone: Job) -> None:
+    def __init__(self, middleware: Middleware, skillset: str, goals: GoalListener, *, on_restart: Job, on_alive: Job, on_gone: Job) -> None:
         self.ready = threading.Event()
         self.model: Skillset | None = None
         self.links: dict[str, ActionLink] = {}
         self.subscriptions: list[Callable[[], bool]] = []
-        self.life = ""
+        self.instance_id = ""
         self.gone = False
         """Whether managers were there and are no more."""
         self._middleware = middleware
         self._skillset = skillset
         self._goals = goals
-        self._on_life = on_life
+        self._on_restart = on_restart
         self._on_alive = on_alive
         self._on_gone = on_gone
         self._alive = False
@@ -53,41 +53,41 @@ class Connection:
         self._looking = False
         self._past: dict[str, int] = {}
 
-    def heard(self, life: str, stamp_ns: int = 0) -> bool:
+    def heard(self, instance_id: str, stamp_ns: int = 0) -> bool:
         """Take a message of managers; False when others have replaced them, and it comes late."""
-        if life in self._past:
-            if stamp_ns > self._past[life] + RIVALS_NS:
-                self._past[life] = stamp_ns
+        if instance_id in self._past:
+            if stamp_ns > self._past[instance_id] + RIVALS_NS:
+                self._past[instance_id] = stamp_ns
                 self._middleware.log(f"two processes manage the skillset {self._skillset}; end one of them")
             return False
-        if life != self.life:
-            if self.life:
-                self._past[self.life] = self._middleware.now_ns()
-            self.life = life
+        if instance_id != self.instance_id:
+            if self.instance_id:
+                self._past[self.instance_id] = self._middleware.now_ns()
+            self.instance_id = instance_id
             self.ready.clear()
-            self._on_life()
+            self._on_restart()
         return True
 
     def heard_states(self) -> None:
         """Note that the resources of the present managers are known."""
-        if self._states_heard != self.life:
-            self._states_heard = self.life
+        if self._states_heard != self.instance_id:
+            self._states_heard = self.instance_id
             self._look()
 
-    def on_sign(self, life: str, stamp_ns: int = 0) -> None:
-        """Take a sign of life; ``stamp_ns``: when it was given (mission clock), 0 where that is not known."""
-        if not self.heard(life, stamp_ns):
+    def on_heartbeat(self, instance_id: str, stamp_ns: int = 0) -> None:
+        """Take a heartbeat; ``stamp_ns``: when it was sent (mission clock), 0 where that is not known."""
+        if not self.heard(instance_id, stamp_ns):
             return
         self._doubted = False
         if not self._alive:
             self._alive, self.gone = True, False
             self._on_alive()
-        if self._described != life:
+        if self._described != instance_id:
             self._ask(DESCRIBE_S)
         self._look()
 
     def on_doubt(self) -> None:
-        """Ask managers whose signs of life stay away."""
+        """Ask managers whose heartbeats stay away."""
         if self._alive:
             self._doubted = True
             self._ask(DOUBT_S)
@@ -101,10 +101,10 @@ class Connection:
         """Have the managers describe themselves, unless that is under way."""
         if not self._asking:
             self._asking = True
-            life = self.life
-            self._middleware.call("describe", {}, lambda text, _: self._use(life, text), self._on_silence, timeout_s=timeout_s)
+            instance_id = self.instance_id
+            self._middleware.call("describe", {}, lambda text, _: self._use(instance_id, text), self._on_silence, timeout_s=timeout_s)
 
-    def _use(self, life: str, model_json: str) -> None:
+    def _use(self, instance_id: str, model_json: str) -> None:
         self._asking = self._doubted = False
         model = from_json(model_json)
         if model != self.model:
@@ -112,8 +112,8 @@ class Connection:
                 if skill.name not in self.links:
                     self.links[skill.name] = self._middleware.action(skill.name, self._goals)
             self.model = model
-        self._described = life
-        if life != self.life:
+        self._described = instance_id
+        if instance_id != self.instance_id:
             self._ask(DESCRIBE_S)
         self._look()
 
@@ -128,7 +128,7 @@ class Connection:
             self._on_gone()
 
     def _ask_again(self) -> None:
-        if self._alive and self._described != self.life:
+        if self._alive and self._described != self.instance_id:
             self._ask(DESCRIBE_S)
 
     def _look(self) -> None:
@@ -146,16 +146,16 @@ class Connection:
     def missing(self) -> str:
         """What the managers can't be called without, and has not come so far; empty when nothing is missing."""
         if not self._alive:
-            return "a sign of life"
+            return "a heartbeat"
         if not self._known:
-            return "their description" if self._described != self.life else "the states of their resources"
+            return "their description" if self._described != self.instance_id else "the states of their resources"
         if not all(connected() for connected in self.subscriptions):
             return "a connection to their topics"
         return ", ".join(f"the action {skill}" for skill, link in list(self.links.items()) if not link.connected)
 
     @property
     def _known(self) -> bool:
-        return self._alive and self.life == self._described == self._states_heard
+        return self._alive and self.instance_id == self._described == self._states_heard
 
     @property
     def _connected(self) -> bool:

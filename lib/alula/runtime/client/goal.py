@@ -59,7 +59,7 @@ class GoalTracker:
             skill, identifier, self._interrupt, pause=lambda paused: pause(identifier, paused), waiter=middleware.waiter
         )
         self.link = link
-        self.life = ""
+        self.instance_id = ""
         """The managers that have acknowledged it; empty before."""
         self._middleware = middleware
         self._skillset = skillset
@@ -81,9 +81,9 @@ class GoalTracker:
             if not self._acknowledged and not self.handle.done:
                 self._timer = self._middleware.later(ACKNOWLEDGE_S, self._look)
 
-    def on_event(self, event: ExecutionEvent, life: str, after: int) -> None:
+    def on_event(self, event: ExecutionEvent, instance_id: str, after: int) -> None:
         """Take an event of this execution; its end is told when the resources are known as they were after event ``after``."""
-        self.life = life
+        self.instance_id = instance_id
         self._acknowledge()
         self._cancel_timer()
         if not event.state.terminal:

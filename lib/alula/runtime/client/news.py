@@ -48,7 +48,7 @@ class ClientNews:
         self.heard = 0
         self.closed = ""
         self.connection = Connection(
-            middleware, skillset, self, on_life=self._on_life, on_alive=self._cancel_orphans, on_gone=self._on_gone
+            middleware, skillset, self, on_restart=self._on_restart, on_alive=self._cancel_orphans, on_gone=self._on_gone
         )
         self._middleware = middleware
         self._lock = threading.Lock()
@@ -61,7 +61,7 @@ class ClientNews:
             middleware.subscribe(EVENTS, self._on_told),
             middleware.subscribe(SKILL_STATES, self._on_skills),
         ]
-        middleware.watch(self.connection.on_sign, self.connection.on_doubt)
+        middleware.watch(self.connection.on_heartbeat, self.connection.on_doubt)
 
     # --- for the client, from any thread -----------------------------------------------------------------------------
 
@@ -110,7 +110,7 @@ class ClientNews:
     # --- messages of topics --------------------------------------------------------------------------------------------
 
     def _on_states(self, states: ResourceStates) -> None:
-        if self.closed or not self.connection.heard(states.life, states.stamp_ns) or states.after <= self.states_after:
+        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns) or states.after <= self.states_after:
             return
         self.heard += 1
         self.states_after = states.after
@@ -126,7 +126,7 @@ class ClientNews:
     def _on_told(self, told: PublishedEvent) -> None:
         event = told.event
         # An event that was published while the history was on its way comes twice.
-        if self.closed or not self.connection.heard(told.life, event.stamp_ns) or event.sequence <= self._last_event:
+        if self.closed or not self.connection.heard(told.instance_id, event.stamp_ns) or event.sequence <= self._last_event:
             return
         self.heard += 1
         gap = event.sequence > self._last_event + 1 and self._last_event > 0
@@ -141,9 +141,9 @@ class ClientNews:
         finally:
             # Also after a callback has raised: the handle of a goal that has ended must end.
             if isinstance(event, ExecutionEvent):
-                self._follow_event(event, told.life)
+                self._follow_event(event, told.instance_id)
 
-    def _follow_event(self, event: ExecutionEvent, life: str) -> None:
+    def _follow_event(self, event: ExecutionEvent, instance_id: str) -> None:
         if event.state.terminal:
             self._keep_last(event.skill, event.stamp_ns, event)
             orphan = self._orphans.pop(event.id, None)
@@ -153,10 +153,10 @@ class ClientNews:
             self._orphans[event.id].link.cancel(event.id)
         tracker = self._open.get(event.id)
         if tracker is not None:
-            tracker.on_event(event, life, self._last_transition)
+            tracker.on_event(event, instance_id, self._last_transition)
 
     def _on_skills(self, states: SkillStates) -> None:
-        if self.closed or not self.connection.heard(states.life, states.stamp_ns):
+        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns):
             return
         self.skills = dict(states.skills)
         for name, skill in states.skills.items():
@@ -169,23 +169,23 @@ class ClientNews:
         if skill not in self.last or self.last[skill][0] <= stamp_ns:
             self.last[skill] = (stamp_ns, ended)
 
-    # --- life and death ----------------------------------------------------------------------------------------------
+    # --- heartbeats ----------------------------------------------------------------------------------------------------
 
-    def _on_life(self) -> None:
+    def _on_restart(self) -> None:
         """Drop what was known of earlier managers: these are others."""
         self._last_event, self._last_transition, self.states_after = 0, 0, -1
         self.last.clear()
         # A goal without an acknowledgement may still be on its way, also to restarted managers.
-        ended = [tracker for tracker in self._orphans.values() if tracker.life]
+        ended = [tracker for tracker in self._orphans.values() if tracker.instance_id]
         for tracker in ended:
             del self._orphans[tracker.handle.id]
             tracker.link.release(tracker.handle.id)
         for tracker in self._trackers():
-            if tracker.life:
+            if tracker.instance_id:
                 tracker.abandon(f"the managers of {self.skillset} were restarted and do not know this execution")
 
     def _on_gone(self) -> None:
-        self._abandon(f"the managers of {self.skillset} have gone: they ended, or gave no sign of life", orphans=True)
+        self._abandon(f"the managers of {self.skillset} have gone: they ended, or sent no heartbeat", orphans=True)
 
     def _cancel_orphans(self) -> None:
         for goal_id, tracker in list(self._orphans.items()):

@@ -17,7 +17,7 @@ from alula.model.model import Skill, Skillset
 from alula.runtime.core.events import ExecutionEvent
 from alula.runtime.local.clock import VirtualClock, WorldError
 from alula.runtime.local.values import Types, complete, fit, ros_type
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, GoalResult, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, GoalResult, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
 from alula.runtime.timers import Job, Timer
 from alula.runtime.waiting import CannotWaitError, Waiter
 
@@ -40,7 +40,7 @@ class Served:
     """What the managers of one skillset serve."""
 
     middleware: VirtualMiddleware
-    life: str = ""
+    instance_id: str = ""
     services: dict[str, Serve] = field(default_factory=dict)
     actions: dict[str, VirtualServer] = field(default_factory=dict)
 
@@ -52,7 +52,7 @@ class Bus:
         self.clock = clock
         self.types = types
         self.served: dict[str, Served] = {}
-        self.watchers: dict[str, list[tuple[OnSign, Job]]] = {}
+        self.watchers: dict[str, list[tuple[OnHeartbeat, Job]]] = {}
         self.ids = itertools.count(1)
         self._run = run
         self._latency_s = latency_s
@@ -216,23 +216,23 @@ class VirtualMiddleware:
         """Connect to a skill."""
         return VirtualLink(self, skill, listener)
 
-    # --- life --------------------------------------------------------------------------------------------------------
+    # --- heartbeats ----------------------------------------------------------------------------------------------------
 
-    def announce(self, life: str, on_rival: OnError) -> None:  # noqa: ARG002 - a world refuses rivals itself
+    def announce(self, instance_id: str, on_rival: OnError) -> None:  # noqa: ARG002 - a world refuses rivals itself
         """Tell all watchers that these managers live."""
-        self._served.life = life
-        for on_sign, _ in self.bus.watchers.get(self.skillset, ()):
-            self.bus.send(functools.partial(on_sign, life, 0))
+        self._served.instance_id = instance_id
+        for on_heartbeat, _ in self.bus.watchers.get(self.skillset, ()):
+            self.bus.send(functools.partial(on_heartbeat, instance_id, 0))
 
-    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Follow the signs of life of the managers."""
-        signed: OnSign = lambda life, stamp_ns: self.do(lambda: on_sign(life, stamp_ns))  # noqa: E731
+    def watch(self, on_heartbeat: OnHeartbeat, on_doubt: Job) -> None:
+        """Follow the heartbeats of the managers."""
+        heard: OnHeartbeat = lambda instance_id, stamp_ns: self.do(lambda: on_heartbeat(instance_id, stamp_ns))  # noqa: E731
         doubted: Job = lambda: self.do(on_doubt)  # noqa: E731
-        self.bus.watchers.setdefault(self.skillset, []).append((signed, doubted))
+        self.bus.watchers.setdefault(self.skillset, []).append((heard, doubted))
         served = self.bus.served.get(self.skillset)
-        if served is not None and served.life:
-            life = served.life
-            self.bus.send(lambda: signed(life, 0))
+        if served is not None and served.instance_id:
+            instance_id = served.instance_id
+            self.bus.send(lambda: heard(instance_id, 0))
 
     def close_hooks(self, timeout_s: float) -> bool:  # noqa: ARG002 - hooks are jobs of the clock, and can't hang
         """Tell that no hook is left behind."""

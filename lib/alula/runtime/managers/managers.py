@@ -63,7 +63,7 @@ class Managers:
             raise SkillRuntimeError(f"parameter hook_timeout_s is {hook_timeout_s:g}; a hook needs a positive time")
         self.skillset = skillset
         self.middleware = middleware
-        self.life = uuid.uuid4().hex[:12]
+        self.instance_id = uuid.uuid4().hex[:12]
         self.on_step: list[Listener] = []
         """Called at each step, within it, before it is published."""
         make = make_inputs or _maker(hooks)
@@ -79,17 +79,17 @@ class Managers:
         )
         self._timer = EngineTimer(middleware, self.engine)
         self.data = DataManager(middleware, skillset, bindings, self.update_data)
-        self.resources = ResourceManager(middleware, self.engine, self.life)
+        self.resources = ResourceManager(middleware, self.engine, self.instance_id)
         self._events = middleware.advertise(EVENTS)
         self.skills = {skill.name: SkillManager(middleware, self.engine, skill, make) for skill in skillset.skills}
-        self._records = SkillStatesPublisher(middleware, skillset, self.life)
+        self._records = SkillStatesPublisher(middleware, skillset, self.instance_id)
         # Served once all are made: clients of managers that were here before ask at once, on other threads.
         self.data.serve()
         self.resources.serve()
         servers = {name: manager.serve() for name, manager in self.skills.items()}
         SkillsetServices(middleware, self.engine, servers, make)
-        # The sign of life comes last: a client that hears it finds everything there.
-        middleware.announce(self.life, on_rival or self._on_rival)
+        # The heartbeat comes last: a client that hears it finds everything there.
+        middleware.announce(self.instance_id, on_rival or self._on_rival)
 
     def close(self, reason: str) -> None:
         """Fail whatever runs for this reason, so that functions are stopped, and take no more requests."""
@@ -105,7 +105,7 @@ class Managers:
             on_step(events)
         self.resources.on_events(events)
         for event in events:
-            self._events.publish(PublishedEvent(self.life, event))
+            self._events.publish(PublishedEvent(self.instance_id, event))
         for event in events:
             if isinstance(event, ExecutionEvent):
                 self.skills[event.skill].on_event(event)

@@ -17,9 +17,9 @@ TOGETHER_S = 0.02
 class SkillStatesPublisher:
     """Follows the events and publishes what is known of all skills."""
 
-    def __init__(self, middleware: Middleware, skillset: Skillset, life: str) -> None:
+    def __init__(self, middleware: Middleware, skillset: Skillset, instance_id: str) -> None:
         self._middleware = middleware
-        self._life = life
+        self._instance_id = instance_id
         self._lock = threading.Lock()
         self._records = Records(skillset)
         self._changed = False
@@ -41,4 +41,4 @@ class SkillStatesPublisher:
         with self._lock:
             self._changed = False
             skills = dict(self._records.skills)
-        self._publisher.publish(SkillStates(self._life, self._middleware.now_ns(), skills))
+        self._publisher.publish(SkillStates(self._instance_id, self._middleware.now_ns(), skills))

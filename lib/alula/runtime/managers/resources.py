@@ -14,10 +14,10 @@ from alula.runtime.middleware import RESOURCE_STATES, Middleware, Reply, Resourc
 class ResourceManager:
     """Publishes ``resource_states`` once a step, and serves ``transition`` and ``trigger``."""
 
-    def __init__(self, middleware: Middleware, engine: SkillsetEngine, life: str) -> None:
+    def __init__(self, middleware: Middleware, engine: SkillsetEngine, instance_id: str) -> None:
         self._middleware = middleware
         self._engine = engine
-        self._life = life
+        self._instance_id = instance_id
         self._publisher = middleware.advertise(RESOURCE_STATES)
         # Kept apart from the engine's, so that each message is the state after the step that it is sent for.
         self._latest = dict(engine.resources)
@@ -37,7 +37,7 @@ class ResourceManager:
             self._publish(transitions[-1].sequence, transitions[-1].stamp_ns)
 
     def _publish(self, after: int, stamp_ns: int) -> None:
-        self._publisher.publish(ResourceStates(self._life, after, stamp_ns, dict(self._latest)))
+        self._publisher.publish(ResourceStates(self._instance_id, after, stamp_ns, dict(self._latest)))
 
     def _transition(self, request: Mapping[str, Any], reply: Reply) -> None:
         reply(self._engine.transition(request["resource"], request["to"]))

@@ -143,7 +143,7 @@ def test_what_breaks_without_a_fault_that_is_known_has_a_recovery_without_a_fail
     assert summary["answers"] == []
 
 
-GONE = "the managers of perception have gone: they ended, or gave no sign of life"
+GONE = "the managers of perception have gone: they ended, or sent no heartbeat"
 
 
 def test_managers_that_die_are_told_as_detected_by_what_the_mission_was_told(tmp_path):

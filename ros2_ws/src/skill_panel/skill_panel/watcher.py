@@ -64,7 +64,7 @@ class Watched:
     def look(self) -> None:
         """See whether the managers are there."""
         if self.view is not None:
-            self.view.heard_life(alive=self.client.ready)
+            self.view.heard_heartbeat(alive=self.client.ready)
         elif self.client.ready:
             view = SkillsetView(self.root, self.client.model)
             view.heard_states(self.client.resources)

@@ -70,7 +70,7 @@ def test_why_not_follows_resources_and_data(view):
     assert view.skill_rows()[0] == SkillRow("go", (), "", ())
     view.heard_data("battery", **battery, stale=True)
     assert [reason.split(":")[0] for reason in view.skill_rows()[0].unmet] == ["full"]
-    view.heard_life(alive=False)
+    view.heard_heartbeat(alive=False)
     assert view.skill_rows()[0].unmet == ("the managers have gone",)
 
 
@@ -85,7 +85,7 @@ def test_skills_show_what_runs_and_how_it_ended(view):
     view.heard_skills(skills(go=([execution("1", "PAUSED"), execution("2", "REQUESTED")], []), wait=([], [])))
     go = view.skill_rows()[0]
     assert (go.status, go.running[0].progress) == ("PAUSED REQUESTED", 0.5)
-    view.heard_life(alive=False)
+    view.heard_heartbeat(alive=False)
     assert view.skill_rows()[0].running == ()
 
 
@@ -96,7 +96,7 @@ def test_the_log_and_the_version_follow_every_change(view):
     view.heard_event(TransitionEvent(2, stamp_ns, "door", "SHUT", "OPEN", "extern"))
     assert list(view.log) == ["12.34  go 012345 NOT_READY open: door is SHUT", "12.34  door SHUT -> OPEN by extern"]
     assert (view.logged, view.version) == (2, before + 2)
-    view.heard_life(alive=True)  # nothing new
+    view.heard_heartbeat(alive=True)  # nothing new
     assert view.logged == 2
 
 

@@ -17,7 +17,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
 from alula.runtime.codecs import Codecs, ServiceCodec, set_stamp, stamp_ns_of
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
 from alula.runtime.timers import Job
 from skillset_ros2.actions import RclpyLink, RclpyServer
 from skillset_ros2.base import RclpyBase
@@ -40,7 +40,7 @@ class RclpyMiddleware(RclpyBase):
         super().__init__(node, skillset, root=root)
         self._interfaces = interfaces
         self._codecs = Codecs(skillset_interfaces.msg, skillset_interfaces.srv, message_class)
-        self._give_sign: Job = lambda: None
+        self._send_heartbeat: Job = lambda: None
 
     # --- topics ------------------------------------------------------------------------------------------------------
 
@@ -105,7 +105,7 @@ class RclpyMiddleware(RclpyBase):
             handler(fields, functools.partial(reply, header))
             if service == "describe":
                 # The client may have given these managers up before this answer comes, and DDS tells of no change.
-                self._give_sign()
+                self._send_heartbeat()
 
         # What rclpy takes for the sending of the callback's return value is where the request is dealt with.
         made.send_response = self.on_loop(take)
@@ -148,34 +148,34 @@ class RclpyMiddleware(RclpyBase):
             self._interfaces = importlib.import_module(f"{self._skillset}_interfaces.action")
         return action_type(self._interfaces, skill)
 
-    # --- life --------------------------------------------------------------------------------------------------------
+    # --- heartbeats ----------------------------------------------------------------------------------------------------
 
-    def announce(self, life: str, on_rival: OnError) -> None:
-        """Tell of these managers, latched; DDS itself sends the signs of life. Those that were there first stay."""
+    def announce(self, instance_id: str, on_rival: OnError) -> None:
+        """Tell of these managers, latched; DDS itself sends the heartbeats. Those that were there first stay."""
         begun_ns = time.time_ns()
-        sign = Header(frame_id=life)
-        set_stamp(sign.stamp, begun_ns)
+        heartbeat = Header(frame_id=instance_id)
+        set_stamp(heartbeat.stamp, begun_ns)
         told = f"managers of {self._skillset} are there already ({self.node.resolve_topic_name(self.name('alive'))}); end them first"
 
         def hear(other: Any) -> None:
-            mine, others = (begun_ns, life), (stamp_ns_of(other.stamp), other.frame_id)
-            if others[1] != life and others < mine:
+            mine, others = (begun_ns, instance_id), (stamp_ns_of(other.stamp), other.frame_id)
+            if others[1] != instance_id and others < mine:
                 on_rival(told)
-            elif others[1] != life:
+            elif others[1] != instance_id:
                 self.log(f"second managers of {self._skillset} were started; they have to end")
 
         self.listen(self.name("alive"), Header, hear, latched(1))
         publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE)
-        self._give_sign = lambda: publisher.publish(sign)
-        self._give_sign()
+        self._send_heartbeat = lambda: publisher.publish(heartbeat)
+        self._send_heartbeat()
 
-    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Follow the signs of life of the managers, by DDS."""
+    def watch(self, on_heartbeat: OnHeartbeat, on_doubt: Job) -> None:
+        """Follow the heartbeats of the managers, by DDS."""
         last: list[str] = []
 
-        def hear(sign: Any) -> None:
-            last[:] = [sign.frame_id]
-            on_sign(sign.frame_id, 0)
+        def hear(heartbeat: Any) -> None:
+            last[:] = [heartbeat.frame_id]
+            on_heartbeat(heartbeat.frame_id, 0)
 
         def changed(info: Any) -> None:
             # By the changes: the counts are wrong where both sides are in one process (alive from 0 to -1).
@@ -183,7 +183,7 @@ class RclpyMiddleware(RclpyBase):
                 on_doubt()
             elif info.alive_count_change > 0 and last:
                 # Perhaps the managers that were heard last: it may be others that live, whose name comes in a moment.
-                on_sign(last[0], 0)
+                on_heartbeat(last[0], 0)
 
         self.node.create_subscription(
             Header,

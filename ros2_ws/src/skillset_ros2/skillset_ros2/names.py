@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProf
 from alula.model.ros_types import camel
 
 LIVELINESS_LEASE_S = 2.0
-"""Without a sign of life for so long (wall clock), a manager process is taken for dead; DDS itself sends the signs."""
+"""Without a heartbeat for so long (wall clock), a manager process is taken for dead; DDS itself sends the heartbeats."""
 
 
 def latched(depth: int) -> QoSProfile:
@@ -31,7 +31,7 @@ ALIVE = QoSProfile(
     liveliness=LivelinessPolicy.AUTOMATIC,
     liveliness_lease_duration=Duration(seconds=LIVELINESS_LEASE_S),
 )
-"""``LATCHED`` with signs of life, for ``alive``."""
+"""``LATCHED`` with heartbeats, for ``alive``."""
 
 SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 """Of all services: with ROS's default, the eleventh request of a burst is lost."""

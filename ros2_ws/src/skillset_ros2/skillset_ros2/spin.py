@@ -108,7 +108,7 @@ def run_skillset(
 
 
 def rivals_there(skillset: str) -> bool:
-    """Tell whether managers of this skillset give signs of life, before anything is done that might disturb them."""
+    """Tell whether managers of this skillset send heartbeats, before anything is done that might disturb them."""
     node = Node(skillset, enable_rosout=False)
     heard: list[object] = []
     node.create_subscription(Header, f"{skillset}/alive", heard.append, latched(1))

@@ -63,7 +63,7 @@ def test_managers_that_answer_after_they_were_given_up_are_found_again(anyhow):
         until(lambda: not navigation.client.ready, "managers that say nothing are given up")
     finally:
         go_on.set()
-    until(lambda: navigation.client.ready, "their late answer is a sign of life")
+    until(lambda: navigation.client.ready, "their late answer counts as a heartbeat")
 
 
 def test_why_answers_over_the_graph(anyhow):

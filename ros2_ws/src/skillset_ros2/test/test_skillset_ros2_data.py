@@ -49,6 +49,6 @@ ENDS = [
 def test_an_event_says_as_a_message_what_it_was(state, kind, unmet):
     event = ExecutionEvent(3, 1_500_000_000, "go", "1", state, "NAME", "in words", {"speed": 1.0}, {}, "rover", kind, unmet)
     codec = CODECS.topic(EVENTS)
-    told = PublishedEvent("a life", event)
+    told = PublishedEvent("an instance", event)
     sent = deserialize_message(serialize_message(codec.encode("rover", told)), skillset_interfaces.msg.Event)
     assert codec.decode(sent) == told

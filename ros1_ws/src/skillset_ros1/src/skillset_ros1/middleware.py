@@ -19,7 +19,7 @@ from roslib.message import get_message_class
 from std_msgs.msg import Header
 
 from alula.runtime.codecs import Codecs, set_stamp, stamp_ns_of
-from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnReply, OnSign, OnValue, Serve, Topic
+from alula.runtime.middleware import CALL_S, Goal, GoalListener, OnError, OnHeartbeat, OnReply, OnValue, Serve, Topic
 from alula.runtime.timers import Job
 from skillset_ros1.actions import RospyLink, RospyServer, is_connected
 from skillset_ros1.base import RospyBase
@@ -28,11 +28,11 @@ from skillset_ros1.convert import message_class
 from skillset_ros1.names import QUEUE, action_types, now_ns
 
 ALIVE_PERIOD_S = 0.5
-"""Managers give a sign of life so often (wall clock), whatever their hooks do: ROS 1 itself does not tell of a node that died."""
+"""Managers send a heartbeat so often (wall clock), whatever their hooks do: ROS 1 itself does not tell of a node that died."""
 LEASE_S = 2.0
-"""Without a sign of life for so long (wall clock), managers are doubted, as in the ROS 2 world."""
+"""Without a heartbeat for so long (wall clock), managers are doubted, as in the ROS 2 world."""
 BROKEN_LEASE_S = 1.5 * ALIVE_PERIOD_S
-"""The same where also the connection over which the signs come is broken."""
+"""The same where also the connection over which the heartbeats come is broken."""
 WATCH_S = 0.25
 ANSWER_S = 60.0
 """An answer to a service that has not come for so long will not come; the managers themselves give their hooks less."""
@@ -142,35 +142,35 @@ class RospyMiddleware(RospyBase):
             self._interfaces = importlib.import_module(f"{self._skillset}_interfaces.msg")
         return self._interfaces
 
-    # --- life --------------------------------------------------------------------------------------------------------
+    # --- heartbeats ----------------------------------------------------------------------------------------------------
 
-    def announce(self, life: str, on_rival: OnError) -> None:  # noqa: ARG002 - the master tells of rivals before
-        """Give signs of life from a thread of their own: simulated time may stand still, and hooks be slow."""
+    def announce(self, instance_id: str, on_rival: OnError) -> None:  # noqa: ARG002 - the master tells of rivals before
+        """Send heartbeats from a thread of their own: simulated time may stand still, and hooks be slow."""
         publisher = rospy.Publisher(self.name("alive"), Header, latch=True, queue_size=1)
         self._parts.append(publisher.unregister)
 
         def beat() -> None:
             while not self._over.is_set() and not rospy.is_shutdown():
-                sign = Header(frame_id=life)
-                set_stamp(sign.stamp, now_ns())
-                publisher.publish(sign)
+                heartbeat = Header(frame_id=instance_id)
+                set_stamp(heartbeat.stamp, now_ns())
+                publisher.publish(heartbeat)
                 self._over.wait(ALIVE_PERIOD_S)
 
         threading.Thread(target=beat, name=f"{self._place}_alive", daemon=True).start()
 
-    def watch(self, on_sign: OnSign, on_doubt: Job) -> None:
-        """Follow the signs of life of the managers, and of their silence, once in a lease."""
+    def watch(self, on_heartbeat: OnHeartbeat, on_doubt: Job) -> None:
+        """Follow the heartbeats of the managers, and of their silence, once in a lease."""
         heard_s: list[float] = []
 
-        def hear(sign: Any) -> None:
-            self.server = sign._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell the sender
+        def hear(heartbeat: Any) -> None:
+            self.server = heartbeat._connection_header["callerid"]  # noqa: SLF001 - rospy's way to tell the sender
             heard_s[:] = [time.monotonic()]
-            on_sign(sign.frame_id, stamp_ns_of(sign.stamp))
+            on_heartbeat(heartbeat.frame_id, stamp_ns_of(heartbeat.stamp))
 
-        signs = self.listen(self.name("alive"), Header, hear)
+        heartbeats = self.listen(self.name("alive"), Header, hear)
 
         def look() -> None:
-            lease_s = LEASE_S if is_connected(signs) else BROKEN_LEASE_S
+            lease_s = LEASE_S if is_connected(heartbeats) else BROKEN_LEASE_S
             if heard_s and time.monotonic() - heard_s[0] > lease_s:
                 heard_s[:] = [time.monotonic()]
                 on_doubt()
