@@ -12,7 +12,7 @@ from alula.runtime.core.errors import SkillRuntimeError
 T = TypeVar("T")
 
 
-class NoAnswerError(SkillRuntimeError):
+class NoResponseError(SkillRuntimeError):
     """The managers gave no answer to a question within its time, or have gone."""
 
 
@@ -143,10 +143,10 @@ class Pending(Waitable, Generic[T]):
         """Return the answer.
 
         Raises:
-            NoAnswerError: there is none, or not yet.
+            NoResponseError: there is none, or not yet.
         """
         if not self.done or self._failure:
-            raise NoAnswerError(self._failure or "the answer is still under way; wait for it or await it")
+            raise NoResponseError(self._failure or "the answer is still under way; wait for it or await it")
         return self._value  # type: ignore[return-value]  # set by `resolve`, before the end
 
     def get(self, timeout_s: float) -> T:

@@ -11,7 +11,7 @@ import pytest
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import Report, SkillFailedError, SkillHandle, StillRunningError
-from alula.runtime.waiting import Moment, NoAnswerError, Pending
+from alula.runtime.waiting import Moment, NoResponseError, Pending
 
 S = ExecutionState
 SOON_S = 10.0
@@ -150,7 +150,7 @@ def test_a_coroutine_without_a_loop_is_resumed_by_its_driver():
 
 def test_an_answer_comes_once_or_says_why_not():
     answer: Pending[str] = Pending()
-    with pytest.raises(NoAnswerError, match="still under way"):
+    with pytest.raises(NoResponseError, match="still under way"):
         answer.get(0.01)
     seen: list[str] = []
     answer.add_done_callback(lambda pending: seen.append(pending.value))
@@ -162,7 +162,7 @@ def test_an_answer_comes_once_or_says_why_not():
     lost.fail("gone")
 
     async def main() -> None:
-        with pytest.raises(NoAnswerError, match="gone"):
+        with pytest.raises(NoResponseError, match="gone"):
             await lost
 
     asyncio.run(main())
@@ -200,7 +200,7 @@ def test_an_answer_stands_whatever_comes_in_between(value):
     refused.fail("")
     assert (given.done, given.failure, given.value) == (True, "", value)
     assert refused.done
-    with pytest.raises(NoAnswerError, match="there is no answer"):
+    with pytest.raises(NoResponseError, match="there is no answer"):
         _ = refused.value
     assert ends == [repr(value), "there is no answer"]
 

@@ -13,7 +13,7 @@ from alula.model.expressions import Comparison, DataIs
 from alula.model.model import Assignment, Data, Effect, Event, Invariant, Parameter, Precondition
 from alula.model.ros_types import parse_type
 from alula.runtime.core.events import event_record
-from alula.runtime.waiting import NoAnswerError
+from alula.runtime.waiting import NoResponseError
 from alula_testing.recorder import Recorder
 
 
@@ -120,7 +120,7 @@ def test_an_event_of_the_model_is_taken_or_refused():
     world.kill("flying")
     world.run_for(0.0)
     for answer in (client.trigger("calm"), client.transition("sdk", "AVAILABLE"), client.why("takeoff")):
-        with pytest.raises(NoAnswerError, match="the managers of flying are not there"):
+        with pytest.raises(NoResponseError, match="the managers of flying are not there"):
             answer.get(1.0)
 
 
@@ -177,5 +177,5 @@ def test_the_views_of_the_typed_clients_fit():
     assert (flying.data.battery.value, flying.data.battery.stamp, flying.data.battery.stale) == (0.5, 3.0, False)
     gone = flying.axes.becomes("GONE")
     world.kill("flying")
-    with pytest.raises(NoAnswerError, match="have gone"):
+    with pytest.raises(NoResponseError, match="have gone"):
         gone.get(1.0)

@@ -29,7 +29,7 @@ from alula.runtime.core.context import Entry, ExecutionContext
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import Listener
 from alula.runtime.core.execution import Execution
-from alula.runtime.core.hook_calls import HookAnswer, HookCaller, LocalHooks, Then
+from alula.runtime.core.hook_calls import HookCaller, HookOutcome, LocalHooks, Then
 from alula.runtime.core.outbox import Outbox
 from alula.runtime.core.records import ResourceStatus, SkillRecord
 from alula.runtime.core.replies import PauseReply, TransitionReply
@@ -157,9 +157,9 @@ class SkillsetEngine:
             validated = lambda answer: self._start(entry, answer, run_at_once)  # noqa: E731
             submit(lambda: self._call(entry, "validate", validated))
         else:
-            self._start(entry, HookAnswer(""), submit)
+            self._start(entry, HookOutcome(""), submit)
 
-    def _start(self, entry: Entry, validated: HookAnswer, submit: Submit) -> None:
+    def _start(self, entry: Entry, validated: HookOutcome, submit: Submit) -> None:
         """Refuse the request or take its start step and call ``on_dispatch``."""
         self.tick()
         refusal = str(validated.value or "")
@@ -262,7 +262,7 @@ class SkillsetEngine:
     def _stop(self, entry: Entry) -> None:
         """Call the decided stop hook; an interruption is done with it unless it says otherwise."""
 
-        def returned(answer: HookAnswer) -> None:
+        def returned(answer: HookOutcome) -> None:
             if answer.value is not False:
                 self._interrupted(entry.key.id, "")
 
@@ -311,7 +311,7 @@ class SkillsetEngine:
         self.set_paused(execution_id, replies.append, paused=paused, wait=False)
         return replies[0]
 
-    def _paused(self, entry: Entry, answer: HookAnswer, reply: Reply, *, paused: bool) -> None:
+    def _paused(self, entry: Entry, answer: HookOutcome, reply: Reply, *, paused: bool) -> None:
         """Enter the phase unless the hook refused or something else has come between."""
         verb, phase = ("paused", ExecutionState.PAUSED) if paused else ("resumed", ExecutionState.RUNNING)
         reason = str(answer.value or "")
@@ -463,14 +463,14 @@ class SkillsetEngine:
             limit_s += self._stop_limit_s(entry)
         watch = None if limit_s is None else WATCHDOG.watch(limit_s, functools.partial(self._overdue, entry, hook, limit_s, then))
 
-        def answered(answer: HookAnswer) -> None:
+        def answered(answer: HookOutcome) -> None:
             problem = f"{hook} raised {answer.error}" if answer.error else answer.wrong
             if problem:
                 self._on_error(as_text(f"{entry.execution}: {problem}\n{answer.trace}".strip()))
             if watch is None or watch.end():
                 if problem:
                     self._fail(entry.key.id, as_text(problem))
-                then(HookAnswer(error=problem) if problem else answer)
+                then(HookOutcome(error=problem) if problem else answer)
             self._returned(entry, hook)
 
         self._hooks.call(entry.execution, hook, answered)
@@ -485,7 +485,7 @@ class SkillsetEngine:
             self._fail(entry.key.id, problem)
         if hook in _STARTS | _STOPS:
             self._defer(functools.partial(self._call, entry, "on_emergency"))
-        then(HookAnswer(error=problem))
+        then(HookOutcome(error=problem))
         self._run_waiting(entry)
 
     def _returned(self, entry: Entry, hook: str) -> None:

@@ -15,7 +15,7 @@ from alula.runtime.hooks import SkillHooks, is_written
 
 
 @dataclass(frozen=True)
-class HookAnswer:
+class HookOutcome:
     """The outcome of a hook's call: its ``value``; or ``wrong``, why its value is refused; or what it raised: ``error``, ``trace``."""
 
     value: object = None
@@ -24,7 +24,7 @@ class HookAnswer:
     wrong: str = ""
 
 
-Then = Callable[[HookAnswer], None]
+Then = Callable[[HookOutcome], None]
 
 
 class HookCaller(Protocol):
@@ -58,16 +58,16 @@ class LocalHooks:
         return is_written(self._hooks[skill], hook)
 
 
-def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookAnswer:
+def call_hook(hooks: SkillHooks, execution: Execution, hook: str) -> HookOutcome:
     """Call one hook and return the outcome."""
     try:
         value = getattr(hooks, hook)(execution.inputs if hook == "validate" else execution)
     except BaseException as error:  # noqa: BLE001 - whatever a hook raises, also SystemExit, ends its execution only
-        return HookAnswer(error=error_line(error), trace=as_text(_trace(error)))
+        return HookOutcome(error=error_line(error), trace=as_text(_trace(error)))
     try:
-        return HookAnswer(fitted_return(hook, value))
+        return HookOutcome(fitted_return(hook, value))
     except ValueError as error:
-        return HookAnswer(wrong=str(error))
+        return HookOutcome(wrong=str(error))
 
 
 def _trace(error: BaseException) -> str:

@@ -15,7 +15,7 @@ from alula.runtime.core.engine import SkillsetEngine
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
-from alula.runtime.core.hook_calls import HookAnswer, Then
+from alula.runtime.core.hook_calls import HookOutcome, Then
 from alula.runtime.hook_processes.place import Snapshot, admit, pipe_key, snapshot
 
 ENDED = "its process has ended"
@@ -70,7 +70,7 @@ class RemoteHooks:
         """Call a hook; ``then`` gets the answer later, on the thread of its process, or at once when that has gone."""
         process = self._processes.get(execution.skill)
         if process is None:
-            then(HookAnswer(error=f"the manager of {execution.skill} has gone: {ENDED}"))
+            then(HookOutcome(error=f"the manager of {execution.skill} has gone: {ENDED}"))
         else:
             process.call(hook, snapshot(execution), then)
 
@@ -128,7 +128,7 @@ class RemoteHooks:
             for execution in self._engine.executions:
                 if execution.skill == skill:
                     self._engine.fail(execution.id, gone)
-        process.give_up(HookAnswer(error=gone))
+        process.give_up(HookOutcome(error=gone))
 
     def _ask(self, method: str, arguments: tuple[object, ...]) -> object:
         if self._engine is None or method not in ASKED:
@@ -147,7 +147,7 @@ class _SkillProcess:
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._waiting: dict[int, Then] = {}
-        self._gone: HookAnswer | None = None
+        self._gone: HookOutcome | None = None
         """What calls are answered once the process has ended."""
 
     def call(self, hook: str, execution: Snapshot, then: Then) -> None:
@@ -180,7 +180,7 @@ class _SkillProcess:
             else:
                 self._send(("reply", number, self._ask(rest[0], rest[1])))
 
-    def give_up(self, answer: HookAnswer) -> None:
+    def give_up(self, answer: HookOutcome) -> None:
         """Answer all calls for a process that has ended, also those that are still on their way here."""
         with self._lock:
             self._gone = answer

@@ -14,7 +14,7 @@ from typing import Any
 
 from alula.model.execution_state import ExecutionState
 from alula.runtime.core.execution import Execution
-from alula.runtime.core.hook_calls import HookAnswer, call_hook
+from alula.runtime.core.hook_calls import HookOutcome, call_hook
 from alula.runtime.core.sanitize import as_text, error_line
 from alula.runtime.hook_processes.place import Snapshot, pipe_key
 from alula.runtime.hooks import HOOKS, SkillHooks, is_written
@@ -151,12 +151,12 @@ class HookServer:
         execution = self._update(told)
         self._workers.submit(lambda: self._send(("answer", number, self._answer(execution, hook))))
 
-    def _answer(self, execution: Execution, hook: str) -> HookAnswer:
+    def _answer(self, execution: Execution, hook: str) -> HookOutcome:
         if isinstance(execution.inputs, Mapping):
             try:
                 execution.inputs = self._hooks.make_inputs(execution.inputs)
             except Exception as error:  # noqa: BLE001 - inputs are made by the developer's class
-                return HookAnswer(error=f"the inputs could not be made: {type(error).__name__}: {error}")
+                return HookOutcome(error=f"the inputs could not be made: {type(error).__name__}: {error}")
         answer = call_hook(self._hooks, execution, hook)
         if hook in STOPS and execution.done:
             self._stopped.setdefault(execution.id, threading.Event()).set()

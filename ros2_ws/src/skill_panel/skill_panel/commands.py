@@ -22,7 +22,7 @@ from alula.common.signals import Interrupts, on_end_signal
 from alula.common.suggestions import nearest
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
-from alula.runtime.waiting import NoAnswerError
+from alula.runtime.waiting import NoResponseError
 from skill_panel.__main__ import DOMAINS, LIST_S, place_of
 from skill_panel.watcher import all_found, skillsets_in
 
@@ -290,7 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             folder = find_run(LATEST).folder if options.run in {None, LATEST} else load_run(Path(options.run)).folder
             return recorded_events(folder, options, out)
         return drive(options, out)
-    except (CommandError, NoRunError, NoAnswerError, ValueError, SkillRuntimeError) as error:
+    except (CommandError, NoRunError, NoResponseError, ValueError, SkillRuntimeError) as error:
         sys.stderr.write(f"alula {options.command}: {error}\n")
         return WRONG
 

@@ -26,7 +26,7 @@ from uav_msgs.msg import GuidanceState  # noqa: E402
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.runtime.handle import SkillFailedError  # noqa: E402
 from alula.runtime.staleness import STALE_PERIODS  # noqa: E402
-from alula.runtime.waiting import CannotWaitError, NoAnswerError  # noqa: E402
+from alula.runtime.waiting import CannotWaitError, NoResponseError  # noqa: E402
 from skillset_ros2 import Robot  # noqa: E402
 from skillset_ros2.robot import NotThereError  # noqa: E402
 
@@ -367,7 +367,7 @@ def test_every_wait_ends_when_the_managers_are_killed(process, ros2_domain):
         reports = list(handle)
         assert (reports[-1].state, handle.get(SOON_S).state) == (S.FAILED, S.FAILED)
         for answer in (flying, value, asked):
-            with pytest.raises(NoAnswerError, match=r"have gone|did not answer|is not there"):
+            with pytest.raises(NoResponseError, match=r"have gone|did not answer|is not there"):
                 answer.get(SOON_S)
         assert navigation.land().get(SOON_S).message == "the managers of navigation are not there"
 
@@ -388,5 +388,5 @@ def test_closing_a_client_ends_its_waits_and_leaves_the_skill_alone(managers, ro
     assert navigation.takeoff(height=5.0, speed=1.0).get(SOON_S).state is S.FAILED
     assert (navigation.data.guidance_state.value, navigation.data.guidance_state.stale) == (None, True)
     for answer in (navigation.flight_status.transition("IN_AIR"), navigation.takeoff.why(), navigation.client.interrupt_all("takeoff")):
-        with pytest.raises(NoAnswerError, match="this client was closed"):
+        with pytest.raises(NoResponseError, match="this client was closed"):
             answer.get(SOON_S)

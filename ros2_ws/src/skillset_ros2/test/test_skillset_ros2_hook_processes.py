@@ -19,7 +19,7 @@ from runtime_models import flying_skill, flying_skillset
 
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.execution import Execution
-from alula.runtime.core.hook_calls import HookAnswer
+from alula.runtime.core.hook_calls import HookOutcome
 from alula.runtime.hook_processes import HookServer, RemoteHooks, pipe_address
 from alula.runtime.hook_processes.place import pipe_key
 from alula.runtime.hooks import SkillHooks
@@ -201,6 +201,6 @@ def test_a_call_that_meets_the_end_of_its_process_is_answered_once(remote):
     until(lambda: not remote._processes, "the end is noticed", SOON_S)
     until(lambda: set(threading.enumerate()) <= others, "the end was dealt with", SOON_S)
     remote._processes["film"] = process  # the engine asked for it just before
-    answers: list[HookAnswer] = []
+    answers: list[HookOutcome] = []
     remote.call(Execution(remote, "1", "film", {}), "on_dispatch", answers.append)
     assert ["its process has ended" in answer.error for answer in answers] == [True]

@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
-from uav_skills.calls import Answer, CallQueue
+from uav_skills.calls import CallQueue, Response
 
 
 @dataclass
@@ -47,23 +47,23 @@ class Clock:
         return self.now
 
 
-def test_calls_are_sent_in_order_each_after_the_answer_to_the_one_before():
-    goto, hover, answers = FakeService("/goto"), FakeService("/hover"), []
+def test_calls_are_sent_in_order_each_after_the_response_to_the_one_before():
+    goto, hover, responses = FakeService("/goto"), FakeService("/hover"), []
     queue = CallQueue(Clock())
-    queue.submit(goto, "go", answers.append)
-    queue.submit(hover, "stop", answers.append)
+    queue.submit(goto, "go", responses.append)
+    queue.submit(hover, "stop", responses.append)
     assert len(goto.sent) == 1
     assert hover.sent == []
     goto.sent[0][1].finish(accepted=True, reason="", reference_id=5)
     assert len(hover.sent) == 1
     hover.sent[0][1].finish(success=False, message="no")
-    assert answers == [Answer(accepted=True, reference_id=5), Answer(accepted=False, reason="no")]
+    assert responses == [Response(accepted=True, reference_id=5), Response(accepted=False, reason="no")]
 
 
-def test_a_slow_answer_does_not_hold_back_a_stop():
-    takeoff, hover, clock, answers = FakeService("/takeoff"), FakeService("/hover"), Clock(), []
+def test_a_slow_response_does_not_hold_back_a_stop():
+    takeoff, hover, clock, responses = FakeService("/takeoff"), FakeService("/hover"), Clock(), []
     queue = CallQueue(clock)
-    queue.submit(takeoff, "up", answers.append)
+    queue.submit(takeoff, "up", responses.append)
     queue.submit(hover, "stop")
     clock.now = 0.25
     queue.tick()
@@ -72,20 +72,20 @@ def test_a_slow_answer_does_not_hold_back_a_stop():
     queue.tick()
     assert len(hover.sent) == 1
     takeoff.sent[0][1].finish(accepted=False, reason="another command came")
-    assert answers == [Answer(accepted=False, reason="another command came")]
+    assert responses == [Response(accepted=False, reason="another command came")]
 
 
 def test_a_service_that_is_away_is_waited_for_and_then_given_up():
-    away, there, clock, answers = FakeService("/away", ready=False), FakeService("/there"), Clock(), []
+    away, there, clock, responses = FakeService("/away", ready=False), FakeService("/there"), Clock(), []
     queue = CallQueue(clock)
-    queue.submit(away, "a", answers.append)
+    queue.submit(away, "a", responses.append)
     queue.submit(there, "b")
     clock.now = 2.9
     queue.tick()
     assert there.sent == []
     clock.now = 3.1
     queue.tick()
-    assert answers == [Answer(accepted=False, reason="service /away is not there for 3 s")]
+    assert responses == [Response(accepted=False, reason="service /away is not there for 3 s")]
     assert len(there.sent) == 1
 
 
@@ -99,14 +99,14 @@ def test_a_service_that_comes_back_in_time_is_called():
     assert len(service.sent) == 1
 
 
-def test_an_answer_that_never_comes_is_given_here_once():
-    service, clock, answers = FakeService("/mute"), Clock(), []
+def test_a_call_without_a_response_is_refused_here_once():
+    service, clock, responses = FakeService("/mute"), Clock(), []
     queue = CallQueue(clock)
-    queue.submit(service, "a", answers.append)
+    queue.submit(service, "a", responses.append)
     clock.now = 21.0
     queue.tick()
     queue.tick()
-    assert answers == [Answer(accepted=False, reason="service /mute does not answer for 20 s")]
+    assert responses == [Response(accepted=False, reason="service /mute does not answer for 20 s")]
     assert service.forgotten == [service.sent[0][1]]
     service.sent[0][1].finish(accepted=True, reason="", reference_id=1)
-    assert len(answers) == 1
+    assert len(responses) == 1

@@ -135,7 +135,7 @@ class FakeFunctional:
             self.vehicle.place, self.vehicle.armed = [x, y, z], True
 
     def report(self, skillset: str, resource: str, to: str):
-        """Ask for an extern transition; return the future of its answer."""
+        """Ask for an extern transition; return the future of its response."""
         return self._transitions[skillset].call_async(Transition.Request(resource=resource, to=to))
 
     def names(self) -> list[str]:

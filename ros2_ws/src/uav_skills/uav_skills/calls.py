@@ -1,9 +1,9 @@
-"""Service calls to the functional layer that never block, arrive in order, and always get an answer.
+"""Service calls to the functional layer that never block, arrive in order, and always get a response.
 
 The functional layer lives in another world behind the bridge: a service may be away for a moment, and two services are
-served by different threads. So calls wait in one queue, and the next is sent when the last was answered, or when it was sent
-long enough ago to have arrived: an answer may take seconds (the guidance arms the vehicle first), and a call that stops the
-vehicle must not wait for it. What is not answered in time is answered here, as a refusal that says so.
+served by different threads. So calls wait in one queue, and the next is sent when the last got its response, or when it was sent
+long enough ago to have arrived: a response may take seconds (the guidance arms the vehicle first), and a call that stops the
+vehicle must not wait for it. A call without a response in time gets a refusal from here that says so.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 ARRIVED_AFTER_S = 0.3
-ANSWERED_WITHIN_S = 20.0
-THERE_WITHIN_S = 3.0
+RESPONSE_TIMEOUT_S = 20.0
+SERVER_TIMEOUT_S = 3.0
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a service said; ``reference_id`` is 0 where the service has none or refused."""
+class Response:
+    """A service's response; ``reference_id`` is 0 where the service has none or refused."""
 
     accepted: bool
     reason: str = ""
     reference_id: int = 0
 
 
-Reply = Callable[[Answer], None]
+Reply = Callable[[Response], None]
 
 
 class Service(Protocol):
@@ -44,7 +44,7 @@ class Service(Protocol):
         ...
 
     def remove_pending_request(self, future: Any) -> None:
-        """Forget a request whose answer does not matter any more."""
+        """Forget a request whose response does not matter any more."""
         ...
 
 
@@ -58,27 +58,27 @@ class _Call:
     future: Any = None
 
     def overdue(self, now_s: float) -> bool:
-        return now_s - self.turn_s > THERE_WITHIN_S if self.sent_s is None else now_s - self.sent_s > ANSWERED_WITHIN_S
+        return now_s - self.turn_s > SERVER_TIMEOUT_S if self.sent_s is None else now_s - self.sent_s > RESPONSE_TIMEOUT_S
 
     def holds_back(self, now_s: float) -> bool:
         return self.sent_s is None or now_s - self.sent_s < ARRIVED_AFTER_S
 
-    def refusal(self) -> Answer:
+    def refusal(self) -> Response:
         name = self.service.srv_name
         if self.sent_s is None:
-            return Answer(accepted=False, reason=f"service {name} is not there for {THERE_WITHIN_S:g} s")
-        return Answer(accepted=False, reason=f"service {name} does not answer for {ANSWERED_WITHIN_S:g} s")
+            return Response(accepted=False, reason=f"service {name} is not there for {SERVER_TIMEOUT_S:g} s")
+        return Response(accepted=False, reason=f"service {name} does not answer for {RESPONSE_TIMEOUT_S:g} s")
 
 
-def ignore_answer(_answer: Answer) -> None:
-    """Take an answer that changes nothing."""
+def ignore_response(_response: Response) -> None:
+    """Ignore a response that changes nothing."""
 
 
-def read_answer(response: Any) -> Answer:
-    """Read an answer of uav_msgs (accepted, reason) or of std_srvs (success, message)."""
+def read_response(response: Any) -> Response:
+    """Read a response of uav_msgs (accepted, reason) or of std_srvs (success, message)."""
     if hasattr(response, "accepted"):
-        return Answer(bool(response.accepted), str(response.reason), int(getattr(response, "reference_id", 0)))
-    return Answer(bool(response.success), str(response.message))
+        return Response(bool(response.accepted), str(response.reason), int(getattr(response, "reference_id", 0)))
+    return Response(bool(response.success), str(response.message))
 
 
 class CallQueue:
@@ -89,8 +89,8 @@ class CallQueue:
         self._calls: list[_Call] = []
         self._lock = threading.Lock()
 
-    def submit(self, service: Service, request: object, reply: Reply = ignore_answer) -> None:
-        """Send the request when its turn comes; ``reply`` gets exactly one answer, from another thread or this one."""
+    def submit(self, service: Service, request: object, reply: Reply = ignore_response) -> None:
+        """Send the request when its turn comes; ``reply`` gets exactly one response, from another thread or this one."""
         with self._lock:
             self._calls.append(_Call(service, request, reply, self._now_s()))
         self.tick()
@@ -123,13 +123,13 @@ class CallQueue:
         return sent
 
     def _follow(self, call: _Call) -> None:
-        # rclpy calls this in a thread of its executor, or here when the answer is there already.
-        call.future.add_done_callback(lambda future: self._answered(call, future))
+        # rclpy calls this in a thread of its executor, or here when the response is there already.
+        call.future.add_done_callback(lambda future: self._on_reply(call, future))
 
-    def _answered(self, call: _Call, future: Any) -> None:
+    def _on_reply(self, call: _Call, future: Any) -> None:
         with self._lock:
             if call not in self._calls:
                 return  # it was too late
             self._calls.remove(call)
-        call.reply(read_answer(future.result()))
+        call.reply(read_response(future.result()))
         self.tick()

@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 from uav_msgs.msg import GuidanceState, MappingState, Obstacle, SensorHealth, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
-from uav_skills.calls import CallQueue, Reply, ignore_answer
+from uav_skills.calls import CallQueue, Reply, ignore_response
 
 WATCH_PERIOD_S = 0.1
 LONGEST_STEP_S = 0.2
@@ -101,11 +101,11 @@ class GuidanceApi(FunctionalPart):
         request = SetHeadingReference.Request(yaw_rad=heading_rad, rate_rad_s=rate_rad_s, lock=lock)
         self._calls.submit(self._heading, request, reply)
 
-    def release_heading(self, reply: Reply = ignore_answer) -> None:
+    def release_heading(self, reply: Reply = ignore_response) -> None:
         """End the holding of a heading."""
         self._calls.submit(self._heading, SetHeadingReference.Request(release=True), reply)
 
-    def hover(self, reply: Reply = ignore_answer) -> None:
+    def hover(self, reply: Reply = ignore_response) -> None:
         """Stop and stay."""
         self._calls.submit(self._hover, Command.Request(), reply)
 
@@ -130,7 +130,7 @@ class DepthApi(FunctionalPart):
         self._enable = self._client(SetBool, f"/{node_name}/enable")
         self._subscribe(Obstacle, f"/{node_name}/obstacle", self._on_obstacle)
 
-    def enable(self, *, on: bool, reply: Reply = ignore_answer) -> None:
+    def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the obstacle detection."""
         self._calls.submit(self._enable, SetBool.Request(data=on), reply)
 
@@ -153,11 +153,11 @@ class MappingApi(FunctionalPart):
         self._subscribe(MappingState, "/lidar_mapping/state", self._on_state)
         self._subscribe(SensorHealth, "/lidar_obstacles/health", self._on_health)
 
-    def enable(self, *, on: bool, reply: Reply = ignore_answer) -> None:
+    def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the registration of scans."""
         self._calls.submit(self._enable, SetBool.Request(data=on), reply)
 
-    def save(self, reply: Reply = ignore_answer) -> None:
+    def save(self, reply: Reply = ignore_response) -> None:
         """Write the map."""
         self._calls.submit(self._save, Trigger.Request(), reply)
 
@@ -189,7 +189,7 @@ class VideoApi(FunctionalPart):
         request = Stream.Request(on=True, min_fps=min_fps, min_quality=min_quality, patience_s=patience_s)
         self._calls.submit(self._stream, request, reply)
 
-    def stop(self, reply: Reply = ignore_answer) -> None:
+    def stop(self, reply: Reply = ignore_response) -> None:
         """Send no more."""
         self._calls.submit(self._stream, Stream.Request(), reply)
 

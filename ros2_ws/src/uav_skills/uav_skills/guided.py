@@ -1,6 +1,6 @@
 """What all skills of the navigation have in common: a reference given to the guidance, followed until a verdict.
 
-The life of one execution (paper, Listing 4): ``on_dispatch`` sends a command and returns; the answer brings the reference's id;
+The life of one execution (paper, Listing 4): ``on_dispatch`` sends a command and returns; the response brings the reference's id;
 every state of the guidance that speaks of this id is decided on; a verdict ends the execution. When the verdict is not the
 success, the vehicle is told to hover: the motion is not watched any more. A guidance that speaks of something else, or not
 at all, ends the execution, too: the reference is lost.
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from alula.runtime.hooks import SkillHooks
-from uav_skills.calls import Answer, Reply, ignore_answer
+from uav_skills.calls import Reply, Response, ignore_response
 from uav_skills.decisions import DEFAULT_THRESHOLDS, Thresholds, Verdict, remaining_part, speaks_of
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class GuidedSkill(SkillHooks):
     # --- what a skill adds -------------------------------------------------------------------------------------------
 
     def send(self, motion: Motion) -> None:
-        """Send the command; its answer goes to ``self.answer(motion)``."""
+        """Send the command; its response goes to ``self.on_response(motion)``."""
         raise NotImplementedError
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:
@@ -85,8 +85,8 @@ class GuidedSkill(SkillHooks):
         instead = "nothing" if state is None else f"{state.reference or 'nothing'} {state.reference_id}"
         return Verdict("ABORTED", f"the guidance does not follow this reference for {silent_s:.1f} s; last it spoke of {instead}")
 
-    def stop(self, reply: Reply = ignore_answer) -> None:
-        """Stop the function; ``reply`` gets the guidance's answer."""
+    def stop(self, reply: Reply = ignore_response) -> None:
+        """Stop the function; ``reply`` gets the guidance's response."""
         self.guidance.hover(reply)
 
     # --- hooks -------------------------------------------------------------------------------------------------------
@@ -124,20 +124,20 @@ class GuidedSkill(SkillHooks):
 
     # --- what the functional layer says ------------------------------------------------------------------------------
 
-    def answer(self, motion: Motion, answer: Answer) -> None:
-        """Take the answer to the command."""
+    def on_response(self, motion: Motion, response: Response) -> None:
+        """Take the response to the command."""
         if self._motion is not motion:
             return  # interrupted meanwhile: the command that stops it is in the queue behind
-        if not answer.accepted:
-            self._end(motion, Verdict("ABORTED", f"refused: {answer.reason}"), stop=False)
+        if not response.accepted:
+            self._end(motion, Verdict("ABORTED", f"refused: {response.reason}"), stop=False)
             return
         motion.heard_s = self.guidance.now_s
-        motion.reference_id = answer.reference_id
+        motion.reference_id = response.reference_id
 
     @staticmethod
-    def _stopped(execution: Execution, answer: Answer) -> None:
-        """Take the answer to the stop of an interruption: refused on the ground or without the authority, when nothing of ours moves."""
-        execution.interrupted("" if answer.accepted else f"the stop was not taken: {answer.reason}")
+    def _stopped(execution: Execution, response: Response) -> None:
+        """Take the response to the stop of an interruption: refused on the ground or without the authority, when nothing of ours moves."""
+        execution.interrupted("" if response.accepted else f"the stop was not taken: {response.reason}")
 
     def _on_state(self, state: GuidanceState) -> None:
         motion = self._motion

@@ -29,7 +29,7 @@ class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[mis
 
     def switch_on(self, execution: Execution) -> None:
         """Start the registration."""
-        self._mapping.enable(on=True, reply=functools.partial(self.answer, execution))
+        self._mapping.enable(on=True, reply=functools.partial(self.on_response, execution))
 
     def switch_off(self) -> None:
         """Stop the registration and write the map."""

@@ -17,7 +17,7 @@ from navigation_managers.hooks import (
 )
 
 from uav_skills import checks, decisions
-from uav_skills.calls import Reply, ignore_answer
+from uav_skills.calls import Reply, ignore_response
 from uav_skills.decisions import Verdict
 from uav_skills.functional import GuidanceApi
 from uav_skills.guided import GuidedSkill, Motion
@@ -48,7 +48,7 @@ class Takeoff(GuidedSkill, AbstractTakeoffSkill):  # type: ignore[misc]  # gener
     def send(self, motion: Motion) -> None:
         """Ask for the climb."""
         inputs = motion.inputs
-        self.guidance.takeoff(height_m=inputs.height, speed_m_s=inputs.speed, reply=functools.partial(self.answer, motion))
+        self.guidance.takeoff(height_m=inputs.height, speed_m_s=inputs.speed, reply=functools.partial(self.on_response, motion))
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
         """End at altitude, adrift, or blocked."""
@@ -74,7 +74,7 @@ class _Flight(GuidedSkill):
     def send(self, motion: Motion) -> None:
         """Give the position reference."""
         target: Point = motion.inputs.target
-        speed_m_s, reply = motion.inputs.speed, functools.partial(self.answer, motion)
+        speed_m_s, reply = motion.inputs.speed, functools.partial(self.on_response, motion)
         self.guidance.set_position(target_enu_m=target, speed_m_s=speed_m_s, along_travel=self.along_travel, reply=reply)
 
     def on_pause(self, execution: Execution) -> str:
@@ -121,7 +121,7 @@ class RotateHead(GuidedSkill, AbstractRotateHeadSkill):  # type: ignore[misc]  #
 
     def send(self, motion: Motion) -> None:
         """Give the heading reference."""
-        inputs, reply = motion.inputs, functools.partial(self.answer, motion)
+        inputs, reply = motion.inputs, functools.partial(self.on_response, motion)
         self.guidance.set_heading(heading_rad=inputs.heading, rate_rad_s=inputs.rate, lock=False, reply=reply)
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
@@ -142,10 +142,10 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
 
     def send(self, motion: Motion) -> None:
         """Lock."""
-        heading_rad, reply = motion.inputs.heading, functools.partial(self.answer, motion)
+        heading_rad, reply = motion.inputs.heading, functools.partial(self.on_response, motion)
         self.guidance.set_heading(heading_rad=heading_rad, rate_rad_s=LOCK_RATE_RAD_S, lock=True, reply=reply)
 
-    def stop(self, reply: Reply = ignore_answer) -> None:
+    def stop(self, reply: Reply = ignore_response) -> None:
         """Release the heading; the motion goes on."""
         self.guidance.release_heading(reply)
 
@@ -178,7 +178,7 @@ class Hover(GuidedSkill, AbstractHoverSkill):  # type: ignore[misc]  # generated
 
     def send(self, motion: Motion) -> None:
         """Hover."""
-        self.guidance.hover(functools.partial(self.answer, motion))
+        self.guidance.hover(functools.partial(self.on_response, motion))
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
         """End after the duration."""
@@ -205,7 +205,7 @@ class Land(GuidedSkill, AbstractLandSkill):  # type: ignore[misc]  # generated
 
     def send(self, motion: Motion) -> None:
         """Land."""
-        self.guidance.land(functools.partial(self.answer, motion))
+        self.guidance.land(functools.partial(self.on_response, motion))
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
         """End on the ground with the motors off, or when it does not come lower."""

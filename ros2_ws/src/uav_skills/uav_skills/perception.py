@@ -30,7 +30,7 @@ class _Depthmap(WatchedSkill):
 
     def switch_on(self, execution: Execution) -> None:
         """Start the obstacle detection."""
-        self._depth.enable(on=True, reply=functools.partial(self.answer, execution))
+        self._depth.enable(on=True, reply=functools.partial(self.on_response, execution))
 
     def switch_off(self) -> None:
         """Stop the obstacle detection."""

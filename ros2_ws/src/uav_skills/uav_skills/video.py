@@ -39,7 +39,7 @@ class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # genera
     def switch_on(self, execution: Execution) -> None:
         """Begin to send, with the criteria."""
         inputs: StreamInputs = execution.inputs
-        reply = functools.partial(self.answer, execution)
+        reply = functools.partial(self.on_response, execution)
         self._video.begin(min_fps=inputs.min_fps, min_quality=inputs.min_quality, patience_s=inputs.patience, reply=reply)
 
     def switch_off(self) -> None:

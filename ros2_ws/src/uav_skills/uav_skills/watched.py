@@ -9,7 +9,7 @@ from alula.runtime.hooks import SkillHooks
 
 if TYPE_CHECKING:
     from alula.runtime.core.execution import Execution
-    from uav_skills.calls import Answer
+    from uav_skills.calls import Response
     from uav_skills.decisions import Verdict
     from uav_skills.functional import FunctionalPart
 
@@ -31,7 +31,7 @@ class WatchedSkill(SkillHooks):
     # --- what a skill adds -------------------------------------------------------------------------------------------
 
     def switch_on(self, execution: Execution) -> None:
-        """Start the function; its answer goes to ``self.answer(execution)``."""
+        """Start the function; its response goes to ``self.on_response(execution)``."""
         raise NotImplementedError
 
     def switch_off(self) -> None:
@@ -70,10 +70,10 @@ class WatchedSkill(SkillHooks):
 
     # --- what the functional layer says ------------------------------------------------------------------------------
 
-    def answer(self, execution: Execution, answer: Answer) -> None:
+    def on_response(self, execution: Execution, response: Response) -> None:
         """Take the answer to switching on."""
-        if not answer.accepted and self._forget(execution):
-            execution.terminate("ABORTED", f"refused: {answer.reason}")
+        if not response.accepted and self._forget(execution):
+            execution.terminate("ABORTED", f"refused: {response.reason}")
 
     def _on_watch(self) -> None:
         execution = self._execution
