@@ -28,7 +28,7 @@ ROBOT = "--robot"
 
 
 def usage() -> str:
-    """Return what there is."""
+    """Return the help text: a line for each command."""
     lines = ["usage: alula [--robot DIR] COMMAND [arguments]", ""]
     lines += [f"  {name:<10} {about}" for name, (_, about) in COMMANDS.items()]
     return "\n".join([*lines, "", "What needs ROS (setup, fly, bridge, panel, test) is in the entry script ./alula of a checkout.", ""])

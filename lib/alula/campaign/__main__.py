@@ -31,7 +31,7 @@ SHOW_EVERY_S = 1.0
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the arguments."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(
         prog="alula campaign", description="Fly many flights with faults, and report the mission's response to each failure."
     )
@@ -61,7 +61,7 @@ class Teller:
         self._since = self._said = time.monotonic()
 
     def __call__(self, done: int) -> None:
-        """Say it."""
+        """Write how many flights are done, their rate and the time left to stderr, at most every ``SHOW_EVERY_S``."""
         now = time.monotonic()
         if now - self._said >= SHOW_EVERY_S or done == self._flights:
             self._said = now

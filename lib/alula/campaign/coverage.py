@@ -39,7 +39,7 @@ class Cover:
         return self.responses.total()
 
     def as_dict(self) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return the row as ``coverage.json`` has it: recovery in seconds, clearance in metres."""
         found = {"kind": self.way.kind, "name": self.way.name, "times": self.times, "answers": dict(self.responses.most_common())}
         worst = {"worst_recovery_s": self.worst_after_s, "worst_clearance_m": self.worst_clearance_m}
         return {**found, "outcomes": dict(self.outcomes.most_common()), **worst}
@@ -62,7 +62,7 @@ class Coverage:
         return [cover.way for cover in self.covers if not cover.times]
 
     def as_dict(self) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return the whole matrix as ``coverage.json`` has it."""
         tried = [cover.as_dict() for cover in self.covers if cover.times]
         never = [vars(way) for way in self.never]
         return {"flights": self.flights, "outcomes": dict(self.outcomes), "troubled": list(self.troubled), "tried": tried, "never": never}

@@ -61,7 +61,7 @@ class MockFlights:
             raise AnalysisError(str(error)) from None
 
     def fly(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> Flown:
-        """Fly once."""
+        """Fly the mission once over mocks, in virtual time; the same faults and seed give the same flight."""
         mission = MockedMission(self.skillsets, self.behaviour, self.plan(), faults=faults, seed=seed)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))

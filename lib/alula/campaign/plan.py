@@ -32,7 +32,7 @@ class Flight:
 
     @property
     def requests(self) -> list[FaultRequest]:
-        """The faults as values."""
+        """The faults of the flight, parsed; raises FaultError where a text is none."""
         return [parse_fault(text) for text in self.faults]
 
 

@@ -17,7 +17,7 @@ ALIKE, DIFFERENT, UNREADABLE = 0, 1, 2
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the arguments."""
+    """Return the command line's values; wrong ones, or a single run, print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula compare", description="Show runs side by side, and whether their missions decided alike.")
     parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folders of runs, or their logs; two or more")
     parser.add_argument("--json", action="store_true", help="print the comparison as JSON")

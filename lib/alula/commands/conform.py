@@ -21,7 +21,7 @@ CONFORMS, DIFFERS, UNREADABLE = 0, 1, 2
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the arguments."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula conform", description="Hold a log of skillset events against the models.")
     parser.add_argument("log", type=Path, help="a run's folder, skills.mcap, a bag with Event messages, or events.jsonl")
     parser.add_argument(

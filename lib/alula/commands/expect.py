@@ -16,7 +16,7 @@ FULFILLED, FAILED, UNREADABLE = 0, 1, 2
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Read the arguments."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula expect", description="Write expectations from a run, or hold a run against them.")
     parser.add_argument("run", type=Path, help="a run's folder, or its log")
     parser.add_argument("--check", type=Path, metavar="FILE", help="hold the run against this file instead of writing one")

@@ -79,7 +79,7 @@ NO_DEPTHS: Depths = {}
 
 
 def parse(words: Sequence[str], depths: Depths = NO_DEPTHS) -> Arguments:
-    """Read the command line."""
+    """Return the command line's values; ``depths`` are the robot's own for ``--from``. Wrong ones exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula replay", description="Make the decisions of a recorded mission again.")
     parser.add_argument("run", type=Path, metavar="RUN", help="a run's folder, its skills.mcap or its functional.bag")
     parser.add_argument("--from", dest="depth", choices=[SKILLS, *depths], default=SKILLS, help="what is taken from the record")

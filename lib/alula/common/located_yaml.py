@@ -83,7 +83,7 @@ class Located:
         return [self]
 
     def text(self, what: str) -> str:
-        """Return a text; raise."""
+        """Return a scalar's text; raises the document's error with file and line where there is a list or a mapping."""
         if not isinstance(self._node, yaml.ScalarNode):
             raise self.wrong(f"{what} should be one word or text, not {_shown(self._node)}")
         return str(self._node.value)

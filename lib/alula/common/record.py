@@ -72,7 +72,7 @@ class Entry:
 
     @property
     def stamp_s(self) -> float:
-        """Seconds of mission clock."""
+        """Stamp in seconds of mission clock."""
         return self.stamp_ns / 1e9
 
 

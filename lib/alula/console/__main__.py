@@ -29,7 +29,7 @@ DOMAINS = range(233)
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Read the arguments."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(
         prog="alula console",
         description="Serve the operator's page: start a mission, watch it, understand it afterwards.",
@@ -133,7 +133,7 @@ class LateLink:
 
 
 def no_link() -> Link:
-    """Reach no robot."""
+    """Raise ActError: without ROS 2 no robot can be reached."""
     raise ActError("there is no ROS 2 here: this server only shows runs")
 
 

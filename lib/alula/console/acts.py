@@ -42,7 +42,7 @@ class Flight:
     autopilot: str = ""
 
     def words(self, out: Path) -> list[str]:
-        """Return the command line."""
+        """Return the command that starts this flight with ``out`` as the run's folder."""
         words = [str(Path(os.environ["ALULA_ROOT"]) / "alula"), "fly", self.scenario, "--seed", str(self.seed), "--out", str(out)]
         for fault in self.faults:
             words += ["--fail", fault]

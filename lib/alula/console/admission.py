@@ -70,7 +70,7 @@ class Admission:
 
     @property
     def address(self) -> str:
-        """Return the page's address."""
+        """Return the URL to open in a browser, with the token where one is needed."""
         named = socket.gethostname() if self.host in {"0.0.0.0", "::", ""} else self.host  # noqa: S104 - it is compared, not bound
         host = f"[{named}]" if ":" in named else named
         return f"{self._scheme}://{host}:{self.port}/{'?token=' + self.token if self.token else ''}"

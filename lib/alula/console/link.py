@@ -48,7 +48,7 @@ class Skillset(Protocol):
 
     @property
     def client(self) -> Client:
-        """What calls its managers."""
+        """The client of its managers."""
         ...
 
     @property
@@ -76,7 +76,7 @@ class Skillsets(Closable, Protocol):
 
     @property
     def now_ns(self) -> int:
-        """The mission clock."""
+        """Mission clock, nanoseconds."""
         ...
 
 

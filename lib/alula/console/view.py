@@ -94,13 +94,13 @@ class SkillsetView:
     # --- what was heard ----------------------------------------------------------------------------------------------
 
     def heard_states(self, states: Mapping[str, str]) -> None:
-        """Take the resources' states."""
+        """Take the states of all resources, by name."""
         with self._lock:
             self._states = dict(states)
             self.version += 1
 
     def heard_event(self, event: EngineEvent) -> None:
-        """Take an event."""
+        """Add a line to the log for an event of the managers."""
         self.say(f"{event.stamp_ns / NANOSECONDS:.2f}  {_told(event)}")
 
     def heard_skills(self, skills: Mapping[str, SkillRecord]) -> None:

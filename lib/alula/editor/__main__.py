@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Serve; return 0."""
+    """Serve on stdin and stdout until the editor closes them; return the exit code 0."""
     parser = argparse.ArgumentParser(prog="alula editor", description="A language server over the standard streams, for editors.")
     parser.parse_args(words)
     from alula.editor.server import serve  # late: --help does without pygls

@@ -154,7 +154,7 @@ class _Finder:
         yield from self._name(span, Entity("state", state, (*owner, resource)), offset=2)
 
     def _typed(self, span: Span, entity: Entity, kind: str) -> Iterator[Occurrence]:
-        """Yield `name: Type`."""
+        """Yield the occurrences in `name: Type`; types of the language itself are none."""
         yield from self._name(span, entity, defining=True)
         if kind not in PRIMITIVES:
             yield from self._name(span, Entity("type", kind), offset=2)

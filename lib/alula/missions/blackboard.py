@@ -34,7 +34,7 @@ class Failure:
 
 @dataclass(kw_only=True)
 class Blackboard:
-    """The mission's memory."""
+    """The memory of a mission: what failed, and why; a robot's own derives from it."""
 
     clock_ns: Clock
     pending: PendingInterrupts
@@ -45,7 +45,7 @@ class Blackboard:
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         return self.clock_ns() / NANOSECONDS
 
     def values(self) -> Mapping[str, object]:

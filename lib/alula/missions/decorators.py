@@ -19,7 +19,7 @@ class Until(Decorator):  # type: ignore[misc]  # py_trees is seen untyped
         self._condition = condition
 
     def update(self) -> Status:
-        """Follow the child."""
+        """Return the child's status; where it succeeds, RUNNING until the condition holds."""
         if self.decorated.status is not Status.SUCCESS:
             return Status(self.decorated.status)
         return Status.SUCCESS if self._condition() else Status.RUNNING

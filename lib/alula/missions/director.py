@@ -41,7 +41,7 @@ EXIT_CODES = {
 
 @dataclass(frozen=True)
 class End:
-    """The outcome and why."""
+    """How a mission ended: its outcome, and the reason in words."""
 
     outcome: Outcome
     reason: str = ""

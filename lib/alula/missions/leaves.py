@@ -56,7 +56,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
 
     @property
     def skill_name(self) -> str:
-        """As navigation.goto."""
+        """``skillset.skill``, as in ``navigation.goto``."""
         return f"{self.client.skillset}.{self.skill}"
 
     def initialise(self) -> None:
@@ -108,7 +108,7 @@ class Do(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen u
         self._action = action
 
     def update(self) -> Status:
-        """Do it."""
+        """Call the action with the blackboard; always SUCCESS."""
         self._action(self._blackboard)
         return Status.SUCCESS
 
@@ -122,7 +122,7 @@ class Check(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         self._otherwise = Status.RUNNING if wait else Status.FAILURE
 
     def update(self) -> Status:
-        """Look."""
+        """SUCCESS where the condition holds, else the status that was given for that."""
         return Status.SUCCESS if self._condition() else self._otherwise
 
 
@@ -137,11 +137,11 @@ class Stays(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         self._since_s = 0.0
 
     def initialise(self) -> None:
-        """Begin to count."""
+        """Begin to count the time during which the condition has held."""
         self._since_s = self._blackboard.now_s
 
     def update(self) -> Status:
-        """Look and count."""
+        """FAILURE as soon as the condition is false, SUCCESS when it has held for the duration."""
         if not self._condition():
             return Status.FAILURE
         return Status.SUCCESS if self._blackboard.now_s - self._since_s >= self._duration_s else Status.RUNNING
@@ -160,12 +160,12 @@ class Awaits(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         self._holds_since_s: float | None = None
 
     def initialise(self) -> None:
-        """Begin to count."""
+        """Begin to count the time limit, and how long the condition has held."""
         self._since_s = self._blackboard.now_s
         self._holds_since_s = None
 
     def update(self) -> Status:
-        """Look and count."""
+        """SUCCESS when the condition has held for long enough without a break, FAILURE at the time limit."""
         now_s = self._blackboard.now_s
         if not self._condition():
             self._holds_since_s = None

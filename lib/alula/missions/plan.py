@@ -20,7 +20,7 @@ MakeMission = Callable[[Mapping[str, Client], Clock, Mapping[str, float]], tuple
 
 
 def nothing_more() -> Mapping[str, object]:
-    """Have nothing to add."""
+    """Return no facts: of a mission that adds none to its record."""
     return {}
 
 

@@ -16,11 +16,11 @@ Clock = Callable[[], int]
 
 
 class Client(Protocol):
-    """A skillset."""
+    """What a mission needs of a client of a skillset's managers."""
 
     @property
     def skillset(self) -> str:
-        """Its name."""
+        """Name of the skillset."""
         ...
 
     @property
@@ -82,7 +82,7 @@ class MissionClient:
         return self.client.resources
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
-        """Start an execution."""
+        """Start an execution, record it as a decision, and wake the mission when it ends."""
         handle = self.client.start(skill, **inputs)
         if self._recorder is not None:
             self._record(self._recorder, handle, inputs)
@@ -119,7 +119,7 @@ class Thinned:
         self._last_s: float | None = None
 
     def __call__(self, sample: Any) -> None:
-        """Take a sample."""
+        """Pass the sample on, unless the last one is less than the period ago (by the samples' stamps)."""
         now_s = None if sample.stamp_ns is None else sample.stamp_ns / NANOSECONDS
         if now_s is not None and self._last_s is not None and now_s - self._last_s < self._every_s:
             return

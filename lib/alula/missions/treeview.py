@@ -97,7 +97,7 @@ class TreeWatch:
                 memory.left, memory.message = True, node.feedback_message
 
     def look(self) -> NodeView:
-        """Return the tree now."""
+        """Return a view of the whole tree as it is now."""
         self.remember()
         return self._view(self._root)
 

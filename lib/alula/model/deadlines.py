@@ -19,7 +19,7 @@ NS_PER_S = 1_000_000_000
 
 
 def nanoseconds(seconds: float) -> int:
-    """Return seconds as nanoseconds."""
+    """Return seconds as whole nanoseconds, rounded to the nearest."""
     return round(seconds * NS_PER_S)
 
 

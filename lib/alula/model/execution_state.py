@@ -21,7 +21,7 @@ class ExecutionState(Enum):
 
     @property
     def terminal(self) -> bool:
-        """Tell whether nothing follows."""
+        """Tell whether it is an end: no state follows it."""
         return self._value_ not in _OPEN
 
     @property

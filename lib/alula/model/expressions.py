@@ -48,7 +48,7 @@ class DataIs:
 
 @dataclass(frozen=True)
 class Constant:
-    """``true`` or ``false``."""
+    """The literals ``true`` and ``false``."""
 
     value: bool
     span: Span = field(default=NOWHERE, compare=False)
@@ -64,7 +64,7 @@ class SkillRuns:
 
 @dataclass(frozen=True)
 class Not:
-    """Negation."""
+    """``not operand``."""
 
     operand: Expression
     span: Span = field(default=NOWHERE, compare=False)
@@ -88,7 +88,7 @@ class Or:
 
 @dataclass(frozen=True)
 class Implies:
-    """Implication, ``premise => conclusion``."""
+    """``premise => conclusion``: false only where the premise holds and the conclusion does not."""
 
     premise: Expression
     conclusion: Expression

@@ -12,7 +12,7 @@ from alula.model.unmet import Unmet
 
 @dataclass(frozen=True)
 class Running:
-    """A running execution."""
+    """An execution that has started and not ended."""
 
     id: str
     skill: str

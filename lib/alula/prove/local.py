@@ -54,7 +54,6 @@ class _Checks:
     # --- kinds ----------------------------------------------------------------------------------------------------
 
     def event(self, event: Event) -> None:
-        """ALU501 to ALU503."""
         solver = self._solver
         guard, span = solver.term(event.guard), _span(event.guard, event.span)
         if not solver.possible(guard):
@@ -67,7 +66,6 @@ class _Checks:
         self._suspect("ALU503", message, event.effect, span, ("event", event.name), asked, [guard, fails])
 
     def preconditions(self, skill: Skill) -> None:
-        """ALU504 and ALU505."""
         before: list[Any] = []
         for precondition in skill.preconditions:
             where = f"precondition `{precondition.name}` of `{skill.name}`"
@@ -75,7 +73,6 @@ class _Checks:
             before.append(self._solver.term(precondition.condition))
 
     def start(self, skill: Skill) -> None:
-        """ALU506."""
         ready = [self._solver.term(p.condition) for p in skill.preconditions]
         fails = self._solver.negation(self._solver.applies(skill.start))
         message = f"the start effect of `{skill.name}` can fail though its preconditions are true"
@@ -83,7 +80,6 @@ class _Checks:
         self._suspect("ALU506", message, skill.start, skill.span, ("start", skill.name), asked, [*ready, fails])
 
     def invariants(self, skill: Skill) -> None:
-        """ALU507 to ALU510."""
         before: list[Any] = []
         for invariant in skill.invariants:
             where = f"invariant `{invariant.name}` of `{skill.name}`"

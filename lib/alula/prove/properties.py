@@ -61,7 +61,7 @@ def true_in(world: World, condition: Expression, state: State) -> bool:
 
 
 def failed(wanted: Property, what: str, run: Counterexample) -> Diagnostic:
-    """Return ALU531."""
+    """Return ALU531, a property that does not hold: ``what`` it comes to, and the run in which it does."""
     message = f"property `{wanted.name}` ({wanted.kind.value}{', assuming termination' if wanted.fair else ''}) does not hold: {what}"
     return Diagnostic("ALU531", message, wanted.span, Severity.ERROR, counterexample=run)
 

@@ -75,13 +75,13 @@ def unreachable_states(skillset: Skillset, seen: list[set[str]]) -> list[Diagnos
 
 
 def dead_skill(skill: Skill) -> Diagnostic:
-    """Return ALU522."""
+    """Return ALU522: the skill's preconditions hold in no reachable situation."""
     message = f"`{skill.name}` can never start: its preconditions are true in no reachable situation"
     return Diagnostic("ALU522", message, skill.span, Severity.WARNING)
 
 
 def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, str], run: Counterexample) -> Diagnostic:
-    """Return ALU523."""
+    """Return ALU523: two executions, of the ``pair`` of skills, hold a resource at once, each by taking it to ``state``."""
     first, second = pair
     holders = f"two executions of `{first}`" if first == second else f"`{first}` and `{second}`"
     message = f"{holders} can hold `{resource}` at once: each has taken it to `{state}`"
@@ -90,7 +90,7 @@ def held_twice(skillset: Skillset, resource: str, state: str, pair: tuple[str, s
 
 
 def lost(skillset: Skillset, names: list[str], run: Counterexample) -> Diagnostic:
-    """Return ALU524."""
+    """Return ALU524: after ``run``, none of the skills named can ever start again."""
     several = ", ".join(f"`{name}`" for name in names)
     message = f"{several} can come to a situation from which {'it' if len(names) == 1 else 'they'} can never start again"
     return Diagnostic("ALU524", message, skillset.skill(names[0]).span, Severity.WARNING, counterexample=run)

@@ -87,7 +87,7 @@ class Solver:
                 return z3.Implies(self.term(premise, after), self.term(conclusion, after))
 
     def constant(self, *, value: bool) -> Any:
-        """Return true or false."""
+        """Return the solver's term of a truth value."""
         return z3.BoolVal(value, ctx=self._context)
 
     def state_is(self, resource: str, state: str) -> Any:

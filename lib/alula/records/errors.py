@@ -1,7 +1,7 @@
-"""Errors of this package."""
+"""The one error of records, and of the models and expectations that they are checked against."""
 
 from __future__ import annotations
 
 
 class AnalysisError(Exception):
-    """Something can't be read or asked; the message names the place and what would be right."""
+    """A file can't be read, or a request does not fit it; the message names the place and the remedy."""

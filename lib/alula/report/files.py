@@ -20,7 +20,7 @@ class Problems:
         self._sentences: list[str] = []
 
     def note(self, sentence: str) -> None:
-        """Add a sentence, once."""
+        """Add a sentence to the report's list of problems, unless it has it already."""
         if sentence not in self._sentences:
             self._sentences.append(sentence)
 

@@ -21,7 +21,7 @@ class MockSummary(TypedDict):
 
 
 def read_mock(folder: Path, problems: Problems) -> tuple[Observed, MockSummary]:
-    """Read ``mock.json``."""
+    """Return what ``mock.json`` of a run over mocks says: lift-off and faults, and how fast it ran."""
     values: dict[str, object] = {}
     with problems.survive("mock.json"):
         values = mapping(read_json(folder / "mock.json"))

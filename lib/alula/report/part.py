@@ -85,15 +85,15 @@ class NoPart:
         return Observed(processes=read_process_faults(run.folder))
 
     def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
-        """Find nothing."""
+        """Return no further faults."""
         return ()
 
     def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
-        """Measure nothing."""
+        """Return no figures."""
         return Findings()
 
     def entries(self) -> Iterable[Entry]:
-        """Add nothing."""
+        """Return no further entries for the page."""
         return ()
 
 

@@ -22,7 +22,7 @@ OUTCOMES = frozenset({"accomplished", "degraded", "given_up", "aborted", "not_st
 
 
 class RecoverySummary(TypedDict):
-    """See `recovery`."""
+    """Moments of the recovery, seconds since lift-off; None: it did not come to that."""
 
     failure_s: float | None
     detected_s: float | None
@@ -122,7 +122,7 @@ def summarise(
     problems: Problems,
     mock: MockSummary | None = None,
 ) -> Summary:
-    """Put everything together."""
+    """Return ``summary.json`` of a run; what could not be read becomes a sentence among the problems."""
     outcome, reason = read_outcome(facts, problems)
     bridge = None if facts.mock else read_bridge(facts, problems)
     note_doubts(facts, observed, phases, problems)

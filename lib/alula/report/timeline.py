@@ -73,7 +73,7 @@ class Timeline(TypedDict):
 
 
 def make_timeline(history: History, phases: Phases, recovery: Recovery | None) -> Timeline:
-    """Arrange the history."""
+    """Return the rows of skills and resources and the marks, in seconds since lift-off."""
     begin_s, end_s = phases.since(history.first_s) or 0.0, phases.since(history.last_s) or 0.0
     return Timeline(
         begin_s=begin_s,

@@ -83,7 +83,7 @@ class ActionMessages:
         return self._outputs(self._types.fill(self._result(), plain, self._outputs_place), RESULT_FIELDS)
 
     def read_feedback(self, message: Any) -> tuple[float, dict[str, Any]]:
-        """Return progress and outputs."""
+        """Return progress (0 to 1) and outputs by name of a feedback message."""
         return message.progress, self._outputs(message, FEEDBACK_FIELDS)
 
     def read_result(self, message: Any) -> GoalResult:

@@ -1,4 +1,4 @@
-"""Subscribed callbacks."""
+"""A list of subscribed callbacks that may change from any thread while it is called."""
 
 from __future__ import annotations
 

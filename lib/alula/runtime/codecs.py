@@ -136,7 +136,7 @@ def event_of(message: Any) -> EngineEvent:
 
 
 def states_of(message: Any) -> ResourceStates:
-    """Return resource states."""
+    """Read ``ResourceStates``; ``frame_id`` holds the instance id and the number of the last event."""
     instance_id, _, after = message.header.frame_id.partition(" ")
     values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
     return ResourceStates(instance_id, int(after or 0), stamp_ns_of(message.header.stamp), values)

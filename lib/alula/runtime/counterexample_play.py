@@ -48,7 +48,6 @@ class _Function(SkillHooks):
         self._reports = 0
 
     def on_dispatch(self, execution: Running) -> None:
-        """Note what runs."""
         self.asked_ns[execution.id] = self.now_ns()
         self.running[execution.id] = execution
 

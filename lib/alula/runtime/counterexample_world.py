@@ -31,7 +31,7 @@ class PlayWorld(Protocol):
 
     @property
     def managers(self) -> PlayManagers:
-        """The managers."""
+        """Managers of the one skillset, with the hooks that were given."""
         ...
 
     @property
@@ -41,7 +41,7 @@ class PlayWorld(Protocol):
 
     @property
     def now_ns(self) -> int:
-        """Mission clock."""
+        """Mission clock, nanoseconds."""
         ...
 
     def pass_time(self, seconds: float) -> None:
@@ -67,11 +67,11 @@ class VirtualWorld:
 
     @property
     def now_ns(self) -> int:
-        """Mission clock."""
+        """Mission clock, nanoseconds."""
         return self._world.clock.now_ns
 
     def pass_time(self, seconds: float) -> None:
-        """Have mission time pass."""
+        """Run the world for so much mission time; it takes none of the wall clock."""
         self._world.run_for(seconds)
 
     def settle(self, condition: Callable[[], bool]) -> None:  # noqa: ARG002 - nothing more happens at this moment, whatever holds

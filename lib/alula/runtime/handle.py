@@ -39,7 +39,7 @@ class Ended(Generic[OutputsT, ResultT]):
 
     @property
     def outcome(self) -> str:
-        """The terminal state's name."""
+        """Name of the terminal state."""
         return self.state.value
 
     def expect(self, *results: ResultT) -> Self:

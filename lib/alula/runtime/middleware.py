@@ -131,7 +131,7 @@ class Goal(Protocol):
     inputs: Mapping[str, object]
 
     def report(self, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
-        """Send feedback."""
+        """Send progress (0 to 1), the state and the outputs so far to the goal's client."""
         ...
 
     def finish(self, event: ExecutionEvent) -> None:
@@ -173,7 +173,7 @@ class ActionLink(Protocol):
         ...
 
     def cancel(self, goal_id: str) -> None:
-        """Cancel a goal."""
+        """Ask for the interruption of a goal; its result tells how it ended."""
         ...
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:
@@ -185,7 +185,7 @@ class ActionLink(Protocol):
         ...
 
     def release(self, goal_id: str) -> None:
-        """Stop following a goal."""
+        """Forget a goal: its listener hears nothing of it any more."""
         ...
 
 
@@ -208,7 +208,7 @@ class Middleware(Protocol):
     """Blocks a thread until an event of the loop."""
 
     def now_ns(self) -> int:
-        """Return the mission clock."""
+        """Return the mission clock, nanoseconds."""
         ...
 
     def at(self, when_ns: int, job: Job) -> Timer:
@@ -248,7 +248,7 @@ class Middleware(Protocol):
         ...
 
     def serve(self, service: str, handler: Serve) -> None:
-        """Serve a service."""
+        """Serve a service of the skillset; its name is relative to the skillset's namespace."""
         ...
 
     def call(

@@ -36,7 +36,7 @@ class TimerQueue:
         self._numbers = itertools.count()
 
     def put(self, when_ns: int, job: Job) -> Timer:
-        """Add a job."""
+        """Have a job run at ``when_ns`` (mission clock); jobs of one moment run in the order in which they were put."""
         timer = Timer(when_ns, job)
         heapq.heappush(self._timers, (when_ns, next(self._numbers), timer))
         return timer

@@ -69,17 +69,17 @@ class Access(Protocol):
 
     @property
     def skillset(self) -> str:
-        """Its name."""
+        """Name of the skillset."""
         ...
 
     @property
     def model(self) -> Skillset:
-        """What the managers execute."""
+        """The model that the managers execute."""
         ...
 
     @property
     def resources(self) -> dict[str, str]:
-        """State of each resource."""
+        """State of each resource by name, as last heard."""
         ...
 
     def on_change(self, callback: Callable[[dict[str, str]], None]) -> Unsubscribe:
@@ -87,7 +87,7 @@ class Access(Protocol):
         ...
 
     def start(self, skill: str, **inputs: object) -> Handle[Any, Any]:
-        """Ask for an execution."""
+        """Ask the managers for an execution; its handle tells what becomes of it."""
         ...
 
     def last(self, skill: str) -> Ended[Any, Any] | None:
@@ -141,7 +141,7 @@ class SkillView(Skill[dict[str, Any], str]):
 
 
 class ResourceView(Generic[StateT]):
-    """One resource."""
+    """One resource of a skillset, as a client sees it; ``StateT`` is its generated enum."""
 
     def __init__(self, client: Access, name: str) -> None:
         self.name = name

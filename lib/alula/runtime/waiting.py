@@ -36,7 +36,7 @@ class ThreadWaiter:
     """Blocks until another thread sets the event."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
-        """Wait for the event."""
+        """Wait on the wall clock; tell whether the event came within the time."""
         return event.wait(timeout_s)
 
 
@@ -107,7 +107,7 @@ class Moment(Waitable):
     """A moment that comes when it is told."""
 
     def come(self) -> None:
-        """Be there, now."""
+        """End the wait of all who wait for this moment."""
         self._end()
 
     def wait_for_it(self) -> None:

@@ -26,7 +26,7 @@ class Workers:
         self._threads = 0
 
     def submit(self, job: Job) -> None:
-        """Run a job soon."""
+        """Run a job on a thread that is free, else on a new one; returns at once."""
         with self._changed:
             self._open += 1
             new = self._open > self._threads

@@ -23,7 +23,7 @@ class ScaffoldError(Exception):
 
 
 def camel(name: str) -> str:
-    """Return ``small_rover`` as ``SmallRover``."""
+    """Return a name of words joined by ``_`` in camel case: ``small_rover`` as ``SmallRover``."""
     return "".join(part.capitalize() for part in name.split("_"))
 
 

@@ -20,12 +20,12 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The name in the model."""
         ...
 
     @property
     def span(self) -> Span:
-        """Where it is defined."""
+        """The place of the definition in its file."""
         ...
 
 
@@ -187,7 +187,7 @@ def ros_name(what: str, element: Named) -> Iterator[Diagnostic]:
 
 
 def error(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
-    """Return an error."""
+    """Return a finding with which the model can't be used."""
     return Diagnostic(code, message, span, hint=hint)
 
 
@@ -197,5 +197,5 @@ def for_generator(code: str, message: str, span: Span, *, hint: str = "") -> Dia
 
 
 def warning(code: str, message: str, span: Span, *, hint: str = "") -> Diagnostic:
-    """Return a warning."""
+    """Return a finding with which the model can still be used."""
     return Diagnostic(code, message, span, Severity.WARNING, hint)

@@ -44,5 +44,5 @@ if __name__ == "__main__":
 
 
 def mock_module(robot: Robot, skillset: Skillset) -> str:
-    """Return ``mock.py``."""
+    """Return the text of ``mock.py``: the program that serves the skillset by mocks."""
     return fill(MOCK, skillset=skillset.name, header=header(robot, skillset))

@@ -19,7 +19,7 @@ _OUTSIDE = ("resource", "event", "skill", "property")
 
 
 def read_skill(cursor: Cursor) -> Skill:
-    """Read `name { ... }`."""
+    """Read `name { ... }`, the part of a skill behind the word `skill`; what is wrong in it goes to the cursor's report."""
     name = cursor.name("the name of the skill")
     reader = _SkillReader(cursor)
     cursor.block(reader.member, lambda: starts_member(cursor, _OUTSIDE), lambda: ends_block(cursor))

@@ -43,7 +43,7 @@ BLOCKS = (
 
 
 def read_skill(cursor: Cursor) -> Skill:
-    """Read `name { ... }`."""
+    """Read `name { ... }`, the part of a skill behind the word `skill`; what is wrong in it goes to the cursor's report."""
     name = cursor.name("the name of the skill")
     reader = _SkillReader(cursor)
     cursor.block(reader.member, lambda: outside(cursor), lambda: cursor.at(*BLOCKS))

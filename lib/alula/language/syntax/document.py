@@ -166,7 +166,6 @@ class _SkillsetReader:
         cursor.block(self._member, lambda: starts_member(cursor, ("skillset",)), self._begins_member)
 
     def build(self, name: Token) -> Skillset:
-        """Put the parts together."""
         parts = self.parts
         return Skillset(
             name=name.text,

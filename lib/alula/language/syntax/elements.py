@@ -63,7 +63,7 @@ def _told_unit(comment: str) -> str:
 
 
 def read_change(cursor: Cursor) -> Assignment:
-    """Read `resource -> STATE`."""
+    """Read `resource -> STATE`, one assignment of an effect."""
     resource = cursor.name("a resource")
     cursor.expect("->")
     state = cursor.name("a state")

@@ -15,7 +15,7 @@ _KINDS = (PropertyKind.NEVER, PropertyKind.ALWAYS, PropertyKind.EVENTUALLY)
 
 
 def read_property(cursor: Cursor) -> Property:
-    """Read one entry."""
+    """Read `name: never | always | eventually CONDITION` or `name: CONDITION leads to CONDITION`, each with `assuming termination`."""
     name = cursor.name("the name of a property")
     cursor.expect(":", hint="a property is written `name: never ...`, `always ...`, `eventually ...` or `... leads to ...`")
     kind, consequence = _kind(cursor), None

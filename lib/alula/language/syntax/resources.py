@@ -62,7 +62,7 @@ class _ResourceReader:
             self._transition()
 
     def build(self, name: Token) -> Resource:
-        """Put the parts together."""
+        """Return the resource; too many states or arrows are reported, and cut."""
         arrows = tuple(self.transitions)
         states = tuple(self.states) if self.states is not None else occurring(self.initial, arrows)
         source = self.cursor.source

@@ -32,7 +32,7 @@ class Finding:
         return f"{self.skillset} event {self.sequence} at {self.stamp_s:.3f} s: {self.event}: {self.why}"
 
     def as_dict(self) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return the finding as ``conform --json`` prints it."""
         return {**vars(self), "allowed": list(self.allowed)}
 
 

@@ -34,7 +34,7 @@ class Verdict:
         return not self.findings
 
     def as_dict(self) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return the verdict as ``conform --json`` prints it."""
         found = {"conforms": self.conforms, "events": self.events, "findings": [finding.as_dict() for finding in self.findings]}
         return {
             **found,

@@ -77,7 +77,11 @@ def bag_of(recorded: Recorded, given: Path) -> Path:
 
 
 def decide(mission: RecordedMission, conditions: Conditions) -> Result:
-    """Decide again; raises ReplayError."""
+    """Make the mission's decisions again under the conditions; return them with the first difference.
+
+    Raises:
+            ReplayError: the conditions do not fit the record, or its folder can't be written.
+    """
     recorded, plan, out = mission.recorded, mission.plan, conditions.out
     parameters = parameters_for(recorded, plan, conditions.settings)
     faults = faults_for(mission.behaviour, conditions.fail)

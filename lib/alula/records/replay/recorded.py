@@ -90,7 +90,7 @@ class Recorded:
 
     @property
     def scenario(self) -> str:
-        """The scenario's name."""
+        """The scenario's name, empty where the record has none."""
         return str(self.mission.get("scenario", ""))
 
     @property

@@ -64,7 +64,7 @@ class ReplayClient(MissionClient):
         self._handles = handles
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
-        """Start an execution."""
+        """Start an execution and remember its handle by its id."""
         handle = super().start(skill, **inputs)
         self._handles[handle.id] = handle
         return handle

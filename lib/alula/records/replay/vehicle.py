@@ -41,7 +41,7 @@ class ReplayedSkill(MockSkill):
         return Choice(replace(choice.script, delay=delay, ending=ending, progress=0.0, outputs={}, changes=()), "")
 
     def on_dispatch(self, execution: Execution) -> None:
-        """Begin."""
+        """Begin the execution; the vehicle ends it as the record says."""
         super().on_dispatch(execution)
         self._vehicle.dispatched(execution, self)
 
@@ -60,7 +60,7 @@ class ReplayedSkill(MockSkill):
         return "" if self._vehicle.held(execution.id) else super().on_pause(execution)
 
     def on_resume(self, execution: Execution) -> str | None:  # noqa: ARG002
-        """Go on."""
+        """Accept: the record says when it ends."""
         return ""
 
 

@@ -93,7 +93,7 @@ class Connection:
             self._ask(DOUBT_S)
 
     def close(self) -> None:
-        """Make no more callbacks."""
+        """Stop: not alive, not ready, and no callback any more."""
         self._alive = False
         self.ready.clear()
 

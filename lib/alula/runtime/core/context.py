@@ -59,7 +59,7 @@ class ExecutionContext:
 
     @property
     def situation(self) -> Situation:
-        """Return the situation now."""
+        """Return states, data and executions, at the present mission time."""
         now_ns = self._clock_ns()
         if now_ns != self._situation.now_ns:
             self._situation = replace(self._situation, now_ns=now_ns)
@@ -91,7 +91,7 @@ class ExecutionContext:
     # --- changes ---------------------------------------------------------------------------------------------------------
 
     def add(self, execution: Execution) -> Entry:
-        """Record a request."""
+        """Add an execution that was requested, and publish its first event."""
         entry = self.entries[execution.id] = Entry(execution, Running(execution.id, execution.skill))
         self._publish([self._entered(execution)])
         return entry

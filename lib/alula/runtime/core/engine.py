@@ -66,7 +66,7 @@ def log_error(text: str) -> None:
 
 
 def _nothing(_: object) -> None:
-    """Ignore the answer."""
+    """Ignore what a call came to."""
 
 
 class SkillsetEngine:

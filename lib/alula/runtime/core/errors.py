@@ -1,4 +1,4 @@
-"""Errors of the runtime."""
+"""Errors of the engine, its managers and its clients, under one root."""
 
 from __future__ import annotations
 

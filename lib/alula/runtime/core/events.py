@@ -41,7 +41,7 @@ class ExecutionEvent:
 
     @property
     def stamp_s(self) -> float:
-        """Seconds of mission clock."""
+        """Stamp in seconds of mission clock."""
         return self.stamp_ns / NANOSECONDS
 
     @property
@@ -64,7 +64,7 @@ class TransitionEvent:
 
     @property
     def stamp_s(self) -> float:
-        """Seconds of mission clock."""
+        """Stamp in seconds of mission clock."""
         return self.stamp_ns / NANOSECONDS
 
 

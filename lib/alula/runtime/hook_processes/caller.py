@@ -54,7 +54,7 @@ class RemoteHooks:
             return [skill for skill in self._skills if skill not in self._processes]
 
     def close(self) -> None:
-        """Let all processes go."""
+        """Close all pipes and the listener; each process ends when its pipe closes."""
         with self._changed:
             self._over = True
             processes = list(self._processes.values())
@@ -151,7 +151,7 @@ class _SkillProcess:
         """What calls are answered once the process has ended."""
 
     def call(self, hook: str, execution: Snapshot, then: Then) -> None:
-        """Send a call."""
+        """Send a call; ``then`` gets the outcome, at once where the process has gone."""
         number = next(self._numbers)
         with self._lock:
             gone = self._gone
@@ -189,7 +189,7 @@ class _SkillProcess:
             then(answer)
 
     def close(self) -> None:
-        """Let the process go."""
+        """Close the pipe, upon which the process ends."""
         with contextlib.suppress(OSError):
             self._pipe.close()
 

@@ -27,12 +27,12 @@ class VirtualClock:
 
     @property
     def now_ns(self) -> int:
-        """Nanoseconds of mission clock."""
+        """Mission clock, nanoseconds."""
         return self._now_ns
 
     @property
     def now_s(self) -> float:
-        """Seconds of mission clock."""
+        """Mission clock, seconds."""
         return self._now_ns / NANOSECONDS
 
     @property

@@ -35,7 +35,7 @@ class LocalManagers:
 
     @property
     def clock(self) -> VirtualClock:
-        """The world's."""
+        """The world's clock, which these managers follow."""
         return self._middleware.bus.clock
 
     @property

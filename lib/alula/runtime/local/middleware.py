@@ -59,7 +59,7 @@ class Bus:
         self._topics: dict[str, VirtualTopic] = {}
 
     def send(self, message: Job) -> None:
-        """Have a message arrive."""
+        """Deliver a message after the bus's latency of mission time."""
         self.clock.after(self._latency_s, message)
 
     def topic(self, name: str) -> VirtualTopic:
@@ -116,7 +116,7 @@ class VirtualMiddleware:
     # --- time --------------------------------------------------------------------------------------------------------
 
     def now_ns(self) -> int:
-        """Return the mission clock."""
+        """Return the mission clock, nanoseconds."""
         return self.bus.clock.now_ns
 
     def at(self, when_ns: int, job: Job) -> Timer:
@@ -151,7 +151,7 @@ class VirtualMiddleware:
             self._on_raise(error)
 
     def log(self, error: str) -> None:
-        """Keep an error."""
+        """Log an error, and keep it in ``errors`` for tests."""
         self.errors.append(error)
         _LOG.error("%s: %s", self.skillset, error)
 
@@ -162,7 +162,7 @@ class VirtualMiddleware:
     # --- topics ------------------------------------------------------------------------------------------------------
 
     def advertise(self, topic: Topic) -> VirtualPublisher:
-        """Open a topic."""
+        """Return a latched publisher; late subscribers get the last ``topic.depth`` values."""
         return VirtualPublisher(self.bus, self.bus.topic(f"{self.skillset}/{topic.name}"), topic.depth)
 
     def subscribe(self, topic: Topic, callback: OnValue) -> Callable[[], bool]:
@@ -179,7 +179,7 @@ class VirtualMiddleware:
     # --- services ----------------------------------------------------------------------------------------------------
 
     def serve(self, service: str, handler: Serve) -> None:
-        """Serve a service."""
+        """Have ``handler`` called with each request to this service of the skillset."""
         self._served.services[service] = handler
 
     def call(
@@ -192,7 +192,7 @@ class VirtualMiddleware:
         timeout_s: float = CALL_S,  # noqa: ARG002 - there is an answer at once, or none
         once: bool = False,  # noqa: ARG002 - no answer gets lost
     ) -> None:
-        """Call a service."""
+        """Call a service; the reply comes as a message, after the bus's latency, or an error where no managers serve it."""
 
         def arrive() -> None:
             served = self.bus.served.get(self.skillset)
@@ -207,13 +207,13 @@ class VirtualMiddleware:
     # --- actions -----------------------------------------------------------------------------------------------------
 
     def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> VirtualServer:
-        """Serve a skill."""
+        """Have goals and cancellations of a skill given to the callbacks."""
         model = (self.model or _no_model(self.skillset)).skill(skill)
         server = self._served.actions[skill] = VirtualServer(self, model, on_goal, on_cancel)
         return server
 
     def action(self, skill: str, listener: GoalListener) -> VirtualLink:
-        """Connect to a skill."""
+        """Return a link that sends goals of a skill and gives their news to the listener."""
         return VirtualLink(self, skill, listener)
 
     # --- heartbeats ----------------------------------------------------------------------------------------------------
@@ -239,7 +239,7 @@ class VirtualMiddleware:
         return True
 
     def close(self) -> None:
-        """Take part no more."""
+        """Send and receive nothing any more."""
         self.alive = False
 
     @property
@@ -248,7 +248,7 @@ class VirtualMiddleware:
 
 
 class VirtualPublisher:
-    """A topic's writing end."""
+    """Publishes values of a topic, and keeps the last ``depth`` of them for late subscribers."""
 
     def __init__(self, bus: Bus, topic: VirtualTopic, depth: int) -> None:
         self._bus = bus
@@ -256,13 +256,13 @@ class VirtualPublisher:
         self._topic.values = deque(maxlen=depth)
 
     def publish(self, value: Any) -> None:
-        """Send to all subscribers."""
+        """Keep the value and send it to each subscriber."""
         self._topic.values.append(value)
         for subscriber in self._topic.subscribers:
             self._bus.send(functools.partial(subscriber, value))
 
     def flush(self, timeout_s: float) -> None:
-        """Nothing gets lost here."""
+        """Return at once: a message that was sent arrives."""
 
 
 class VirtualGoal:
@@ -275,12 +275,12 @@ class VirtualGoal:
         self._link = link
 
     def report(self, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:  # noqa: ARG002 - events tell it
-        """Send feedback."""
+        """Send progress and outputs to the client as feedback."""
         outputs = dict(outputs)
         self._bus.send(lambda: self._link.listener.on_feedback(self.id, progress, outputs))
 
     def finish(self, event: ExecutionEvent) -> None:
-        """Send the result."""
+        """Send the terminal event to the client as the goal's result."""
         outputs = self._link.outputs_of(event.outputs)
         ending = GoalResult(event.state, event.result, event.message, outputs)
         self._bus.send(lambda: self._link.listener.on_result(self.id, ending))
@@ -304,12 +304,12 @@ class VirtualServer:
         return complete(self.skill.inputs, fitted, self._middleware.bus.types)
 
     def take(self, goal: VirtualGoal) -> None:
-        """Take a goal."""
+        """Accept a goal and give it to the managers."""
         self.goals.add(goal.id)
         self._middleware.do(lambda: self._on_goal(goal))
 
     def cancel(self, goal_id: str) -> None:
-        """Take a cancellation."""
+        """Ask the managers to interrupt the execution of a goal."""
         self._middleware.do(lambda: self._on_cancel(goal_id))
 
 
@@ -339,7 +339,7 @@ class VirtualLink:
         return complete(self._model.outputs, copy.deepcopy(dict(plain)), self._bus.types)
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:
-        """Send a goal."""
+        """Send a goal; ``on_answer(True)`` tells of its arrival, nothing comes where no managers are there."""
 
         def arrive() -> None:
             server = self._server
@@ -350,7 +350,7 @@ class VirtualLink:
         self._bus.send(arrive)
 
     def cancel(self, goal_id: str) -> None:
-        """Cancel a goal."""
+        """Ask for the interruption of one goal."""
 
         def arrive() -> None:
             server = self._server
@@ -360,7 +360,7 @@ class VirtualLink:
         self._bus.send(arrive)
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:
-        """Cancel all goals."""
+        """Ask for the interruption of all goals of the skill; ``on_count`` gets how many there are."""
 
         def arrive() -> None:
             server = self._server

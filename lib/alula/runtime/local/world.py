@@ -59,7 +59,7 @@ class LocalWorld:
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         return self.clock.now_s
 
     @property
@@ -123,7 +123,7 @@ class LocalWorld:
         return True
 
     def run_for(self, duration_s: float) -> None:
-        """Let time pass."""
+        """Run all that is due within so much mission time."""
         self.run_until(lambda: False, timeout_s=duration_s)
 
     def run(self, coroutine: Coroutine[object, object, T], *, timeout_s: float = 3600.0) -> T:

@@ -24,7 +24,7 @@ class ResourceManager:
         self._publish(0, middleware.now_ns())
 
     def serve(self) -> None:
-        """Take transitions and events."""
+        """Serve ``transition`` (extern transitions) and ``trigger`` (events of the model)."""
         self._middleware.serve("transition", self._transition)
         self._middleware.serve("trigger", self._trigger)
 

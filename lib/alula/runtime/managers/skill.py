@@ -35,7 +35,7 @@ class SkillManager:
         self._reported: set[str] = set()
 
     def serve(self) -> ActionServer:
-        """Take goals."""
+        """Serve the skill's action; return its server."""
         self.server = self._middleware.serve_action(self._skill.name, self._on_goal, self._on_cancel)
         return self.server
 

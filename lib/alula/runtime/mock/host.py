@@ -12,7 +12,7 @@ class MockHost(Protocol):
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         ...
 
     @property

@@ -24,7 +24,7 @@ class LocalMockHost:
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         return self._world.now_s
 
     def after(self, delay_s: float, job: Job) -> Timer:
@@ -32,7 +32,7 @@ class LocalMockHost:
         return self._world.clock.after(delay_s, job)
 
     def transition(self, skillset: str, resource: str, to: str) -> str:
-        """Take an extern transition."""
+        """Take an extern transition; return why it was refused, empty where it was taken."""
         managers = self._world.managers.get(skillset)
         if managers is None or not managers.alive:
             return f"the managers of {skillset} are not there"
@@ -44,13 +44,13 @@ class LocalMockHost:
         return "" if managers is None else managers.engine.resources[resource].state
 
     def publish(self, skillset: str, data: str, value: object) -> None:
-        """Publish a value."""
+        """Give a value of a data to the skillset's managers, if they are there."""
         managers = self._world.managers.get(skillset)
         if managers is not None and managers.alive:
             managers.publish(data, _namespaces(value))
 
     def note(self, error: str) -> None:
-        """Keep what went wrong."""
+        """Add an error to ``notes``."""
         self.notes.append(error)
 
 

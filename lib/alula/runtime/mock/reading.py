@@ -46,7 +46,6 @@ class _Reader:
         self._memory = frozenset(memory)
 
     def read(self, parts: Mapping[str, Located]) -> Behaviour:
-        """Read one file's sections."""
         entries = {name: parts[name].entries(name) if name in parts else {} for name in ("skills", "faults", "data")}
         return Behaviour(
             rules=dict(self._skill(name, part) for name, part in entries["skills"].items()),

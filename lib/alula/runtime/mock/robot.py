@@ -52,7 +52,7 @@ class MockRobot(MockState):
         return made
 
     def begin(self) -> None:
-        """Begin the timeline."""
+        """Schedule the timeline and the data, from now on."""
         self._began_s = self.host.now_s
         for event in self._behaviour.timeline:
             self._schedule(event.anchor, self.number(event.after_s, {}), functools.partial(self.take, event.states))

@@ -48,7 +48,7 @@ class LogWriter:
         self.flush()
 
     def changed(self, uid: int, _previous: Status, status: Status) -> None:
-        """Take a node's change."""
+        """Write that a node changed its status now."""
         self._waiting += Transition(self._clock_us() - self._began_us, uid, status).pack()
 
     def flush(self) -> None:
@@ -62,7 +62,7 @@ class LogWriter:
         self._waiting.clear()
 
     def close(self) -> None:
-        """End the file."""
+        """Write what is still buffered and close the file."""
         self.flush()
         with contextlib.suppress(OSError):
             self._file.close()

@@ -87,7 +87,7 @@ class Transition:
     SIZE = _TRANSITION.size
 
     def pack(self) -> bytes:
-        """Return its nine bytes."""
+        """Return the record's nine bytes: time in microseconds (6), node id (2), status (1)."""
         at_us = min(max(self.at_us, 0), _LONGEST_US)
         return _TRANSITION.pack(at_us & 0xFFFFFFFF, at_us >> 32, self.uid, self.status)
 
