@@ -32,7 +32,7 @@ class Place:
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Read the arguments."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(
         prog="alula panel",
         description="Look at running skillsets and drive them by hand.",

@@ -31,7 +31,7 @@ class Source(Protocol):
 
     @property
     def watched(self) -> list[Watched]:
-        """The skillsets, by name."""
+        """The skillsets found so far, by name."""
         ...
 
     @property
@@ -41,7 +41,7 @@ class Source(Protocol):
 
     @property
     def now_ns(self) -> int:
-        """The mission clock."""
+        """Mission clock, nanoseconds."""
         ...
 
 
@@ -65,7 +65,7 @@ class Panel(App[None]):
         self._shown: tuple[str, str] = ("", "")
 
     def compose(self) -> ComposeResult:
-        """Lay out the screen."""
+        """Yield the widgets of the screen: skillsets, skills with their form, resources, data, log."""
         yield Header()
         yield SkillsetBar(id="skillsets")
         yield Static(id="no-skillset")
@@ -99,7 +99,6 @@ class Panel(App[None]):
         return next((one for one in self._source.watched if one.root == self._root), None)
 
     async def _refresh(self) -> None:
-        """Show what has changed."""
         if not self.query(SkillsetBar):  # the screen is being taken down
             return
         watched = self._source.watched
@@ -162,7 +161,7 @@ class Panel(App[None]):
     # --- what is wanted ----------------------------------------------------------------------------------------------
 
     def on_skillset_bar_wanted(self, event: SkillsetBar.Wanted) -> None:
-        """Show another skillset."""
+        """Show the skillset that was chosen in the bar."""
         self._choose(event.root)
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
@@ -178,7 +177,7 @@ class Panel(App[None]):
         self._start(event.skill, event.texts)
 
     def on_resource_line_wanted(self, event: ResourceLine.Wanted) -> None:
-        """Take an extern transition."""
+        """Ask the managers for the extern transition whose button was pressed."""
         if self.current is not None:
             self.current.transition(event.resource, event.to)
 
@@ -210,7 +209,7 @@ class Panel(App[None]):
             self.current.ask_why(self._skill)
 
     def action_skills(self) -> None:
-        """Go to the skills."""
+        """Give the table of skills the keyboard."""
         self.query_one("#skills", SkillTable).focus()
 
     def action_inputs(self) -> None:

@@ -42,7 +42,7 @@ class RosMission:
         self._awaited: set[threading.Event] = set()
 
     def close(self) -> None:
-        """End the session."""
+        """End the ROS session; calls under way fail at once."""
         self._over.set()
         for news in tuple(self._awaited):
             news.set()

@@ -212,7 +212,7 @@ class Watcher:
 
     @property
     def now_ns(self) -> int:
-        """The mission clock."""
+        """Mission clock, nanoseconds."""
         return int(self.node.get_clock().now().nanoseconds)
 
     def close(self) -> None:

@@ -32,14 +32,14 @@ class SkillsetBar(Static):
     """The skillsets in one line, the one on the screen marked; a click chooses another."""
 
     class Wanted(Message):
-        """Another skillset was chosen."""
+        """The user chose another skillset."""
 
         def __init__(self, root: str) -> None:
             super().__init__()
             self.root = root
 
     def show(self, roots: Sequence[str], current: str) -> None:
-        """Show the names."""
+        """Show the names of the skillsets, the current one reversed."""
         text = Text()
         for root in roots:
             text.append(f" {root} ", Style(reverse=root == current, bold=root == current, meta={"@click": f"choose({root!r})"}))
@@ -47,7 +47,7 @@ class SkillsetBar(Static):
         self.update(text)
 
     def action_choose(self, root: str) -> None:
-        """Ask for a skillset."""
+        """Tell the panel that this skillset was clicked."""
         self.post_message(self.Wanted(root))
 
 
@@ -57,7 +57,7 @@ class SkillTable(DataTable[Text]):
     COLUMNS: ClassVar[Sequence[tuple[str, int]]] = (("skill", 18), ("state", 14), ("progress", 15), ("last end", 20))
 
     def on_mount(self) -> None:
-        """Make the columns."""
+        """Make the columns, with a cursor that selects whole rows."""
         self.cursor_type = "row"
         for name, width in self.COLUMNS:
             self.add_column(name, key=name, width=width)
@@ -90,7 +90,7 @@ class DataLines(Static):
     """The data: name, value, age; stale ones dimmed."""
 
     def show(self, rows: Sequence[DataRow]) -> None:
-        """Show the rows."""
+        """Show each data with its value, age in seconds, and whether it is stale."""
         text = Text()
         for row in rows:
             age = "" if row.age_s is None else f"  {row.age_s:.1f} s ago"
@@ -119,7 +119,7 @@ class ResourceLine(Horizontal):
         self._buttons = [Button(f"→ {to}", name=to, compact=True, classes="transition") for to in row.every_target]
 
     def compose(self) -> ComposeResult:
-        """Lay out the line."""
+        """Yield name, state and a button for each extern transition."""
         yield Label(self.row.name, classes="resource-name")
         yield self._state
         yield from self._buttons
@@ -150,7 +150,7 @@ class ResourceLine(Horizontal):
 
 
 class ResourceList(VerticalScroll):
-    """All resources."""
+    """A line for each resource of the skillset."""
 
     can_focus = False
 
@@ -185,7 +185,7 @@ class SkillForm(VerticalScroll):
         self._fields: Sequence[Field] = ()
 
     def compose(self) -> ComposeResult:
-        """Lay out the form."""
+        """Yield the parts of the form: unmet preconditions, inputs, complaint, buttons."""
         yield Static(id="needs")
         yield Vertical(id="fields")
         yield Static(id="complaint")
@@ -196,7 +196,7 @@ class SkillForm(VerticalScroll):
             yield Button("Why? (F8)", id="why", compact=True)
 
     async def take(self, skill: str, fields: Sequence[Field]) -> None:
-        """Show another skill."""
+        """Show another skill, with a text field for each of its inputs."""
         self.skill, self._fields = skill, fields
         self.complain("")
         self.border_title = skill

@@ -54,7 +54,7 @@ class RclpyGoal:
         self._handle = handle
 
     def report(self, progress: float, state: ExecutionState, outputs: Mapping[str, object]) -> None:
-        """Send feedback."""
+        """Publish progress (0 to 1), state and outputs as the action's feedback."""
         self._handle.publish_feedback(self._server.messages.make_feedback(progress, state, outputs))
 
     def finish(self, event: ExecutionEvent) -> None:
@@ -88,7 +88,7 @@ class RclpyServer:
         )
 
     def finish(self, handle: Any, event: ExecutionEvent) -> None:
-        """End a goal."""
+        """Have the server answer with the result that an execution's terminal event makes."""
         self._server.notify_execute(handle, lambda goal: self._result(goal, event))
 
     def _accepted(self, handle: Any) -> None:
@@ -152,7 +152,7 @@ class RclpyLink:
         return ros_types(self._action.Goal)
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:
-        """Send a goal."""
+        """Send a goal; ``on_answer`` gets whether it was accepted."""
         identifier = UUID(uuid=list(bytes.fromhex(goal_id) + os.urandom(UUID_BYTES - ID_DIGITS // 2)))
         with self._lock:
             self._goals[goal_id] = identifier
@@ -169,7 +169,7 @@ class RclpyLink:
         _ = self._cancels  # met by the time that it is wanted
 
     def cancel(self, goal_id: str) -> None:
-        """Cancel a goal."""
+        """Ask for the interruption of a goal that was sent here."""
         identifier = self._goals.get(goal_id)
         if identifier is not None:
             request = CancelGoal.Request(goal_info=GoalInfo(goal_id=identifier))

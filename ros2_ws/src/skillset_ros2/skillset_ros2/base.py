@@ -85,7 +85,7 @@ class RclpyBase:
         """When this was closed, mission clock: the node may be destroyed afterwards."""
 
     def now_ns(self) -> int:
-        """Return the mission clock."""
+        """Return the mission clock, nanoseconds; after the end, the moment of the end."""
         return self._ended_ns or int(self.node.get_clock().now().nanoseconds)
 
     def at(self, when_ns: int, job: Job) -> Timer:
@@ -115,11 +115,11 @@ class RclpyBase:
             self.later(LOOK_S, lambda: self.when(condition, job))
 
     def log(self, error: str) -> None:
-        """Log an error."""
+        """Write an error to the node's log, and so to ``/rosout``."""
         self.node.get_logger().error(error)
 
     def new_id(self) -> str:
-        """Return a random id."""
+        """Return a random id of ``ID_DIGITS`` hexadecimal digits."""
         return uuid.uuid4().hex[:ID_DIGITS]
 
     def on_loop(self, callback: CallbackT) -> CallbackT:

@@ -105,7 +105,7 @@ class Calls:
         return lambda: self._close(call)
 
     def close(self) -> None:
-        """Ask nothing more."""
+        """Send no more; calls under way end with an error."""
         with self._lock:
             self._closed = True
             calls = [*self._waiting, *self._open]

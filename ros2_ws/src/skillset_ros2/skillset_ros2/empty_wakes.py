@@ -51,7 +51,7 @@ class EmptyWakes(Waitable):  # type: ignore[misc]  # rclpy has no types
         return self._row >= ROW
 
     def take_data(self) -> None:
-        """Count from the beginning."""
+        """Begin to count empty turns anew; ``execute`` takes what the readers hold."""
         self._row = 0
 
     async def execute(self, _taken: None) -> None:

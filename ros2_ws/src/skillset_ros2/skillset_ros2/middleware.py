@@ -120,7 +120,7 @@ class RclpyMiddleware(RclpyBase):
         timeout_s: float = CALL_S,
         once: bool = False,
     ) -> None:
-        """Call a service."""
+        """Call a service of the skillset, in the codec's plain values; one of the callbacks is called once."""
         codec = self._codecs.services[service]
         decoded: OnReply = lambda response, tries: on_reply(codec.decode(response), tries)  # noqa: E731
         self._calls_of(service, codec).call(codec.kind.Request(**request), decoded, on_error, timeout_s=timeout_s, once=once)
@@ -136,11 +136,11 @@ class RclpyMiddleware(RclpyBase):
     # --- actions -----------------------------------------------------------------------------------------------------
 
     def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> RclpyServer:
-        """Serve a skill."""
+        """Have goals and cancellations of a skill given to the callbacks."""
         return RclpyServer(self, self._action(skill), skill, on_goal, on_cancel)
 
     def action(self, skill: str, listener: GoalListener) -> RclpyLink:
-        """Connect to a skill."""
+        """Return a link that sends goals of a skill and gives their news to the listener."""
         return RclpyLink(self, self._action(skill), skill, listener)
 
     def _action(self, skill: str) -> type:
@@ -196,14 +196,14 @@ class RclpyMiddleware(RclpyBase):
 
 
 class RclpyPublisher:
-    """A topic's writing end."""
+    """Publishes plain values of a topic as its messages."""
 
     def __init__(self, publisher: Any, encode: Callable[[Any], Any]) -> None:
         self._publisher = publisher
         self._encode = encode
 
     def publish(self, value: Any) -> None:
-        """Send a value."""
+        """Encode a value and publish the message."""
         self._publisher.publish(self._encode(value))
 
     def flush(self, timeout_s: float) -> None:

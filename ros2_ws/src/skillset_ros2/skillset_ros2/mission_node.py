@@ -69,7 +69,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         return self._clock_ns() / 1e9
 
     def _clock_ns(self) -> int:

@@ -39,7 +39,7 @@ class RosMockHost:
 
     @property
     def now_s(self) -> float:
-        """Mission clock."""
+        """Mission clock, seconds."""
         return self._now_ns() / 1e9
 
     def _now_ns(self) -> int:
@@ -57,7 +57,7 @@ class RosMockHost:
         return self._timers.after(delay_s, attempt)
 
     def transition(self, skillset: str, resource: str, to: str) -> str:
-        """Take an extern transition."""
+        """Take an extern transition; return why it was refused, empty where it was taken."""
         node = self.nodes.get(skillset)
         return f"{skillset} is not mocked here" if node is None else node.engine.transition(resource, to).reason
 
@@ -83,7 +83,7 @@ class RosMockHost:
         self._publishers[skillset, data].publish(message)
 
     def note(self, error: str) -> None:
-        """Say what went wrong."""
+        """Add an error to ``notes`` and log it, once."""
         if error not in self.notes:
             self.notes.append(error)
             self._node.get_logger().error(error)

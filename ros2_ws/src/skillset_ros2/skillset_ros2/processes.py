@@ -58,7 +58,7 @@ class Part:
         self._thread = threading.Thread(target=self._run, name=name)
 
     def start(self) -> None:
-        """Start the process."""
+        """Start the thread that keeps the process running."""
         self._thread.start()
 
     def end(self) -> None:

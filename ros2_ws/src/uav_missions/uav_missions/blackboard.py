@@ -46,7 +46,7 @@ class WaypointWriter(Behaviour):  # type: ignore[misc]  # py_trees is seen untyp
         self._blackboard = blackboard
 
     def update(self) -> Status:
-        """Write."""
+        """Write the route's current waypoint (frame map, metres) to the blackboard; FAILURE where the route is done."""
         route = self._blackboard.route
         self._blackboard.waypoint = route.current
         if self._blackboard.waypoint is None:

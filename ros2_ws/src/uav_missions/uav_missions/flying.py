@@ -63,12 +63,12 @@ class Flying:
         return SkillLeaf(name, self._navigation, skill, inputs or {}, blackboard=self._blackboard, success=results, on_success=after)
 
     def take_off(self) -> Behaviour:
-        """Climb."""
+        """Return a leaf that climbs to ``takeoff_height_m`` at ``takeoff_speed_m_s``."""
         climb = {"height": self._settings.takeoff_height_m, "speed": self._settings.takeoff_speed_m_s}
         return self.skill("take off", "takeoff", climb, success="AT_ALTITUDE")
 
     def land(self, name: str) -> SkillLeaf[RouteBlackboard]:
-        """Land."""
+        """Return a leaf of this name that lands where the vehicle is."""
         return self.skill(name, "land", success="LANDED")
 
     def stop_here(self) -> Behaviour:
@@ -146,7 +146,7 @@ class Flying:
         return Selector(name, memory=True, children=[Check("is sideways", self._is_sideways), rotate])
 
     def lock_sideways(self) -> SkillLeaf[RouteBlackboard]:
-        """Hold the nose there."""
+        """Return a leaf that locks the heading across the present leg."""
         return self.skill("lock the heading", "lock_head", lambda board: {"heading": sideways_yaw_rad(board)})
 
     # --- what leaves ask and tell ------------------------------------------------------------------------------------

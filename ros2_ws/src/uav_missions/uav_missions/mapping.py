@@ -54,12 +54,12 @@ from uav_missions.plan import route_plan
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(FlightSettings):
-    """How the mission flies."""
+    """Parameters of the mapping mission: those of any flight."""
 
 
 @dataclass(frozen=True)
 class Clients:
-    """The drone's skillsets."""
+    """The clients of the drone's skillsets that the mission uses."""
 
     navigation: Client
     perception: Client

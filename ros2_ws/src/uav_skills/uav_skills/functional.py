@@ -106,7 +106,7 @@ class GuidanceApi(FunctionalPart):
         self._calls.submit(self._heading, SetHeadingReference.Request(release=True), reply)
 
     def hover(self, reply: Reply = ignore_response) -> None:
-        """Stop and stay."""
+        """Stop the motion and hold the position."""
         self._calls.submit(self._hover, Command.Request(), reply)
 
     def land(self, reply: Reply) -> None:
@@ -140,7 +140,7 @@ class DepthApi(FunctionalPart):
 
 
 class MappingApi(FunctionalPart):
-    """The LiDAR mapping."""
+    """Services and state of the LiDAR mapping node."""
 
     def __init__(self, node: Node) -> None:
         super().__init__(node)
@@ -158,7 +158,7 @@ class MappingApi(FunctionalPart):
         self._calls.submit(self._enable, SetBool.Request(data=on), reply)
 
     def save(self, reply: Reply = ignore_response) -> None:
-        """Write the map."""
+        """Have the node write the map to its file."""
         self._calls.submit(self._save, Trigger.Request(), reply)
 
     def _on_state(self, state: MappingState) -> None:
@@ -190,7 +190,7 @@ class VideoApi(FunctionalPart):
         self._calls.submit(self._stream, request, reply)
 
     def stop(self, reply: Reply = ignore_response) -> None:
-        """Send no more."""
+        """Have the node end the stream."""
         self._calls.submit(self._stream, Stream.Request(), reply)
 
     def _on_state(self, state: VideoState) -> None:

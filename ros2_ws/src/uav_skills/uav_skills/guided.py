@@ -92,7 +92,7 @@ class GuidedSkill(SkillHooks):
     # --- hooks -------------------------------------------------------------------------------------------------------
 
     def on_dispatch(self, execution: Execution) -> None:
-        """Send the command."""
+        """Send the command of a new motion, and return without waiting for it."""
         motion = Motion(execution)
         with self._lock:
             self._motion = motion

@@ -28,7 +28,7 @@ class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[mis
         self._mapping = mapping
 
     def switch_on(self, execution: Execution) -> None:
-        """Start the registration."""
+        """Have the mapping node register scans."""
         self._mapping.enable(on=True, reply=functools.partial(self.on_response, execution))
 
     def switch_off(self) -> None:
@@ -51,7 +51,7 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
 
 
 def main_mapping() -> None:
-    """Serve the skillset."""
+    """Serve the skillset `mapping` until the process is told to end."""
     serve("mapping", make_hooks)
 
 

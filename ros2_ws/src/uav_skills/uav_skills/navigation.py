@@ -42,11 +42,11 @@ class Takeoff(GuidedSkill, AbstractTakeoffSkill):  # type: ignore[misc]  # gener
     success = "AT_ALTITUDE"
 
     def validate(self, inputs: TakeoffInputs) -> str:
-        """Check height and speed."""
+        """Refuse a height (m) or speed (m/s) out of bounds."""
         return checks.check_takeoff(height_m=inputs.height, speed_m_s=inputs.speed)
 
     def send(self, motion: Motion) -> None:
-        """Ask for the climb."""
+        """Ask the guidance for the climb."""
         inputs = motion.inputs
         self.guidance.takeoff(height_m=inputs.height, speed_m_s=inputs.speed, reply=functools.partial(self.on_response, motion))
 
@@ -55,7 +55,7 @@ class Takeoff(GuidedSkill, AbstractTakeoffSkill):  # type: ignore[misc]  # gener
         return decisions.decide_takeoff(state, self.thresholds)
 
     def remaining(self, state: GuidanceState) -> float:
-        """Metres to climb."""
+        """Return the metres left to climb."""
         return abs(float(state.vertical_to_go_m))
 
 
@@ -67,12 +67,12 @@ class _Flight(GuidedSkill):
     along_travel = False
 
     def validate(self, inputs: GotoInputs | GotoStraightInputs) -> str:
-        """Check target and speed."""
+        """Refuse a target (frame map, m) or speed (m/s) out of bounds."""
         target = inputs.target
         return checks.check_target(target_enu_m=(target.x, target.y, target.z), speed_m_s=inputs.speed)
 
     def send(self, motion: Motion) -> None:
-        """Give the position reference."""
+        """Give the guidance the target as its position reference."""
         target: Point = motion.inputs.target
         speed_m_s, reply = motion.inputs.speed, functools.partial(self.on_response, motion)
         self.guidance.set_position(target_enu_m=target, speed_m_s=speed_m_s, along_travel=self.along_travel, reply=reply)
@@ -110,17 +110,17 @@ class GotoStraight(_Flight, AbstractGotoStraightSkill):  # type: ignore[misc]  #
 
 
 class RotateHead(GuidedSkill, AbstractRotateHeadSkill):  # type: ignore[misc]  # generated
-    """Turn on the spot."""
+    """Turn to a heading on the spot."""
 
     reference = "heading"
     success = "ALIGNED"
 
     def validate(self, inputs: RotateHeadInputs) -> str:
-        """Check heading and rate."""
+        """Refuse a heading (rad) that is no number, or a rate (rad/s) out of bounds."""
         return checks.check_turn(heading_rad=inputs.heading, rate_rad_s=inputs.rate)
 
     def send(self, motion: Motion) -> None:
-        """Give the heading reference."""
+        """Give the guidance the heading as its reference."""
         inputs, reply = motion.inputs, functools.partial(self.on_response, motion)
         self.guidance.set_heading(heading_rad=inputs.heading, rate_rad_s=inputs.rate, lock=False, reply=reply)
 
@@ -129,7 +129,7 @@ class RotateHead(GuidedSkill, AbstractRotateHeadSkill):  # type: ignore[misc]  #
         return decisions.decide_rotation(state, self.thresholds)
 
     def remaining(self, state: GuidanceState) -> float:
-        """Radians to turn."""
+        """Return the radians left to turn."""
         return abs(float(state.heading_error_rad))
 
 
@@ -137,11 +137,11 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
     """Hold a heading while other skills move the vehicle, until interrupted."""
 
     def validate(self, inputs: LockHeadInputs) -> str:
-        """Check the heading."""
+        """Refuse a heading (rad) that is no finite number."""
         return "" if math.isfinite(inputs.heading) else f"heading is {inputs.heading}, not a finite number"
 
     def send(self, motion: Motion) -> None:
-        """Lock."""
+        """Have the guidance turn to the heading and hold it during later motions."""
         heading_rad, reply = motion.inputs.heading, functools.partial(self.on_response, motion)
         self.guidance.set_heading(heading_rad=heading_rad, rate_rad_s=LOCK_RATE_RAD_S, lock=True, reply=reply)
 
@@ -173,15 +173,15 @@ class Hover(GuidedSkill, AbstractHoverSkill):  # type: ignore[misc]  # generated
     success = "DONE"
 
     def validate(self, inputs: HoverInputs) -> str:
-        """Check the duration."""
+        """Refuse a duration (s) out of bounds."""
         return checks.check_duration(duration_s=inputs.duration)
 
     def send(self, motion: Motion) -> None:
-        """Hover."""
+        """Have the guidance hold the position."""
         self.guidance.hover(functools.partial(self.on_response, motion))
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
-        """End after the duration."""
+        """Succeed once the vehicle has hovered for the duration."""
         return decisions.decide_hover(self._hovered_s(motion), motion.inputs.duration)
 
     def progress(self, execution: Execution) -> float:
@@ -204,7 +204,7 @@ class Land(GuidedSkill, AbstractLandSkill):  # type: ignore[misc]  # generated
     stops_when_it_fails = False
 
     def send(self, motion: Motion) -> None:
-        """Land."""
+        """Ask the guidance for the landing."""
         self.guidance.land(functools.partial(self.on_response, motion))
 
     def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
@@ -232,7 +232,7 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
 
 
 def main_navigation() -> None:
-    """Serve the skillset."""
+    """Serve the skillset `navigation` until the process is told to end."""
     serve("navigation", make_hooks)
 
 

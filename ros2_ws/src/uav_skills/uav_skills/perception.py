@@ -29,11 +29,11 @@ class _Depthmap(WatchedSkill):
         self._depth = depth
 
     def switch_on(self, execution: Execution) -> None:
-        """Start the obstacle detection."""
+        """Have the sensor's node detect obstacles."""
         self._depth.enable(on=True, reply=functools.partial(self.on_response, execution))
 
     def switch_off(self) -> None:
-        """Stop the obstacle detection."""
+        """Have the sensor's node detect no more."""
         self._depth.enable(on=False)
 
     def heard_s(self) -> float | None:
@@ -62,7 +62,7 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
 
 
 def main_perception() -> None:
-    """Serve the skillset."""
+    """Serve the skillset `perception` until the process is told to end."""
     serve("perception", make_hooks)
 
 

@@ -43,7 +43,7 @@ class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # genera
         self._video.begin(min_fps=inputs.min_fps, min_quality=inputs.min_quality, patience_s=inputs.patience, reply=reply)
 
     def switch_off(self) -> None:
-        """Stop sending."""
+        """Have the node end the stream."""
         self._video.stop()
 
     def shows_s(self) -> float | None:
@@ -65,7 +65,7 @@ def make_hooks(node: Node) -> dict[str, SkillHooks]:
 
 
 def main_video() -> None:
-    """Serve the skillset."""
+    """Serve the skillset `video` until the process is told to end."""
     serve("video", make_hooks)
 
 

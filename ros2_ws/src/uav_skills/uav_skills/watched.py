@@ -35,7 +35,7 @@ class WatchedSkill(SkillHooks):
         raise NotImplementedError
 
     def switch_off(self) -> None:
-        """Stop the function."""
+        """Stop the function of the functional layer, without waiting for its response."""
         raise NotImplementedError
 
     def heard_s(self) -> float | None:
@@ -64,7 +64,7 @@ class WatchedSkill(SkillHooks):
         return 1.0 if execution is self._execution and shows_s is not None and shows_s > self._since_s else 0.0
 
     def on_interrupt(self, execution: Execution) -> None:
-        """Switch the function off."""
+        """Switch the function off, unless the execution has ended by itself."""
         if self._forget(execution):
             self.switch_off()
 

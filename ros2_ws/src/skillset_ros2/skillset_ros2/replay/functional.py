@@ -91,7 +91,7 @@ class SwitchedSkill(SkillHooks):
         return self._mock.validate(inputs)
 
     def on_dispatch(self, execution: Execution) -> None:
-        """Start."""
+        """Dispatch to the real hooks, which the mock follows, or to the mock."""
         self._open[execution.id] = execution
         hooks = self._of(execution)
         if hooks is self._real:
@@ -103,7 +103,7 @@ class SwitchedSkill(SkillHooks):
         return self._of(execution).progress(execution)
 
     def on_interrupt(self, execution: Execution) -> bool | None:
-        """Stop."""
+        """Interrupt by the hooks that the execution was dispatched to."""
         return self._of(execution).on_interrupt(execution)
 
     def on_emergency(self, execution: Execution) -> None:
@@ -111,11 +111,11 @@ class SwitchedSkill(SkillHooks):
         self._of(execution).on_emergency(execution)
 
     def on_violation(self, execution: Execution) -> None:
-        """Stop after a violation."""
+        """Tell the hooks that the execution was dispatched to."""
         self._of(execution).on_violation(execution)
 
     def on_failure(self, execution: Execution) -> None:
-        """Stop after a failure."""
+        """Tell the hooks that the execution was dispatched to."""
         self._of(execution).on_failure(execution)
 
     def hand_over(self) -> None:

@@ -24,11 +24,11 @@ class RecordedFuture:
         self._callbacks.append(callback)
 
     def result(self) -> Any:
-        """Return the answer."""
+        """Return the recorded response; None before it was resolved."""
         return self._result
 
     def resolve(self, result: Any) -> None:
-        """Let the answer come."""
+        """Set the response and call the callbacks, on this thread."""
         self._result = result
         for callback in self._callbacks:
             callback(self)
@@ -50,11 +50,11 @@ class RecordedService:
         return True
 
     def call_async(self, request: Any) -> RecordedFuture:
-        """Call it."""
+        """Return a future of the recorded response to this request."""
         return self._answer(self.srv_name, to_plain(request))
 
     def remove_pending_request(self, future: RecordedFuture) -> None:
-        """Nothing waits here."""
+        """Do nothing: no request is pending here."""
 
 
 class BagNode:
@@ -78,7 +78,7 @@ class BagNode:
         return self
 
     def now(self) -> SimpleNamespace:
-        """Return the mission clock."""
+        """Return the mission clock as rclpy does: with ``nanoseconds``."""
         return SimpleNamespace(nanoseconds=self._clock.now_ns)
 
     def create_timer(self, period_s: float, callback: Callable[[], None], **_: object) -> Timer:
@@ -92,13 +92,13 @@ class BagNode:
         return self._clock.after(period_s, again)
 
     def create_client(self, _kind: object, name: str, **_: object) -> RecordedService:
-        """Connect to a service."""
+        """Return a client that the record answers."""
         return RecordedService(name, self._answer)
 
     def create_subscription(self, _kind: object, topic: str, callback: Callable[[Any], None], *_: object, **__: object) -> None:
-        """Follow a topic."""
+        """Have the callback called with each recorded message of a topic."""
         self._subscribers.setdefault(topic, []).append(callback)
 
     def declare_parameter(self, _name: str, value: object) -> SimpleNamespace:
-        """Return the parameter's default."""
+        """Return a parameter with its default: a replay has no others."""
         return SimpleNamespace(value=value)
