@@ -130,7 +130,6 @@ class _ShownLog:
         self._lines.write(json.dumps(line) + "\n")
 
     def close(self) -> None:
-        """Finish both files."""
         if self._film is not None:
             self._film.close()
         self._lines.close()

@@ -59,7 +59,7 @@ class Rehearsal:
         self._down, self._up = Channel(both.down, 2 * self.seed), Channel(both.up, 2 * self.seed + 1)
 
     def run(self, seconds: float) -> None:
-        """Run from time 0."""
+        """Run radio, drone and ground from time 0 for so many seconds of simulated time."""
         frame = 0
         for now_ns in range(TICK_NS, int(seconds * NS) + 1, TICK_NS):
             both = self.radio(now_ns / NS)

@@ -46,14 +46,14 @@ class FieldLike(Protocol):
 
 
 class StampLike(Protocol):
-    """A stamp."""
+    """What is needed of a message's stamp."""
 
     def to_nsec(self) -> int:
-        """Return integer nanoseconds."""
+        """Return the stamp as integer nanoseconds of mission clock."""
 
 
 class HeaderLike(Protocol):
-    """A header."""
+    """What is needed of a message's header."""
 
     stamp: StampLike
 

@@ -18,7 +18,7 @@ class Quality(Enum):
 
     @property
     def rank(self) -> int:
-        """0 for the best."""
+        """Position in the order from best (0) to worst."""
         return list(Quality).index(self)
 
 

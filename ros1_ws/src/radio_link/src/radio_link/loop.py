@@ -62,7 +62,7 @@ class MissionLoop(Generic[Item]):
 
     @property
     def now_ns(self) -> int:
-        """The mission clock."""
+        """Mission clock, nanoseconds."""
         return self._now_ns
 
     def post(self, item: Item) -> None:
@@ -79,7 +79,7 @@ class MissionLoop(Generic[Item]):
             rospy.logwarn_throttle(5.0, f"a datagram to port {port} could not be sent: {error}")
 
     def run(self) -> None:
-        """Handle what comes."""
+        """Handle packets, orders and ticks of the clock, one after another, until ROS shuts down."""
         while not rospy.is_shutdown():
             waiting: list[socket.socket | int] = [*self.sockets, self._wake]
             readable, _, _ = select.select(waiting, [], [], WAIT_S)

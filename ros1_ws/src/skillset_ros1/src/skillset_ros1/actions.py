@@ -48,12 +48,11 @@ class _Server(ActionServer, rospy.SubscribeListener):  # type: ignore[misc]  # n
         super().__init__(name, spec, on_goal, on_cancel, auto_start=False)
 
     def initialize(self) -> None:
-        """Make the topics."""
         super().initialize()
         self.result_pub.impl.add_subscriber_listener(self)
 
     def publish_result(self, status: Any, result: Any) -> None:
-        """Publish a result."""
+        """Publish a result, and keep it for subscribers that come later; one that actionlib left empty is made INTERRUPTED."""
         if not result.outcome:
             result.outcome, result.message = ExecutionState.INTERRUPTED.value, RECALLED_EARLY
         with self.lock:
@@ -148,13 +147,13 @@ class RospyLink:
         return fields_of(self._types.goal)
 
     def send(self, goal_id: str, goal: Any, on_answer: Callable[[bool], None]) -> None:  # noqa: ARG002 - events answer it
-        """Send a goal."""
+        """Publish a goal; events of the managers tell whether it was taken."""
         message = self._types.action_goal(goal=goal, goal_id=GoalID(id=goal_id, stamp=rospy.get_rostime()))
         message.header.stamp = message.goal_id.stamp
         self._goals.publish(message)
 
     def cancel(self, goal_id: str) -> None:
-        """Cancel a goal."""
+        """Ask for the interruption of one goal."""
         self._cancels.publish(GoalID(id=goal_id))
 
     def cancel_all(self, on_count: OnValue, on_error: OnError) -> None:  # noqa: ARG002 - nothing is answered
@@ -169,7 +168,7 @@ class RospyLink:
         """Follow a goal no more."""
 
     def unregister(self) -> None:
-        """Take the topics away."""
+        """Unregister publishers and subscribers at the master."""
         for topic in (self._goals, self._cancels, *self._listening):
             topic.unregister()
 

@@ -42,7 +42,7 @@ class RospyBase:
         self._parts: list[Callable[[], object]] = []
 
     def now_ns(self) -> int:
-        """Return the mission clock."""
+        """Return the mission clock, nanoseconds."""
         return now_ns()
 
     def at(self, when_ns: int, job: Job) -> Timer:
@@ -69,11 +69,11 @@ class RospyBase:
             self.later(LOOK_S, lambda: self.when(condition, job))
 
     def log(self, error: str) -> None:
-        """Log an error."""
+        """Write an error to rospy's log, and so to ``/rosout``."""
         rospy.logerr("%s", error)
 
     def new_id(self) -> str:
-        """Return a random id."""
+        """Return a random id of ``ID_DIGITS`` hexadecimal digits."""
         return uuid.uuid4().hex[:ID_DIGITS]
 
     def _raised(self, error: Exception) -> None:

@@ -115,7 +115,7 @@ class RospyMiddleware(RospyBase):
         timeout_s: float = CALL_S,
         once: bool = False,  # noqa: ARG002 - no answer gets lost that its caller could ask for again
     ) -> None:
-        """Call a service."""
+        """Call a service of the skillset on a thread of its own; one of the callbacks is called, in the loop."""
         codec = self._codecs.services[service]
         reply: OnValue = lambda response: self.submit(lambda: on_reply(codec.decode(response), 1))  # noqa: E731
         error: OnError = lambda reason: self.submit(lambda: on_error(reason))  # noqa: E731
@@ -125,13 +125,13 @@ class RospyMiddleware(RospyBase):
     # --- actions -----------------------------------------------------------------------------------------------------
 
     def serve_action(self, skill: str, on_goal: Callable[[Goal], None], on_cancel: Callable[[str], None]) -> RospyServer:
-        """Serve a skill."""
+        """Have goals and cancellations of a skill given to the callbacks."""
         server = RospyServer(self, action_types(self._messages, skill), skill, on_goal, on_cancel)
         self._parts.append(server.unregister)
         return server
 
     def action(self, skill: str, listener: GoalListener) -> RospyLink:
-        """Connect to a skill."""
+        """Return a link that sends goals of a skill and gives their news to the listener."""
         link = RospyLink(self, action_types(self._messages, skill), skill, listener)
         self._parts.append(link.unregister)
         return link
@@ -195,7 +195,7 @@ class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
         self._publisher: Any = rospy.Publisher(name, kind, queue_size=QUEUE, **options)
 
     def publish(self, value: Any) -> None:
-        """Send a value."""
+        """Publish a value, and keep it for subscribers that come later."""
         message = self._encode(value)
         with self._lock:
             self._history.append(message)
@@ -220,5 +220,5 @@ class RospyPublisher(rospy.SubscribeListener):  # type: ignore[misc]  # rospy ha
             time.sleep(FLUSH_STEP_S)
 
     def unregister(self) -> None:
-        """Take the topic away."""
+        """Unregister the publisher at the master."""
         self._publisher.unregister()

@@ -9,7 +9,7 @@ from uav_guidance.vectors import Line, Vec3
 
 
 def braking_distance(speed_m_s: float, accel_m_s2: float) -> float:
-    """Return v^2 / 2a."""
+    """Return the metres, v^2 / 2a, that it takes to stop from a speed."""
     return speed_m_s * speed_m_s / (2.0 * accel_m_s2)
 
 
@@ -31,7 +31,7 @@ class LineCarrot:
 
     @property
     def point(self) -> Vec3:
-        """Where the carrot is."""
+        """The carrot's position on the line (frame of the line, metres)."""
         return self.line.at(self.travelled_m)
 
     def step(self, follower_m: Vec3, dt_s: float) -> Vec3:

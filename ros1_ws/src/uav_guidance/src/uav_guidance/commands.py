@@ -45,7 +45,7 @@ NO_EVIDENCE = Evidence("", lambda _vehicle: False)
 
 @dataclass(frozen=True)
 class Command:
-    """A COMMAND_LONG."""
+    """A COMMAND_LONG of MAVLink, and what shows that the autopilot has carried it out."""
 
     name: str
     number: int
@@ -61,7 +61,7 @@ def set_mode(mode: Mode) -> Command:
 
 
 def arm() -> Command:
-    """Ask to arm."""
+    """Return the command to arm; a HEARTBEAT that says armed is evidence of it."""
     return Command("arm", ARM_DISARM, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), evidence=Evidence("HEARTBEAT", lambda vehicle: vehicle.armed))
 
 
@@ -78,7 +78,7 @@ def take_off(height_above_home_m: float) -> Command:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a procedure ended."""
+    """Whether the autopilot accepted a procedure, and its reason where it did not."""
 
     accepted: bool
     reason: str = ""

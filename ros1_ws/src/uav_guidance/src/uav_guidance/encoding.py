@@ -22,7 +22,7 @@ def heartbeat_message() -> Any:
 
 
 def command_message(command: Command) -> Any:
-    """Return a COMMAND_LONG."""
+    """Return a command as the MAVLink message COMMAND_LONG to the autopilot."""
     return mavlink.MAVLink_command_long_message(
         AUTOPILOT_SYSTEM, AUTOPILOT_COMPONENT, command.number, command.confirmation, *command.parameters
     )

@@ -97,7 +97,7 @@ class Guidance:
 
     @property
     def correction(self) -> Correction:
-        """T_map_odom in use."""
+        """The transform T_map_odom in use."""
         return self._localization.correction
 
     # ---- what comes in -------------------------------------------------------------------------------------------------
@@ -136,7 +136,7 @@ class Guidance:
         self._localization.hear_state(running=running, problem=problem, scans=scans, now_s=now_s)
 
     def on_transform(self, newest: Transform) -> None:
-        """Take the mapping's T_map_odom."""
+        """Take the newest T_map_odom of the mapping."""
         self._localization.hear_transform(newest)
 
     def on_obstacle(self, sighting: Sighting, now_s: float) -> None:

@@ -21,7 +21,7 @@ NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 def time_of(stamp_ns: int) -> rospy.Time:
-    """Return a ROS time."""
+    """Return nanoseconds as a rospy.Time."""
     return rospy.Time(*divmod(stamp_ns, 1_000_000_000))
 
 

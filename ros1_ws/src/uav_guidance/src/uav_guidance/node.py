@@ -266,6 +266,6 @@ def _next_due(due_s: float, now_s: float) -> float:
 
 
 def main() -> None:
-    """Run the node."""
+    """Run the guidance node, with its private parameters, until ROS shuts down."""
     rospy.init_node("uav_guidance")
     GuidanceNode(read_settings(Settings())).run()

@@ -208,7 +208,7 @@ class Takeoff(Reference):
 
 
 class Land(Reference):
-    """The autopilot's own landing."""
+    """Landing in place, which the autopilot does in its own mode."""
 
     name: ClassVar[str] = "land"
 

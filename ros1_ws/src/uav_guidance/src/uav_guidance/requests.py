@@ -49,7 +49,7 @@ class HoverRequest:
 
 @dataclass(frozen=True)
 class LandRequest:
-    """Land here."""
+    """Request to land at the present place; it has no parameters."""
 
 
 @dataclass(frozen=True)

@@ -29,12 +29,12 @@ class Vec3:
         return Vec3(c * self.x - s * self.y, s * self.x + c * self.y, self.z)
 
     def dot(self, other: Vec3) -> float:
-        """Return the scalar product."""
+        """Return the scalar product of the two vectors."""
         return self.x * other.x + self.y * other.y + self.z * other.z
 
     @property
     def norm(self) -> float:
-        """The length."""
+        """The Euclidean length, in the vector's unit."""
         return math.hypot(self.x, self.y, self.z)
 
     @property

@@ -62,7 +62,7 @@ class Mode(IntEnum):
 
 
 class Landed(IntEnum):
-    """MAV_LANDED_STATE of EXTENDED_SYS_STATE."""
+    """MAV_LANDED_STATE, as EXTENDED_SYS_STATE has it."""
 
     UNDEFINED = 0
     ON_GROUND = 1

@@ -38,11 +38,11 @@ class Mocked:
     """Of a flight over mocks: there is no world to collide with or to map."""
 
     def observe(self, run: Run) -> Observed:  # noqa: ARG002
-        """Observe nothing."""
+        """Return no observations: there is no functional bag."""
         return Observed()
 
     def failures(self, phases: Phases, known: Sequence[Fault], effects: EffectsByFault) -> Iterable[tuple[FaultChange, Fault]]:  # noqa: ARG002
-        """Find nothing."""
+        """Return no further faults."""
         return ()
 
     def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
@@ -50,5 +50,5 @@ class Mocked:
         return Findings(NOTHING_MEASURED)
 
     def entries(self) -> Iterable[Entry]:
-        """Add nothing."""
+        """Return no further entries for the page."""
         return ()

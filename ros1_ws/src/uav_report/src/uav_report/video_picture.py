@@ -19,7 +19,7 @@ KILO = 1e-3
 
 
 def draw_video(video: Video, timeline: Timeline, path: Path, *, title: str) -> None:
-    """Draw it."""
+    """Draw frame rate, similarity, delay and bit rate over seconds since lift-off, with the radio's state and the marks."""
     figure = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
     fps, quality, delay, rate = figure.subplots(4, 1, sharex=True)
     _draw_fps(fps, video)

@@ -32,7 +32,7 @@ class Measurement:
 
 
 class Driver(Protocol):
-    """One sensor's driver."""
+    """Measures with one sensor, and publishes what it measured."""
 
     sensor: str
     every_ticks: int
@@ -104,7 +104,7 @@ class LidarDriver:
         self._last: NDArray[np.void] | None = None
 
     def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
-        """Scan."""
+        """Scan the sweep that ends now; its stamp is the sweep's begin."""
         start_ns = self._simulation.now_ns - self.every_ticks * TICK_NS
         if not self._cloud.wanted or start_ns < 0:
             return None
@@ -126,7 +126,7 @@ class ImuDriver:
         self._last: ImuReading | None = None
 
     def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
-        """Take one reading."""
+        """Measure rates and specific force at this tick."""
         if not self._imu.wanted:
             return None
         simulation = self._simulation
@@ -150,7 +150,7 @@ class CameraDriver:
         self._last: NDArray[np.uint8] | None = None
 
     def measure(self, mode: SensorMode, stamp_shift_ns: int) -> Measurement | None:
-        """Take a picture."""
+        """Render the colour image at this tick."""
         simulation = self._simulation
         if not self._image.wanted:
             return None

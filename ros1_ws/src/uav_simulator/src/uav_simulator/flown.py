@@ -22,7 +22,7 @@ class Flown(Protocol):
 
     @property
     def body(self) -> RigidBody:
-        """The body."""
+        """The rigid body in the simulated world."""
 
     @property
     def landed_state(self) -> LandedState:
@@ -61,16 +61,16 @@ class SimulatedAutopilotVehicle:
 
     @property
     def body(self) -> RigidBody:
-        """The body."""
+        """The vehicle's rigid body."""
         return self.vehicle.body
 
     @property
     def landed_state(self) -> LandedState:
-        """What the autopilot says."""
+        """MAV_LANDED_STATE of the simulated autopilot."""
         return self.autopilot.landed_state
 
     def late_s(self, now_s: float) -> float:  # noqa: ARG002
-        """It waits."""
+        """Return 0: this autopilot runs in the simulator's own time."""
         return 0.0
 
     def tick(self, now_s: float, dt_s: float) -> bool:

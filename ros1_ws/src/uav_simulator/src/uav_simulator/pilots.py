@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class Pilot(Protocol):
-    """What flies the body."""
+    """Flies the body: the simulated autopilot, ArduPilot, or one elsewhere that is followed."""
 
     @property
     def flown(self) -> Flown:
@@ -39,7 +39,7 @@ class Pilot(Protocol):
         """Do what a word of ``/sim/pilot`` says; raises ConfigError for one that can't be done."""
 
     def close(self) -> None:
-        """Free the ports."""
+        """Close its sockets and connections."""
 
 
 class SimulatedPilot:
@@ -61,7 +61,7 @@ class SimulatedPilot:
             self.ports["gcs_port"] = self._links.gcs_port
 
     def serve(self, wait_s: float = 0.0) -> None:
-        """Carry MAVLink."""
+        """Read and write MAVLink on all links; wait for at most ``wait_s`` (wall clock)."""
         self._links.serve(wait_s)
 
     def obey(self, word: str) -> None:
@@ -69,7 +69,7 @@ class SimulatedPilot:
         apply_pilot_word(word, self.flown.autopilot, self.flown.endpoint)
 
     def close(self) -> None:
-        """Let the clients go."""
+        """Close the links and the connections of their clients."""
         self._links.close()
 
 
@@ -90,7 +90,7 @@ class ArduPilotPilot:
         raise ConfigError(f"/sim/pilot: {word!r} is for the simulated autopilot; ArduPilot takes it over MAVLink")
 
     def close(self) -> None:
-        """Free the port."""
+        """Close the UDP socket to ArduPilot."""
         self.flown.close()
 
 
@@ -112,7 +112,7 @@ class FollowedPilot:
         raise ConfigError(f"/sim/pilot: {word!r} is for the simulated autopilot; the one that is followed takes it from its own pilot")
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the connection to the autopilot."""
         self.flown.close()
 
 

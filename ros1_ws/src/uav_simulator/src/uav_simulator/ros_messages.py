@@ -26,7 +26,7 @@ def ros_time(stamp_ns: int) -> rospy.Time:
 
 
 def header(stamp_ns: int, frame_id: str) -> Header:
-    """Return a header."""
+    """Return a header with this stamp (mission clock) and frame."""
     return Header(stamp=ros_time(stamp_ns), frame_id=frame_id)
 
 

@@ -66,7 +66,7 @@ class Camera:
             self._container = self._opened(self._source)
 
     def close(self) -> None:
-        """Let the device go."""
+        """Close the device or file."""
         self._container.close()
 
     def _frames(self) -> Iterator[av.VideoFrame]:
@@ -109,7 +109,7 @@ class CameraThread:
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start the thread that reads frames."""
         self._thread.start()
 
     def close(self) -> None:

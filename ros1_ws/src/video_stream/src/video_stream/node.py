@@ -205,7 +205,6 @@ class _SentLog:
         self._lines.write(json.dumps({**line, "target_bps": round(sender.target_bps), "level": level, "film": self._name}) + "\n")
 
     def close(self) -> None:
-        """Finish both files."""
         if self._film is not None:
             self._film.close()
         self._lines.close()

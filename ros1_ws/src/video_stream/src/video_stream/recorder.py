@@ -43,7 +43,7 @@ class Film:
         return self.count - 1
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the frames that the encoder still holds, and close the file."""
         for packet in self._stream.encode(None):
             self._container.mux(packet)
         self._container.close()

@@ -45,7 +45,7 @@ class Report:
     want_key: bool = False
 
     def pack(self, seal: Seal) -> bytes:
-        """Return the datagram."""
+        """Return the report as a datagram, with the seal that shows its sender."""
         values = [round(value, 4) if isinstance(value, float) else value for value in astuple(self)]
         return pack_message(KIND, values, seal)
 

@@ -43,7 +43,7 @@ class Mark:
     key: bool
 
     def pack(self) -> bytes:
-        """Return 16 bytes."""
+        """Return the mark's 16 bytes, big-endian."""
         return _MARK.pack(self.frame_id, self.stamp_ns, self.index, self.count | (_KEY_FLAG if self.key else 0))
 
     @classmethod
@@ -87,7 +87,7 @@ class VideoPacket:
         return (self.mark.stamp_ns * CLOCK_HZ // NS) & 0xFFFFFFFF
 
     def serialize(self, seal: Seal) -> bytes:
-        """Return the datagram."""
+        """Return the RTP datagram: mark and authentication tag in the header's extension."""
         packet = RtpPacket(
             payload_type=PAYLOAD_TYPE,
             marker=int(self.mark.index == self.mark.count - 1),

@@ -72,7 +72,7 @@ class ZedSettings:
 
     @property
     def images(self) -> ImageLimits:
-        """What is no picture."""
+        """The limits beyond which an image is no picture."""
         return ImageLimits(dark_mean=self.dark_mean, min_contrast=self.min_contrast, max_saturated=self.max_saturated)
 
     @property
@@ -87,7 +87,7 @@ class ZedSettings:
 
     @property
     def matcher(self) -> MatcherSettings:
-        """How to match."""
+        """The parameters of the stereo matcher, from those of the node."""
         return MatcherSettings(
             block_px=self.block_px | 1,
             uniqueness_percent=self.uniqueness_percent,

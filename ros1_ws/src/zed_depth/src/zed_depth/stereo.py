@@ -62,12 +62,12 @@ class DisparityRange:
 
     @property
     def last(self) -> int:
-        """The greatest disparity."""
+        """The greatest disparity that is searched, pixels."""
         return self.first + self.count - 1
 
 
 def sgbm(settings: MatcherSettings, search: DisparityRange, speckle_px: int) -> cv2.StereoSGBM:
-    """Return OpenCV's matcher."""
+    """Return OpenCV's semi-global matcher (3-way mode) for these disparities; ``speckle_px`` is the largest region to drop."""
     smoothness = settings.block_px**2
     return cv2.StereoSGBM_create(
         minDisparity=search.first,

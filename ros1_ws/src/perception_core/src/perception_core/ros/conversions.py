@@ -28,7 +28,7 @@ GUIDANCE_MAP = "guidance_map"
 
 
 def depth_message(header: Header, depth_m: NDArray[np.float32]) -> Image:
-    """Return a 32FC1 image."""
+    """Return an image of encoding 32FC1 from depths (rows, columns) in metres; NaN where nothing is known."""
     height, width = depth_m.shape
     data = np.ascontiguousarray(depth_m, dtype="<f4").tobytes()
     return Image(header=header, height=height, width=width, encoding="32FC1", is_bigendian=0, step=4 * width, data=data)

@@ -105,7 +105,7 @@ class RawSubscriber(Generic[Message]):
         return connected or abs(rospy.get_time() - self._reconnected_s) < SILENCE_S
 
     def close(self) -> None:
-        """End the subscription."""
+        """Unregister; no callback is called any more."""
         with self._lock:
             self._ended = True
             self._subscriber.unregister()

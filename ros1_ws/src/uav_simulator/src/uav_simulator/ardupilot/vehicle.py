@@ -100,7 +100,7 @@ class ArduPilotVehicle:
         return 0.0
 
     def close(self) -> None:
-        """Free the port."""
+        """Close the UDP socket on which ArduPilot sends its servos."""
         self._socket.close()
 
     def _receive(self, until_s: float) -> _Received | None:

@@ -105,7 +105,7 @@ class Autopilot:
 
     @property
     def landed_state(self) -> LandedState:
-        """Return MAV_LANDED_STATE [8]."""
+        """Return MAV_LANDED_STATE as the autopilot publishes it [8]."""
         if self.landed:
             return LandedState.ON_GROUND
         if self.mode is Mode.LAND or (self._return and self._return.landing):

@@ -57,7 +57,7 @@ class Drift:
 
     @property
     def yaw_rad(self) -> float:
-        """The heading's error."""
+        """Error of the estimated heading, radians."""
         walk_rad = math.radians(self._imperfections.yaw_walk_deg) * math.sin(math.pi * self._flown_s / YAW_WALK_S) ** 2
         return self._turned_rad + self._turn_sign * walk_rad
 
@@ -109,7 +109,7 @@ class Barometer:
         self._drift = SlowNoise(sigma=drift_m, tau_s=60.0, limit=3.0 * drift_m, seed=f"ekf height drift {seed}")
 
     def step(self, dt_s: float) -> float:
-        """Return the error, metres."""
+        """Advance by ``dt_s``; return the error of the height, metres."""
         return self._noise.step(dt_s)[2] + self._drift.step(dt_s)[2]
 
 

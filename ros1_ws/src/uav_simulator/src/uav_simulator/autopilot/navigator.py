@@ -62,7 +62,7 @@ class Navigator:
         self.goal = Goal((x, y), self._z.position[0] + 0.4 * self._z.velocity[0])
 
     def hold_yaw(self) -> None:
-        """Keep the present heading."""
+        """Take the reference's present heading as the target."""
         self.yaw_target, self.yaw_rate = self._yaw.position[0], None
 
     def look(self, yaw_rad: float, *, turn: int = 0) -> None:
@@ -81,7 +81,7 @@ class Navigator:
 
     @property
     def yaw_rad(self) -> float:
-        """Return the reference's heading."""
+        """Return the reference's heading in [-pi, pi), radians."""
         return wrap_pi(self._yaw.position[0])
 
     def keep_above(self, floor_m: float) -> None:
@@ -124,7 +124,6 @@ class Navigator:
             self._z.toward((goal.z,), (velocity,), limits, dt_s)
 
     def _step_yaw(self, dt_s: float) -> None:
-        """Advance the heading."""
         limits = Limits(self.yaw_speed_rad_s, YAW_ACCEL_RAD_S2, YAW_JERK_RAD_S3, 2.0)
         rate = self.yaw_stick_rad_s or self.yaw_rate
         if rate is not None:

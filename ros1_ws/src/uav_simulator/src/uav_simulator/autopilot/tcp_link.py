@@ -41,7 +41,7 @@ class TcpLink:
         self._receive()
 
     def send(self) -> None:
-        """Send what is ready."""
+        """Send what the endpoint has written; what the socket does not take is kept for the next call, up to a limit."""
         out = self._endpoint.take_output()
         if self._client is None:
             return

@@ -74,7 +74,7 @@ def attitude(pilot: Autopilot) -> Message:
 
 
 def attitude_quaternion(pilot: Autopilot) -> Message:
-    """Return ATTITUDE_QUATERNION."""
+    """Return the message ATTITUDE_QUATERNION: the estimated attitude and rates, NED to FRD."""
     w, x, y, z = quat_ned_frd_from_enu_flu(pilot.estimate.attitude)
     p, q, r = frd_from_flu(pilot.estimate.rates)
     return mavlink.MAVLink_attitude_quaternion_message(boot_ms(pilot), w, x, y, z, p, q, r)
@@ -90,7 +90,7 @@ def local_position(pilot: Autopilot) -> Message | None:
 
 
 def global_position(pilot: Autopilot) -> Message:
-    """Return GLOBAL_POSITION_INT."""
+    """Return the message GLOBAL_POSITION_INT: 1e-7 degrees, mm, cm/s, 0.01 degrees."""
     lat, lon, alt = geodetic_from_enu(pilot.estimate.position, ORIGIN)
     vx, vy, vz = ned_from_enu(pilot.estimate.velocity)
     above_home = pilot.estimate.position[2] - (pilot.home[2] if pilot.home else 0.0)

@@ -21,7 +21,7 @@ class Mode(IntEnum):
 
 
 class Result(IntEnum):
-    """MAV_RESULT."""
+    """MAV_RESULT: the autopilot's reply to a command."""
 
     ACCEPTED = 0
     TEMPORARILY_REJECTED = 1
@@ -31,7 +31,7 @@ class Result(IntEnum):
 
 
 class LandedState(IntEnum):
-    """MAV_LANDED_STATE."""
+    """MAV_LANDED_STATE, without its value for unknown."""
 
     ON_GROUND = 1
     IN_AIR = 2
@@ -40,7 +40,7 @@ class LandedState(IntEnum):
 
 
 class SystemStatus(IntEnum):
-    """MAV_STATE."""
+    """MAV_STATE: the values that this autopilot takes."""
 
     STANDBY = 3
     ACTIVE = 4
@@ -48,7 +48,7 @@ class SystemStatus(IntEnum):
 
 
 class Severity(IntEnum):
-    """MAV_SEVERITY."""
+    """MAV_SEVERITY: the values that this autopilot uses."""
 
     CRITICAL = 2
     WARNING = 4
@@ -65,7 +65,7 @@ class Notice(Enum):
 
 @dataclass(frozen=True)
 class Text:
-    """A STATUSTEXT."""
+    """A STATUSTEXT to be sent."""
 
     severity: Severity
     text: str

@@ -28,7 +28,7 @@ class UdpLink:
         self.port: int = self.socket.getsockname()[1]
 
     def receive(self) -> None:
-        """Handle what has come."""
+        """Give the endpoint all datagrams that have come, and take their sender as the peer."""
         # A peer that has gone makes the next call fail (ICMP port unreachable); the link goes on.
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while True:
@@ -36,7 +36,7 @@ class UdpLink:
                 self._endpoint.feed(data)
 
     def send(self) -> None:
-        """Send what is ready."""
+        """Send what the endpoint has written to the last peer; without a peer it is lost."""
         out = self._endpoint.take_output()
         if self._peer is None:
             return
@@ -45,5 +45,5 @@ class UdpLink:
                 self.socket.sendto(out[start : start + DATAGRAM], self._peer)
 
     def close(self) -> None:
-        """Free the port."""
+        """Close the socket."""
         self.socket.close()

@@ -47,7 +47,7 @@ class ListeningLink:
             return []
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the MAVLink connection, if one is open."""
         port, self._port = self._port, None
         if port is not None:
             with contextlib.suppress(OSError):

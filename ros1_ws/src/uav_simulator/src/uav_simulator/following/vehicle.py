@@ -54,7 +54,7 @@ class FollowedVehicle:
         return bool(messages)
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the MAVLink connection to the autopilot that is followed."""
         self._link.close()
 
     def known(self, now_s: float) -> bool:

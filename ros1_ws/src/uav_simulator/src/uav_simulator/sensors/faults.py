@@ -80,7 +80,7 @@ class SensorBoard:
         self._records: list[FaultRecord] = []
 
     def mode(self, sensor: str) -> SensorMode:
-        """Return a sensor's mode."""
+        """Return the mode of a sensor: OK, or the way in which it fails."""
         with self._lock:
             return self._modes[sensor]
 

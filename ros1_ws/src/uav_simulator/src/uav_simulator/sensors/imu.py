@@ -23,7 +23,7 @@ class ImuReading:
 
 
 class Imu:
-    """Measures a body."""
+    """A strapdown IMU in the body's frame, with biases drawn from the seed and white noise."""
 
     def __init__(self, seed: int, *, gyro_bias_rad_s: float = 0.0, accel_bias_m_s2: float = 0.0) -> None:
         """Standard deviations of the biases, on top of those that are always there."""
@@ -32,7 +32,7 @@ class Imu:
         self._accel_bias = self._noisy((0.0, 0.0, 0.0), math.hypot(ACCEL_BIAS_M_S2, accel_bias_m_s2))
 
     def measure(self, rates: Vec3, specific_force: Vec3) -> ImuReading:
-        """Return one reading."""
+        """Return rates (rad/s) and specific force (m/s2), both forward-left-up, with bias and noise."""
         return ImuReading(
             self._noisy(rates, GYRO_NOISE_RAD_S, self._gyro_bias), self._noisy(specific_force, ACCEL_NOISE_M_S2, self._accel_bias)
         )

@@ -24,7 +24,7 @@ class Mount:
 
     @property
     def matrix(self) -> Floats:
-        """Return R_body_sensor, (3, 3)."""
+        """Return R_body_sensor as a rotation matrix, (3, 3) float64."""
         return rotation_matrix(self.rotation)
 
 

@@ -20,7 +20,7 @@ class RadioQuality(Enum):
 
 
 class Volume(Protocol):
-    """A part of space."""
+    """A closed part of space (ENU, metres)."""
 
     def contains(self, point: Vec3) -> bool:
         """Return whether a point lies in it, its surface included."""
@@ -28,7 +28,7 @@ class Volume(Protocol):
 
 @dataclass(frozen=True)
 class BoxVolume:
-    """An axis-aligned box."""
+    """A box between two corners, along the axes (ENU, metres)."""
 
     low: Vec3
     high: Vec3
@@ -53,7 +53,7 @@ class CylinderVolume:
 
 @dataclass(frozen=True)
 class SphereVolume:
-    """A ball."""
+    """A ball around ``at`` (ENU, metres)."""
 
     at: Vec3
     radius_m: float
