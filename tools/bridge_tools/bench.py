@@ -36,7 +36,7 @@ HEADINGS = (
 
 
 def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Read the command line."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula bench bridge", description="Measures the bridge from end to end, with real ends.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
     parser.add_argument("--case", action="append", metavar="WORDS", help="only cases whose name begins so, such as image; several times")

@@ -50,7 +50,7 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """Process id."""
         return self._process.pid
 
     def _read(self, errors: bool) -> None:  # noqa: FBT001
@@ -76,7 +76,7 @@ class Process:
                 return found
 
     def tell(self, word: str) -> None:
-        """Write a line."""
+        """Write a line to the process's stdin."""
         if self._process.stdin is not None:
             self._process.stdin.write(word + "\n")
             self._process.stdin.flush()
@@ -118,7 +118,7 @@ class Bench:
         self._names = 0
 
     def end(self, world: int, order: dict[str, Any], *, small_segments: bool = True) -> Process:
-        """Start an end."""
+        """Start a process that sends, receives or serves in ROS 1 or ROS 2 (``world``), as ordered."""
         environment = dict(self.environment)
         argument = json.dumps(order)
         if world == 1:

@@ -36,7 +36,7 @@ class _Quiet(SimpleXMLRPCRequestHandler):
     rpc_paths = ()
 
     def log_message(self, *arguments: object) -> None:
-        """Say nothing."""
+        """Log nothing; ``http.server`` would write each request to stderr."""
 
 
 class HostilePublisher:
@@ -70,7 +70,7 @@ class HostilePublisher:
                 self.served.set()
 
     def close(self) -> None:
-        """Leave the topic."""
+        """Unregister at the master, and close the sockets."""
         with contextlib.suppress(OSError), master(self._master_uri) as proxy:
             proxy.unregisterPublisher(self._name, self._topic, self._uri)
         self._api.shutdown()

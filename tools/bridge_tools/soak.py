@@ -88,7 +88,6 @@ class Master:
     """A ROS master in a process of its own, on one port however often it is started."""
 
     def __init__(self, folder: Path) -> None:
-        """Start it."""
         self._command = [sys.executable, "-c", RUN_MASTER, str(two_worlds.find_ros1_path()), str(free_port())]
         self._log = (folder / "master.log").open("wb")
         self.uri = f"http://127.0.0.1:{self._command[-1]}"
@@ -109,13 +108,13 @@ class Master:
         self._process = self._start()
 
     def close(self) -> None:
-        """Kill it."""
+        """Kill the master's process."""
         self._process.kill()
         self._process.wait()
 
 
 def configuration() -> str:
-    """Return the bridge's configuration."""
+    """Return the bridge's configuration file for the soak: fixed topics, those that come and go, a service."""
     lines = ["topics:"]
     lines += [f"  - {{name: {UP}, direction: ros1_to_ros2, type: std_msgs/String, depth: 1000}}"]
     lines += [f"  - {{name: {DOWN}, direction: ros2_to_ros1, type: std_msgs/String, depth: 1000}}"]
@@ -241,7 +240,7 @@ def open_files(pid: int) -> int:
 
 
 class Soak:
-    """One run."""
+    """One soak: peers of both worlds come and go, and the master restarts, while messages are counted."""
 
     def __init__(self, seconds: float, seed: int, master: Master, pid: int, ros1: Mapping[str, Any]) -> None:
         """Prepare; the bridge runs, with this process id. ``ros1`` as of ``Ends``."""

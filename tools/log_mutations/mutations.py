@@ -45,7 +45,7 @@ def doubled(spoiler: Spoiler, log: list[EngineEvent]) -> list[EngineEvent]:
 
 
 def swapped(spoiler: Spoiler, log: list[EngineEvent]) -> list[EngineEvent]:
-    """Swap two neighbours."""
+    """Return the log with two neighbouring events swapped."""
     at = spoiler.chance.randrange(len(log) - 1)
     return [*log[:at], log[at + 1], log[at], *log[at + 2 :]]
 

@@ -20,7 +20,6 @@ class _Hooks(SkillHooks):
     refusal = ""
 
     def validate(self, inputs: object) -> str:  # noqa: ARG002 - the hook's signature
-        """Refuse while told to."""
         return self.refusal
 
     def on_interrupt(self, execution: Execution) -> bool | None:  # noqa: ARG002
@@ -28,11 +27,9 @@ class _Hooks(SkillHooks):
         return False
 
     def on_pause(self, execution: Execution) -> str | None:  # noqa: ARG002
-        """Pause."""
         return ""
 
     def on_resume(self, execution: Execution) -> str | None:  # noqa: ARG002
-        """Go on."""
         return ""
 
 

@@ -110,7 +110,7 @@ class Sensor(Protocol):
 
 
 class Camera:
-    """/zed_depth without ROS."""
+    """The node /zed_depth without ROS: the same cores, fed with a recording's image pairs."""
 
     def __init__(self, recording: Recording) -> None:
         self.name, self._recording, self._settings = "zed", recording, ZedSettings()
@@ -165,7 +165,7 @@ class Camera:
 
 
 class Scanner:
-    """/lidar_obstacles without ROS."""
+    """The node /lidar_obstacles without ROS: the same cores, fed with a recording's sweeps."""
 
     def __init__(self, recording: Recording) -> None:
         self.name, self._recording, self._settings = "lidar", recording, LidarSettings()

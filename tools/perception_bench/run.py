@@ -83,7 +83,7 @@ def print_row(row: Mapping[str, object]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the bench."""
+    """Run the bench that the command line asks for; return the exit code."""
     parser = argparse.ArgumentParser(prog="alula bench perception", description="Measures the perception nodes against bare libraries.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
     parser.add_argument("--case", metavar="WORDS", default="", help="only cases whose name begins so")

@@ -23,7 +23,7 @@ EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
 def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Read the command line."""
+    """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="alula bench skills", description="Measures what the skill layer costs beside bare rclpy.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
     parser.add_argument("--quick", action="store_true", help="fewer measurements: for a first look, not for comparing")

@@ -41,7 +41,7 @@ class Case:
 
     @property
     def skillset(self) -> str:
-        """The skillset's name."""
+        """Name of the generated skillset, by its numbers of skills and resources."""
         return f"bench_{self.skills}_{self.resources}"
 
 

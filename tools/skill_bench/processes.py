@@ -39,7 +39,7 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """Its number."""
+        """Process id."""
         assert self._process.pid is not None  # noqa: S101 - it was started
         return self._process.pid
 

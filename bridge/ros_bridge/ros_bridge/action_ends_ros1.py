@@ -49,7 +49,7 @@ class ActionlibServerEnd:
         self._cancels.publish(actionlib_wire.encode_goal_id(GoalId(name, 0)))
 
     def close(self) -> None:
-        """Leave all topics."""
+        """Unregister the five topics of the action."""
         for end in self._ends:
             end.close()
 
@@ -58,7 +58,6 @@ class ActionlibClientsEnd:
     """The clients of an action in ROS 1, as the server sees them."""
 
     def __init__(self, name: str, action: ActionType, context: Context, *, on_goal: Take, on_cancel: Take, empty_result: bytes) -> None:
-        """Offer the action."""
         self._seq = itertools.count(1)
         self._empty_result = empty_result
         plane, types = context.plane, context.types
@@ -74,15 +73,15 @@ class ActionlibClientsEnd:
         self._status.publish(actionlib_wire.encode_status_array(statuses, seq=next(self._seq), stamp_ns=time.time_ns()))
 
     def publish_feedback(self, status: GoalStatus, payload: bytes) -> None:
-        """Publish feedback."""
+        """Publish a goal's feedback; ``payload`` is the serialized ROS 1 feedback."""
         self._feedback.publish(actionlib_wire.encode_outcome(status, payload, seq=next(self._seq), stamp_ns=time.time_ns()))
 
     def publish_result(self, status: GoalStatus, payload: bytes | None) -> None:
-        """Publish a result."""
+        """Publish a goal's result; ``payload`` is the serialized ROS 1 result, None for an empty one."""
         content = self._empty_result if payload is None else payload
         self._result.publish(actionlib_wire.encode_outcome(status, content, seq=next(self._seq), stamp_ns=time.time_ns()))
 
     def close(self) -> None:
-        """Leave all topics."""
+        """Unregister the five topics of the action."""
         for end in self._ends:
             end.close()

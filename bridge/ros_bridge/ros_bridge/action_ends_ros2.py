@@ -76,7 +76,7 @@ class Ros2ClientsEnd:
         self._goals.reply(self._class.Impl.SendGoalService.Response(accepted=accepted, stamp=ros2_time(stamp_ns)), caller)
 
     def reply_cancel(self, caller: Header, code: CancelCode, goals: list[tuple[bytes, int]]) -> None:
-        """Answer a cancel request."""
+        """Send the response to a cancel request: its code, and the goals (UUID, stamp in ns) that are being canceled."""
         canceling = [_goal_info(goal, goal_stamp_ns) for goal, goal_stamp_ns in goals]
         self._cancels.reply(CancelGoal.Response(return_code=int(code), goals_canceling=canceling), caller)
 
@@ -95,7 +95,7 @@ class Ros2ClientsEnd:
         self._status.publish(GoalStatusArray(status_list=statuses))
 
     def close(self) -> None:
-        """Withdraw the action."""
+        """Destroy the services and publishers of the action."""
         for service in (self._goals, self._cancels, self._results):
             service.close()
         for publisher in (self._feedback, self._status):
@@ -153,7 +153,7 @@ class Ros2ServerEnd:
         self._call(self._goals, request, goal, self._on_answer)
 
     def ask_result(self, goal: bytes) -> None:
-        """Ask for the result."""
+        """Request the result of a goal; it comes when the goal has ended."""
         self._call(self._results, self._class.Impl.GetResultService.Request(goal_id=UUID(uuid=list(goal))), goal, self._on_result)
 
     def send_cancel(self, goal: bytes) -> None:
@@ -185,7 +185,7 @@ class Ros2ServerEnd:
         self._on_status([(bytes(status.goal_info.goal_id.uuid), Ros2Status(status.status)) for status in known])
 
     def close(self) -> None:
-        """Disconnect."""
+        """Forget all requests, and destroy the clients and subscriptions of the action."""
         for goal in list(self._pending):
             self.forget(goal)
         for subscription in (self._feedback, self._status):

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class Ros1Status(IntEnum):
-    """actionlib_msgs/GoalStatus."""
+    """The states of actionlib_msgs/GoalStatus."""
 
     PENDING = 0
     ACTIVE = 1
@@ -25,7 +25,7 @@ class Ros1Status(IntEnum):
 
 
 class Ros2Status(IntEnum):
-    """action_msgs/GoalStatus."""
+    """The states of action_msgs/GoalStatus."""
 
     UNKNOWN = 0
     ACCEPTED = 1

@@ -141,7 +141,7 @@ def decode_outcome(data: bytes | memoryview) -> tuple[GoalStatus, bytes]:
 
 
 def encode_status_array(statuses: Iterable[GoalStatus], *, seq: int, stamp_ns: int) -> bytes:
-    """Return an actionlib_msgs/GoalStatusArray."""
+    """Return a serialized actionlib_msgs/GoalStatusArray."""
     parts = [_status(status) for status in statuses]
     return _header(seq, stamp_ns) + UINT32.pack(len(parts)) + b"".join(parts)
 

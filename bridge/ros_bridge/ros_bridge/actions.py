@@ -52,7 +52,7 @@ class Ticker:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
-        """Begin to tick."""
+        """Start the thread that ticks while goals are open."""
         self._thread.start()
 
     def _run(self) -> None:
@@ -94,7 +94,7 @@ class _End(Protocol):
     """An end of an action in one of the worlds."""
 
     def close(self) -> None:
-        """Leave."""
+        """Withdraw all topics and services of this end."""
 
 
 class _ActionBridge(Generic[Goals]):
@@ -105,7 +105,6 @@ class _ActionBridge(Generic[Goals]):
     _clients: _End
 
     def __init__(self, spec: ActionRoute, action: ActionType, action_class: Any, context: Context) -> None:
-        """Open nothing yet."""
         self._spec, self._type, self._class, self._context = spec, action, action_class, context
         self._stats = RouteStats()
         self._payloads = PayloadConverter(self._stats)

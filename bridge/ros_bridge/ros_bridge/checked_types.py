@@ -16,7 +16,7 @@ Pair = tuple[str, str]
 
 
 class CheckedTypes:
-    """Answers for ``decisions.decide``."""
+    """The types that cross, each pair checked once; what ``decisions.decide`` asks of types."""
 
     def __init__(self, types: Types, headers: Headers) -> None:
         """``headers`` asks the ROS 1 publishers of a topic for their connection headers; it may take a second each."""

@@ -41,7 +41,7 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def set_up_logging() -> None:
-    """Log to standard error."""
+    """Log to standard error, from level INFO on."""
     handler = logging.StreamHandler()
     handler.setFormatter(logging.Formatter("[%(levelname)s] ros_bridge: %(message)s"))
     logger.addHandler(handler)

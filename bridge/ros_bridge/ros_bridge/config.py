@@ -119,5 +119,5 @@ class BridgeConfig:
 
     @property
     def routes(self) -> tuple[Spec, ...]:
-        """All named routes."""
+        """The routes that the file names: topics, services, actions."""
         return (*self.topics, *self.services, *self.actions)

@@ -30,7 +30,7 @@ def type_name(value: object) -> str:
 
 
 def package(value: object) -> str:
-    """Read a package's name."""
+    """Return a package's name; raises ValueError that says what is expected."""
     if isinstance(value, str) and PACKAGE.fullmatch(value):
         return value
     raise ValueError("a package's name such as sensor_msgs")
@@ -62,7 +62,7 @@ def mapping(key_reader: Reader, value_reader: Reader) -> Reader:
 
 
 def flag(value: object) -> bool:
-    """Read a truth value."""
+    """Return true or false; raises ValueError that says what is expected."""
     if isinstance(value, bool):
         return value
     raise ValueError("true or false")
@@ -76,7 +76,7 @@ def depth(value: object) -> int:
 
 
 def timeout(value: object) -> float:
-    """Read a duration, s."""
+    """Return seconds above 0 and up to 3600; raises ValueError that says what is expected."""
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= 3600:
         return float(value)
     raise ValueError("a number of seconds above 0 and up to 3600")

@@ -24,7 +24,7 @@ BULKY_DEPTH = 10  # of types with an array of bytes without an end: images, clou
 
 
 class TypeLookup(Protocol):
-    """Questions about types."""
+    """What ``decide`` asks about types."""
 
     def pair(self, ros1_type: str | None, ros2_type: str | None, topic: str) -> tuple[str, str]:
         """Return both types of a topic, of which one may be unknown; raises BridgeError when they can't be converted."""

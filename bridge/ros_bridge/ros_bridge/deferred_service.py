@@ -37,9 +37,9 @@ class DeferredService:
         self._take(response.request, header)
 
     def reply(self, response: Any, header: Header) -> None:
-        """Answer a request."""
+        """Send the response to the request with this header, from any thread."""
         self._send(response, header)
 
     def close(self) -> None:
-        """Withdraw the service."""
+        """Destroy the service; requests without a response get none."""
         self._node.destroy_service(self._service)

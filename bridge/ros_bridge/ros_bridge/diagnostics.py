@@ -29,7 +29,7 @@ OK, WARN, ERROR = b"\x00", b"\x01", b"\x02"
 
 
 class Diagnostics:
-    """The two publishers."""
+    """Publishes the routes' figures as diagnostic_msgs/DiagnosticArray, in both worlds."""
 
     def __init__(self, context: Context) -> None:
         """Advertise in both worlds; raises BridgeError where diagnostic_msgs is missing."""

@@ -44,7 +44,6 @@ class GraphReader:
     """Reads both graphs and their types."""
 
     def __init__(self, node: Node, types: Types, master: Connection, caller_id: str) -> None:
-        """Ask nothing yet."""
         self._node = node
         self._master = master
         self._caller_id = caller_id
@@ -75,7 +74,6 @@ class Discovery:
     def __init__(
         self, reader: GraphReader, node: Node, monitor: MasterMonitor, selection: Selection, table: RouteTable, configured: Iterable[Spec]
     ) -> None:
-        """Get ready."""
         self._reader = reader
         self._monitor = monitor
         self._selection = selection
@@ -92,7 +90,7 @@ class Discovery:
         self._thread = threading.Thread(target=self._run, name="discovery", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread that follows both graphs."""
         self._monitor.on_graph = self._events.wake
         self._thread.start()
 

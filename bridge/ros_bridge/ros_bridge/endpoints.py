@@ -27,11 +27,11 @@ class Ros1Type(Protocol):
 
     @property
     def ros1_name(self) -> str:
-        """``package/Name``."""
+        """Name of the type in ROS 1, ``package/Name``."""
 
     @property
     def md5sum(self) -> str:
-        """The type's fingerprint."""
+        """ROS 1's checksum of the type, 32 hexadecimal digits."""
 
     @property
     def full_text(self) -> str:
@@ -82,7 +82,7 @@ class Ros1Publisher(_Endpoint):
             return 0 if self._handle is None else int(self._native.route_target_peers(self._handle))
 
     def close(self) -> None:
-        """Withdraw the topic."""
+        """Unregister the publisher and free it."""
         self._plane.node.unregister(Kind.PUBLISHER, self._topic, self._type_name)
         self._delete()
 
@@ -104,7 +104,7 @@ class Ros1Subscriber(_Endpoint):
             return 0 if self._handle is None else int(self._native.route_source_peers(self._handle))
 
     def close(self) -> None:
-        """Unsubscribe."""
+        """Unregister the subscription and free it."""
         if self._handle is not None:
             self._plane.links.unsubscribe(self._handle)
         self._delete()

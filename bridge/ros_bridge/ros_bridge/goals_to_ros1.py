@@ -39,7 +39,7 @@ class ActionlibServer(Protocol):
         """Tell whether the server's status has no publisher any more."""
 
     def send_goal(self, name: str, payload: bytes) -> None:
-        """Publish a goal."""
+        """Publish a goal under this id; ``payload`` is the serialized ROS 1 goal."""
 
     def send_cancel(self, name: str) -> None:
         """Ask for one goal's end."""
@@ -58,7 +58,7 @@ class Ros2Clients(Protocol):
         """Hand over a result; without a payload an empty one, with the reason where the type has a field for it."""
 
     def publish_feedback(self, goal: bytes, payload: bytes) -> None:
-        """Publish feedback."""
+        """Publish a goal's feedback; ``payload`` is the serialized ROS 1 feedback."""
 
     def publish_status(self, goals: list[tuple[bytes, int, Ros2Status]]) -> None:
         """Publish ids, stamps and states of all goals that were accepted."""
@@ -98,7 +98,6 @@ class GoalsToRos1:
     """All goals of one action. Every method may be called from any thread; ``now_s`` is a steady clock's."""
 
     def __init__(self, label: str, timeout_s: float) -> None:
-        """Begin with no goals."""
         self._label = label
         self._timeout_s = timeout_s
         self.lock = threading.RLock()

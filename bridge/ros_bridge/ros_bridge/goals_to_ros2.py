@@ -59,7 +59,7 @@ class Ros1Clients(Protocol):
         """Publish the list of all goals."""
 
     def publish_feedback(self, status: GoalStatus, payload: bytes) -> None:
-        """Publish feedback."""
+        """Publish a goal's feedback; ``payload`` is the serialized feedback."""
 
     def publish_result(self, status: GoalStatus, payload: bytes | None) -> None:
         """Publish a result; without a payload an empty one."""
@@ -67,7 +67,7 @@ class Ros1Clients(Protocol):
 
 @dataclass
 class GoalToRos2:
-    """One goal."""
+    """A goal of a ROS 1 client, on its way to the ROS 2 server."""
 
     name: str
     stamp_ns: int
@@ -98,7 +98,6 @@ class GoalsToRos2:
     """All goals of one action. Every method may be called from any thread; ``now_s`` is a steady clock's."""
 
     def __init__(self, label: str, timeout_s: float) -> None:
-        """Begin with no goals."""
         self._label = label
         self._timeout_s = timeout_s
         self.lock = threading.RLock()
@@ -206,7 +205,7 @@ class GoalsToRos2:
             return goal_uuid in self._by_uuid
 
     def on_feedback(self, goal_uuid: bytes, payload: bytes) -> None:
-        """Pass on feedback."""
+        """Pass feedback of the server on to the client of its goal."""
         with self.lock:
             goal = self._by_uuid.get(goal_uuid)
             if goal is not None and goal.open:

@@ -65,7 +65,7 @@ class Ros2Graph:
 
 @dataclass(frozen=True)
 class Graphs:
-    """Both."""
+    """Topics, services and actions of both worlds, as they were read at one moment."""
 
     ros1: Ros1Graph
     ros2: Ros2Graph

@@ -63,5 +63,5 @@ class GraphEvents:
         self._rcl.rcl_trigger_guard_condition(self._condition)
 
     def close(self) -> None:
-        """Free what rcl allocated."""
+        """Free what rcl allocated; nothing wakes any more."""
         self._rcl.rcl_wait_set_fini(ctypes.byref(self._set))

@@ -40,11 +40,11 @@ class Heartbeat:
         self._thread = threading.Thread(target=self._run, name="heartbeat", daemon=True)
 
     def start(self) -> None:
-        """Begin to beat."""
+        """Start the thread that beats."""
         self._thread.start()
 
     def changed(self) -> None:
-        """Beat now."""
+        """Beat at once: something has changed."""
         self._wake.set()
 
     def _run(self) -> None:

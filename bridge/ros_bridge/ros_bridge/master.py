@@ -157,7 +157,7 @@ class MasterMonitor:
         self._thread = threading.Thread(target=self._run, name="master_monitor", daemon=True)
 
     def start(self) -> None:
-        """Begin to ask."""
+        """Start the thread that asks the master."""
         self._thread.start()
 
     def _run(self) -> None:
@@ -194,7 +194,7 @@ class MasterMonitor:
             self.on_reachable()
 
     def close(self) -> None:
-        """Stop asking."""
+        """Stop the thread; wait for it for ``ANSWER_WITHIN_S`` at most."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join(ANSWER_WITHIN_S)

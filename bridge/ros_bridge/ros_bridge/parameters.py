@@ -69,7 +69,7 @@ class ParameterMirror:
         self.node.add_on_set_parameters_callback(self._allow)
 
     def start(self) -> None:
-        """Begin."""
+        """Subscribe to the parameters at the master, and start the thread that copies them."""
         self._ros1_node.subscribe_parameters(self._changed.set)
         self._thread.start()
 
@@ -104,7 +104,7 @@ class ParameterMirror:
                 self.node.declare_parameter(name, value, ParameterDescriptor(dynamic_typing=True, description="set in ROS 1"))
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop the thread; wait for it for a second at most."""
         self._stop.set()
         self._changed.set()
         if self._thread.is_alive():

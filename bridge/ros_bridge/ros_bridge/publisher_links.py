@@ -159,6 +159,6 @@ class PublisherLinks:
             return bool(missing)
 
     def close(self) -> None:
-        """Try no more."""
+        """Connect to no further publisher."""
         self._closed = True
         self._askers.shutdown(wait=False, cancel_futures=True)

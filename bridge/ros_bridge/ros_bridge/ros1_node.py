@@ -69,7 +69,7 @@ class _Handler(SimpleXMLRPCRequestHandler):
     rpc_paths = ()
 
     def log_message(self, *arguments: object) -> None:
-        """Say nothing."""
+        """Log nothing; ``http.server`` would write each request to stderr."""
 
 
 class _Server(ThreadingMixIn, SimpleXMLRPCServer):
@@ -99,7 +99,7 @@ class Ros1Node:
 
     @property
     def master_uri(self) -> str:
-        """Where the master is."""
+        """URI of the ROS master."""
         return self._master.uri
 
     def topics(self, kind: Kind) -> list[list[str]]:
@@ -231,7 +231,7 @@ class _SlaveApi:
         return [OK, f"ready on {place[0]}:{place[1]}", ["TCPROS", *place]]
 
     def getPid(self, _caller: str) -> list[Any]:  # noqa: N802
-        """Tell the process's number."""
+        """Return the bridge's process id."""
         return [OK, "", os.getpid()]
 
     def getMasterUri(self, _caller: str) -> list[Any]:  # noqa: N802
@@ -243,7 +243,7 @@ class _SlaveApi:
         return [OK, "", self._node.topics(Kind.SUBSCRIBER)]
 
     def getPublications(self, _caller: str) -> list[Any]:  # noqa: N802
-        """Tell what is published."""
+        """Return the topics that the bridge publishes, each with its type."""
         return [OK, "", self._node.topics(Kind.PUBLISHER)]
 
     def getBusStats(self, _caller: str) -> list[Any]:  # noqa: N802
@@ -251,7 +251,7 @@ class _SlaveApi:
         return [OK, "see the bridge's figures", [[], [], []]]
 
     def getBusInfo(self, _caller: str) -> list[Any]:  # noqa: N802
-        """Tell nothing about connections."""
+        """Return no connections; the bridge's own figures have them."""
         return [OK, "see the bridge's figures", []]
 
     def paramUpdate(self, _caller: str, _key: str, _value: object) -> list[Any]:  # noqa: N802

@@ -144,5 +144,5 @@ class RouteTable:
         return {spec: route.figures().after(self._earlier.get(key_of(spec), Figures())) for spec, route in self.running().items()}
 
     def close(self) -> None:
-        """Close all routes."""
+        """Close all routes, also those that failed."""
         self.reconcile(())

@@ -41,7 +41,7 @@ class Refusal:
 
 
 class NativeService(NativeRoute):
-    """One route."""
+    """A service in one world whose server is in the other; calls cross in the data plane."""
 
     def __init__(self, spec: ServiceRoute, service: ServiceType, context: Context) -> None:
         """Offer the service; calls cross from here on. Raises BridgeError."""

@@ -18,7 +18,7 @@ LOG_GROWTH = math.log(BIN_GROWTH)
 
 
 class Durations:
-    """A histogram of durations."""
+    """A histogram of durations in bins of logarithmic width."""
 
     def __init__(self) -> None:
         self._bins: npt.NDArray[np.int64] = np.zeros(BINS, np.int64)
@@ -33,7 +33,7 @@ class Durations:
         return durations
 
     def add(self, duration_ns: int) -> None:
-        """Count one duration."""
+        """Count a duration in nanoseconds; one beyond the last bin goes into that."""
         position = int(math.log(max(duration_ns, SHORTEST_NS) / SHORTEST_NS) / LOG_GROWTH)
         self._bins[min(position, BINS - 1)] += 1
         self.count += 1

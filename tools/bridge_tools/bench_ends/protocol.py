@@ -28,7 +28,7 @@ def read_order() -> Order:
 
 
 def report(**event: object) -> None:
-    """Write an event."""
+    """Write an event as a line of JSON on stdout, for the bench that started this process."""
     sys.stdout.write(json.dumps(event) + "\n")
     sys.stdout.flush()
 

@@ -43,7 +43,7 @@ TYPES = {"string": String, "image": Image, "cloud": PointCloud2}
 
 
 def send(order: protocol.Order) -> None:
-    """Publish as ordered."""
+    """Publish messages of the ordered kind and size, at the ordered rate."""
     warnings.filterwarnings("ignore", category=SyntaxWarning)  # rospy's on the missing queue
     # Without a queue rospy writes in the caller's thread, as the fastest of its users do.
     publishers = [rospy.Publisher(topic, TYPES[order["kind"]], queue_size=None, tcp_nodelay=True) for topic in order["topics"]]
@@ -52,7 +52,7 @@ def send(order: protocol.Order) -> None:
 
 
 def receive(order: protocol.Order) -> None:
-    """Subscribe and count."""
+    """Subscribe to the ordered topics, and report how many messages came and how late."""
     meter = protocol.Meter(order["topics"])
     for topic in order["topics"]:
         rospy.Subscriber(topic, TYPES[order["kind"]], lambda message, topic=topic: meter.take(topic, stamp_of(message)), tcp_nodelay=True)
@@ -60,7 +60,7 @@ def receive(order: protocol.Order) -> None:
 
 
 def serve(order: protocol.Order) -> None:
-    """Answer calls."""
+    """Serve a SetBool service until told to finish."""
     rospy.Service(order["topics"][0], SetBool, lambda request: SetBoolResponse(success=request.data, message="done"))
     protocol.report(event="ready")
     protocol.wait_for("finish")

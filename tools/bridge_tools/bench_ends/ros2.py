@@ -52,14 +52,14 @@ TYPES = {"string": String, "image": Image, "cloud": PointCloud2}
 
 
 def send(order: protocol.Order, node: Node) -> None:
-    """Publish as ordered."""
+    """Publish messages of the ordered kind and size, at the ordered rate."""
     publishers = [node.create_publisher(TYPES[order["kind"]], topic, DEPTH) for topic in order["topics"]]
     message = message_of(order["kind"], order["size_bytes"])
     protocol.send(order, [publisher.publish for publisher in publishers], message, stamp)
 
 
 def receive(order: protocol.Order, node: Node) -> None:
-    """Subscribe and count."""
+    """Subscribe to the ordered topics, and report how many messages came and how late."""
     meter = protocol.Meter(order["topics"])
 
     def taker(topic: str) -> Any:
@@ -72,7 +72,7 @@ def receive(order: protocol.Order, node: Node) -> None:
 
 
 def serve(order: protocol.Order, node: Node) -> None:
-    """Answer calls."""
+    """Serve a SetBool service until told to finish."""
 
     def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         response.success, response.message = request.data, "done"
