@@ -12,17 +12,17 @@ from alula.common.robots import VARIABLE
 from alula.common.suggestions import nearest
 
 COMMANDS = {
-    "check": ("alula.commands.check", "read skill models, say what is wrong, prove the rest"),
+    "check": ("alula.commands.check", "check skill models: errors and warnings, then proofs"),
     "new": ("alula.scaffold.__main__", "make a robot: alula new robot FOLDER"),
     "run": ("alula.commands.run", "run a scenario over mocks, in virtual time: alula run SCENARIO --mock [--fail WHAT@SECONDS]"),
     "replay": ("alula.commands.replay", "make a recorded mission's decisions again, with one thing changed"),
-    "expect": ("alula.commands.expect", "write what a run was as expectations, or hold it against a file"),
-    "conform": ("alula.commands.conform", "hold a record against the models"),
+    "expect": ("alula.commands.expect", "write a run's expectations, or check a run against them"),
+    "conform": ("alula.commands.conform", "check a record against the models"),
     "compare": ("alula.commands.compare", "show runs side by side"),
-    "campaign": ("alula.campaign.__main__", "run many scenarios with faults, and tell what answered each failure"),
+    "campaign": ("alula.campaign.__main__", "run scenarios many times with faults, and report the responses to failures"),
     "console": ("alula.console.__main__", "serve the page of runs"),
     "editor": ("alula.editor.__main__", "serve editors over the standard streams (language server)"),
-    "generate": ("alula.language.generate.__main__", "make interfaces, managers and bridge configuration of a robot's models"),
+    "generate": ("alula.language.generate.__main__", "generate interfaces, managers and bridge configuration from a robot's models"),
 }
 ROBOT = "--robot"
 

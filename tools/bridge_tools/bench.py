@@ -37,11 +37,15 @@ HEADINGS = (
 
 def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula bench bridge", description="Measures the bridge from end to end, with real ends.")
+    parser = argparse.ArgumentParser(
+        prog="alula bench bridge", description="Measures the bridge end to end, between real ROS 1 and ROS 2 nodes."
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
-    parser.add_argument("--case", action="append", metavar="WORDS", help="only cases whose name begins so, such as image; several times")
-    parser.add_argument("--repeat", type=int, default=3, metavar="N", help="measure each case so often (default 3)")
-    parser.add_argument("--quick", action="store_true", help="2 s a case instead of 10, once: for a first look, not for comparing")
+    parser.add_argument(
+        "--case", action="append", metavar="WORDS", help="only cases whose names begin with this, such as image; repeatable"
+    )
+    parser.add_argument("--repeat", type=int, default=3, metavar="N", help="measure each case N times (default 3)")
+    parser.add_argument("--quick", action="store_true", help="each case once, for 2 s instead of 10: for a first look, not for comparing")
     return parser.parse_args(arguments)
 
 

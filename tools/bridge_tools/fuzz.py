@@ -158,14 +158,12 @@ class Fuzzer:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Throw, print the figures, and return 0 if the bridge still answers."""
-    parser = argparse.ArgumentParser(
-        prog="bridge_tools.fuzz", description="Throws garbage at a running bridge, which has to be of this machine."
-    )
+    parser = argparse.ArgumentParser(prog="bridge_tools.fuzz", description="Send malformed data to a running bridge on this machine.")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--up", default="/fuzz/up", help="a std_msgs/String topic that the bridge carries to ROS 2")
-    parser.add_argument("--down", default="/fuzz/down", help="one that it carries to ROS 1")
-    parser.add_argument("--service", default="", help="a std_srvs/SetBool service that it offers in ROS 1")
+    parser.add_argument("--up", default="/fuzz/up", help="std_msgs/String topic that the bridge carries to ROS 2")
+    parser.add_argument("--down", default="/fuzz/down", help="std_msgs/String topic that the bridge carries to ROS 1")
+    parser.add_argument("--service", default="", help="std_srvs/SetBool service that the bridge offers in ROS 1")
     options = parser.parse_args(arguments)
     master_uri = os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
     figures = Fuzzer(master_uri, options.up, options.down, options.seed, options.service).run(options.seconds)

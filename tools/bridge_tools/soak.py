@@ -309,7 +309,7 @@ class Soak:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run and print the figures; return 0 if they are good."""
-    parser = argparse.ArgumentParser(prog="bridge_tools.soak", description="Runs a bridge for minutes amid coming and going.")
+    parser = argparse.ArgumentParser(prog="bridge_tools.soak", description="Runs a bridge for minutes while nodes come and go.")
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args(arguments)

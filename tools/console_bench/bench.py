@@ -255,15 +255,15 @@ def measure(folder: Path, options: argparse.Namespace) -> Figures:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula bench console", description="What the operator's page costs a flight.")
-    parser.add_argument("--hours", type=float, default=4.0, help="length of the run that is there already (default 4)")
-    parser.add_argument("--nodes", type=int, default=500, help="nodes of its tree (default 500)")
-    parser.add_argument("--viewers", type=int, default=10, help="how many watch (default 10)")
-    parser.add_argument("--rate", type=float, default=20.0, help="entries a second while it goes on (default 20)")
-    parser.add_argument("--seconds", type=float, default=30.0, help="how long it goes on (default 30)")
-    parser.add_argument("--load", type=int, default=0, help="so many processes compute beside the mission that is commanded (default 0)")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
-    parser.add_argument("--quick", action="store_true", help="half an hour, gone on with for 10 s: for a first look, not for comparing")
+    parser = argparse.ArgumentParser(prog="alula bench console", description="Measure what the operator's page costs a flight.")
+    parser.add_argument("--hours", type=float, default=4.0, help="hours that the run has already lasted (default 4)")
+    parser.add_argument("--nodes", type=int, default=500, help="nodes of the mission's tree (default 500)")
+    parser.add_argument("--viewers", type=int, default=10, help="number of viewers (default 10)")
+    parser.add_argument("--rate", type=float, default=20.0, help="entries a second meanwhile (default 20)")
+    parser.add_argument("--seconds", type=float, default=30.0, help="seconds that the run goes on (default 30)")
+    parser.add_argument("--load", type=int, default=0, help="processes that load the machine while the mission is commanded (default 0)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
+    parser.add_argument("--quick", action="store_true", help="half an hour of record, then 10 s: for a first look, not for comparing")
     options = parser.parse_args(arguments)
     if options.quick:
         options.hours, options.seconds = QUICK_HOURS, QUICK_S

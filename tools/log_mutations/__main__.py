@@ -41,11 +41,9 @@ def asks_data(skillset: Skillset) -> bool:
 
 def main() -> int:
     """Count, print, and end with 1 where a good log has alarmed or a spoiled one was missed."""
-    parser = argparse.ArgumentParser(
-        prog="log_mutations", description="Count which spoiled logs the conformance check tells from good ones."
-    )
+    parser = argparse.ArgumentParser(prog="log_mutations", description="Count how many corrupted logs the conformance check recognises.")
     parser.add_argument("--flights", type=int, default=100, help="good flights over mocks (default 100)")
-    parser.add_argument("--each", type=int, default=50, help="spoiled logs of each kind (default 50)")
+    parser.add_argument("--each", type=int, default=50, help="corrupted logs of each kind (default 50)")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     chance = random.Random(given.seed)  # noqa: S311 - nothing here is secret

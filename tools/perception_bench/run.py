@@ -86,15 +86,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the bench that the command line asks for; return the exit code."""
     parser = argparse.ArgumentParser(prog="alula bench perception", description="Measures the perception nodes against bare libraries.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
-    parser.add_argument("--case", metavar="WORDS", default="", help="only cases whose name begins so")
+    parser.add_argument("--case", metavar="WORDS", default="", help="only cases whose names begin with this")
     parser.add_argument("--frames", type=int, default=FRAMES, metavar="N", help=f"measure so many frames a case (default {FRAMES})")
-    parser.add_argument("--recording", type=Path, metavar="BAG", nargs="+", help="say what the nodes make of recorded flights instead")
     parser.add_argument(
-        "--rendered", metavar="WORLD:SEED", nargs="+", help="say what the nodes make of flights that are rendered along a world's route"
+        "--recording", type=Path, metavar="BAG", nargs="+", help="instead: report the nodes' judgements on recorded flights"
     )
-    parser.add_argument("--imperfections", default="off", metavar="WORDS", help="of a rendered flight, as of a simulated one (default off)")
     parser.add_argument(
-        "--times", type=int, default=0, metavar="N", help="with --recording or --rendered: break the sensors so often in each way, too"
+        "--rendered",
+        metavar="WORLD:SEED",
+        nargs="+",
+        help="instead: report the nodes' judgements on flights rendered along a world's route",
+    )
+    parser.add_argument(
+        "--imperfections", default="off", metavar="WORDS", help="imperfections of a rendered flight, as for `alula fly` (default off)"
+    )
+    parser.add_argument(
+        "--times", type=int, default=0, metavar="N", help="with --recording or --rendered: also break the sensors N times in each way"
     )
     options = parser.parse_args(arguments)
     if options.recording or options.rendered:

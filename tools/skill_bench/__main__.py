@@ -1,4 +1,4 @@
-"""Measure what the skill layer costs beside bare rclpy: ``./alula bench skills``.
+"""Measure what the skill layer costs compared with bare rclpy: ``./alula bench skills``.
 
 Managers in one process, their client in another; in the same run and by turns a bare action and a bare topic between two further
 processes. Times are median / 95th percentile in milliseconds.
@@ -24,11 +24,13 @@ EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 def parse_arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula bench skills", description="Measures what the skill layer costs beside bare rclpy.")
+    parser = argparse.ArgumentParser(prog="alula bench skills", description="Measures what the skill layer costs compared with bare rclpy.")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file")
     parser.add_argument("--quick", action="store_true", help="fewer measurements: for a first look, not for comparing")
     names = [case.name for case in CASES]
-    parser.add_argument("--case", action="append", choices=names, metavar="NAME", help=f"only this one; several times; {', '.join(names)}")
+    parser.add_argument(
+        "--case", action="append", choices=names, metavar="NAME", help=f"measure only this case; repeatable; one of {', '.join(names)}"
+    )
     return parser.parse_args(arguments)
 
 

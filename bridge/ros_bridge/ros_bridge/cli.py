@@ -27,9 +27,9 @@ LOOPBACK = ("http://127.0.0.1", "http://localhost")
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line without what roslaunch adds: ``own_name`` reads ``__name:=`` and ``__ns:=``, the rest has no effect."""
     parser = argparse.ArgumentParser(prog="ros_bridge", description="Bridges topics and services between ROS 1 and ROS 2.")
-    parser.add_argument("--config", type=Path, action="append", default=[], help="what to bridge (YAML); several files are read as one")
+    parser.add_argument("--config", type=Path, action="append", default=[], help="configuration (YAML); several files are merged")
     discovery_options.add_arguments(parser)
-    parser.add_argument("--list", action="store_true", help="show what would be bridged and what can't be, with the reason, and end")
+    parser.add_argument("--list", action="store_true", help="print what would be bridged, and why the rest can't be, and exit")
     parser.add_argument(
         "--stats", type=Path, metavar="FILE", help="write figures of all routes to this JSON file, every 2 s and at the end"
     )

@@ -130,7 +130,7 @@ def test_empty_file_is_an_empty_configuration(parsed):
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B,\n     depth: 0}", 3, ["depth: 0 is not a number of messages"]),
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B, depth: true}", 2, ["depth: True is not"]),
         ("topics:\n  - {name: /a, direction: ros1_to_ros2, type: a/B, latched: 1}", 2, ["latched: 1 is not true or false"]),
-        ("topics:\n  - {name: /a, name: /b}", 2, ["`name` is there twice"]),
+        ("topics:\n  - {name: /a, name: /b}", 2, ["`name` is given twice"]),
         ("services:\n  - {name: /a, server: ros3, type: a/B}", 2, ["'ros3' is not one of ros1, ros2"]),
         ("services:\n  - {name: /a, server: ros1, type: a/B, timeout_s: -1}", 2, ["timeout_s: -1 is not a number of seconds"]),
         ("services:\n  - {name: /a, server: ros1, type: a/B, depth: 1}", 2, ["a route has no `depth`"]),

@@ -35,10 +35,10 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="alula campaign", description="Fly many flights with faults, and report the mission's response to each failure."
     )
-    parser.add_argument("file", type=Path, help="the campaign (docs/records.md)")
-    parser.add_argument("--out", type=Path, help="its folder (default: runs/campaign-NAME); one that was interrupted goes on")
+    parser.add_argument("file", type=Path, help="campaign file (docs/records.md)")
+    parser.add_argument("--out", type=Path, help="folder for the results (default: runs/campaign-NAME); an interrupted one continues there")
     parser.add_argument(
-        "--dask", metavar="URL", help="have it flown by the workers of a Dask scheduler, as in tcp://host:8786 (default: here)"
+        "--dask", metavar="URL", help="use the workers of this Dask scheduler, such as tcp://host:8786 (default: this machine)"
     )
     return parser.parse_args(arguments)
 

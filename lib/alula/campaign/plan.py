@@ -64,18 +64,18 @@ def load_campaign(path: Path) -> Campaign:
     said = document.record("a campaign", KEYS)
     for wanted, other in (("flights", "faults"), ("draw", "faults"), ("draw", "seeds"), ("flights", "seeds")):
         if wanted in said and other in said:
-            raise said[other].wrong(f"`{other}` lists flights, `{wanted}` draws them; write one of both")
+            raise said[other].wrong(f"`{other}` lists flights, `{wanted}` draws them; use only one of both")
     over = _choice(said["over"], (MOCKS, SIMULATOR)) if "over" in said else MOCKS
     scenarios = tuple(_choice(part, scenario_names()) for part in said["scenarios"].elements()) if "scenarios" in said else ("mapping",)
     drawn = "draw" in said or "flights" in said
     for key in ("scenarios", "seeds", "faults"):
         if key in said and not said[key].elements():
-            raise said[key].wrong(f"`{key}` lists nothing, so there is no flight; leave it out, or name one")
+            raise said[key].wrong(f"`{key}` is empty, so there would be no flight; leave it out, or name one")
     flights = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
     if over == SIMULATOR and "behaviour" in said:
-        raise said["behaviour"].wrong("`behaviour` says what mocks do; the simulator has none")
+        raise said["behaviour"].wrong("`behaviour` is for mocks only; leave it out, or fly `over: mocks`")
     if over == MOCKS and "worlds" in said:
-        raise said["worlds"].wrong("`worlds` says where the simulator flies; mocks have none")
+        raise said["worlds"].wrong("`worlds` is for the simulator only; leave it out, or fly `over: simulator`")
     worlds = said["worlds"].record("`worlds`", scenarios) if "worlds" in said else {}
     files = {scenario: _file(path, part, "a world file") for scenario, part in worlds.items()}
     return Campaign(
@@ -191,17 +191,17 @@ def _drawn(document: Located, said: dict[str, Located], scenarios: Sequence[str]
 def _draw(part: Located, scenarios: Sequence[str]) -> _Draw:
     said = part.record("`draw`", DRAW)
     if ("faults" in said) == ("in_turn" in said):
-        raise part.wrong("`draw` needs `faults`, of which it draws, or `in_turn`, lists of faults that flights take one after another")
+        raise part.wrong("`draw` needs `faults` to draw from, or `in_turn`: lists of faults, which the flights use one after another")
     if "in_turn" in said and "most" in said:
         raise said["most"].wrong("`most` says how many of `faults` are drawn; `in_turn` draws none")
     faults, in_turn = (_by_scenario(said[key], key, scenarios) if key in said else {} for key in ("faults", "in_turn"))
     lists = {scenario: tuple(tuple(map(_kind, one.elements())) for one in part.elements()) for scenario, part in in_turn.items()}
     for scenario, one in lists.items():
         if not one:
-            raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` is flights without faults")
+            raise in_turn[scenario].wrong(f"`in_turn` has no list for {scenario}; `[[]]` means flights without faults")
     for scenario, several in faults.items():
         if not several.elements():
-            raise several.wrong(f"`faults` has none to draw for {scenario}; for flights without faults write `in_turn: [[]]`")
+            raise several.wrong(f"`faults` has no fault to draw for {scenario}; for flights without faults write `in_turn: [[]]`")
     return _Draw(
         faults={scenario: tuple(map(_kind, part.elements())) for scenario, part in faults.items()},
         in_turn=lists,
@@ -216,7 +216,7 @@ def _by_scenario(part: Located, key: str, scenarios: Sequence[str]) -> dict[str,
     given = part.record(f"`{key}`", scenarios) if part.is_mapping else dict.fromkeys(scenarios, part)
     for scenario in scenarios:
         if scenario not in given:
-            raise part.wrong(f"`{key}` says nothing of {scenario}")
+            raise part.wrong(f"`{key}` has no entry for {scenario}")
     return given
 
 

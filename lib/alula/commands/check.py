@@ -63,7 +63,7 @@ def exit_code(findings: Sequence[Diagnostic]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    description = "Read skill models, say what is wrong with them and where, and prove the rest."
+    description = "Check skill models: report errors and warnings with their places, then prove the rest."
     parser = argparse.ArgumentParser(prog="alula check", description=description, epilog=EXIT_CODES)
     parser.add_argument(
         "files",
@@ -77,12 +77,12 @@ def _parser() -> argparse.ArgumentParser:
         help="print one JSON object: each finding's place, code, counterexample",
     )
     parser.add_argument(
-        "--closed-world", action="store_true", help="nothing takes an arrow that no effect of the model takes and that is not extern"
+        "--closed-world", action="store_true", help="assume that transitions that are neither extern nor used by an effect are never taken"
     )
-    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="don't prove anything about the models")
-    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="how long the proofs of a file may take (30)")
+    parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="skip the proofs")
+    parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="time limit for the proofs of a file (default 30)")
     parser.add_argument("--play", type=int, metavar="N", help="play counterexample N in running managers (see `--play 1 --help`)")
-    parser.add_argument("--strict", action="store_true", help="make errors of warnings")
+    parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
     parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
     return parser
 
@@ -124,7 +124,7 @@ def counterexamples_of(files: Sequence[ModelFile], timeout_s: float, *, closed_w
 def _not_begun(skillsets: Sequence[Skillset], timeout_s: float) -> Diagnostic:
     """Return the prover's own finding for a lack of time, for skillsets that it was not even asked about."""
     severity = Severity.ERROR if any(skillset.properties for skillset in skillsets) else Severity.WARNING
-    message = f"nothing is proved of this skillset and {len(skillsets) - 1} more: the {timeout_s:g} s for the file are over"
+    message = f"no proof was tried for this skillset and {len(skillsets) - 1} more: the {timeout_s:g} s for the file are over"
     return Diagnostic("ALU540", message, skillsets[0].span, severity, "allow more with `--time`, or divide the file")
 
 

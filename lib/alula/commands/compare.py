@@ -1,4 +1,4 @@
-"""``./alula compare``: runs side by side. Ends with 0: they decided alike, 1: they did not, 2: one can't be read."""
+"""``./alula compare``: runs side by side. Exit code 0: the same decisions, 1: not, 2: one can't be read."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ ALIKE, DIFFERENT, UNREADABLE = 0, 1, 2
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones, or a single run, print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula compare", description="Show runs side by side, and whether their missions decided alike.")
-    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folders of runs, or their logs; two or more")
+    parser = argparse.ArgumentParser(
+        prog="alula compare", description="Show runs side by side, and whether their missions made the same decisions."
+    )
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="two or more folders of runs, or logs")
     parser.add_argument("--json", action="store_true", help="print the comparison as JSON")
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="draw it, too")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the skills of all runs over time")
     given = parser.parse_args(arguments)
     if len(given.runs) < 2:
         parser.error("one run alone can't be compared; name two or more")

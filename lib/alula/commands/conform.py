@@ -22,12 +22,17 @@ CONFORMS, DIFFERS, UNREADABLE = 0, 1, 2
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula conform", description="Hold a log of skillset events against the models.")
+    parser = argparse.ArgumentParser(prog="alula conform", description="Check a log of skillset events against the models.")
     parser.add_argument("log", type=Path, help="a run's folder, skills.mcap, a bag with Event messages, or events.jsonl")
     parser.add_argument(
-        "--model", type=Path, action="append", default=[], metavar="FILE", help="hold it against this model (default: the managers' own)"
+        "--model",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="check it against this model (default: the models of the managers that wrote it)",
     )
-    parser.add_argument("--complete", action="store_true", help="end with 1 where the log has a hole: it breaks off, or ends within a step")
+    parser.add_argument("--complete", action="store_true", help="exit with 1 if the log has a gap, breaks off, or ends within a step")
     parser.add_argument("--json", action="store_true", help="print the verdict as JSON")
     return parser.parse_args(arguments)
 
@@ -55,7 +60,7 @@ def lines(log: Log, verdict: Verdict) -> Iterator[str]:
         yield f"{log.path}: does not conform"
     for finding in verdict.findings:
         yield f"  {finding}"
-        yield "    would have been allowed: " + "; ".join(finding.allowed)
+        yield "    the models allow instead: " + "; ".join(finding.allowed)
     for name, stamps in verdict.restarts.items():
         yield f"  {name} was restarted at {', '.join(f'{stamp_s:.3f} s' for stamp_s in stamps)}"
     if verdict.open:
@@ -63,7 +68,7 @@ def lines(log: Log, verdict: Verdict) -> Iterator[str]:
     if verdict.owed:
         yield f"  it ends within a step; {'; '.join(verdict.owed)} should follow"
     if log.cut:
-        yield f"  read up to its break: {log.cut}"
+        yield f"  read up to the damage: {log.cut}"
 
 
 def holes(log: Log, verdict: Verdict) -> tuple[str, ...]:

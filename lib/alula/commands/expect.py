@@ -17,13 +17,13 @@ FULFILLED, FAILED, UNREADABLE = 0, 1, 2
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
-    parser = argparse.ArgumentParser(prog="alula expect", description="Write expectations from a run, or hold a run against them.")
+    parser = argparse.ArgumentParser(prog="alula expect", description="Write expectations from a run, or check a run against them.")
     parser.add_argument("run", type=Path, help="a run's folder, or its log")
-    parser.add_argument("--check", type=Path, metavar="FILE", help="hold the run against this file instead of writing one")
-    parser.add_argument("--junit", type=Path, metavar="FILE", help="with --check: write the results as JUnit XML, too")
+    parser.add_argument("--check", type=Path, metavar="FILE", help="check the run against this file instead of writing one")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="with --check: also write the results as JUnit XML")
     given = parser.parse_args(arguments)
     if given.junit is not None and given.check is None:
-        parser.error("--junit tells of a --check; add --check FILE")
+        parser.error("--junit writes the results of a check; add --check FILE")
     return given
 
 

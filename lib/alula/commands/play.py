@@ -39,7 +39,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--play", type=int, required=True, metavar="N", help="the number of the counterexample in the output of `alula check`"
     )
-    parser.add_argument("--time", type=float, default=DEFAULT_TIME_S, metavar="SECONDS", help="how long the proofs of a file may take")
+    parser.add_argument(
+        "--time", type=float, default=DEFAULT_TIME_S, metavar="SECONDS", help="time limit for the proofs of a file (default 30)"
+    )
     parser.add_argument("--closed-world", action="store_true", help="as for `alula check`")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser

@@ -63,7 +63,7 @@ class Located:
             name = str(key.value) if isinstance(key, yaml.ScalarNode) else ""
             if not name or name in found:
                 raise Located(self._path, key, self._make_error).wrong(
-                    f"{what}: `{name}` is there twice" if name else f"{what}: a key should be a word"
+                    f"{what}: `{name}` is given twice" if name else f"{what}: a key should be a word"
                 )
             found[name] = Located(self._path, value, self._make_error)
         return found

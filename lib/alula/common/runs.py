@@ -74,7 +74,7 @@ def find_run(which: str) -> Run:
     if which == LATEST:
         runs = live_runs()
         if not runs:
-            raise NoRunError(f"no run is under way in {runs_folder()}; start one (./alula fly mapping), or name its folder (--run DIR)")
+            raise NoRunError(f"no run is under way in {runs_folder()}; start one (alula run SCENARIO), or name its folder (--run DIR)")
         return runs[0]
     run = load_run(Path(which))
     if not run.live:

@@ -39,11 +39,15 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     which.add_argument("--run", metavar="DIR|latest", default=LATEST, help="show this run's folder first (default: the newest)")
     which.add_argument("--domain", type=int, metavar="N", help="show the run under way in this DDS domain first")
     parser.add_argument(
-        "--host", default="127.0.0.1", help="listen here (default 127.0.0.1); any other is served over TLS, and needs the printed address"
+        "--host",
+        default="127.0.0.1",
+        help="address to listen on (default 127.0.0.1); any other is served over TLS, and viewers need the printed URL",
     )
-    parser.add_argument("--certificate", type=Path, metavar="FILE", help="TLS certificate, PEM (default elsewhere: one that signs itself)")
+    parser.add_argument(
+        "--certificate", type=Path, metavar="FILE", help="TLS certificate, PEM (default for other addresses: a self-signed one)"
+    )
     parser.add_argument("--key", type=Path, metavar="FILE", help="its private key, PEM, without a passphrase")
-    parser.add_argument("--plain", action="store_true", help="with --host: no TLS; other machines may only watch then")
+    parser.add_argument("--plain", action="store_true", help="with --host: serve without TLS; other machines may then only watch")
     parser.add_argument("--port", type=int, help=f"listen on this port (default {PORT}, or a free one where that is taken)")
     options = parser.parse_args(arguments)
     if options.domain is not None and options.domain not in DOMAINS:
@@ -112,7 +116,7 @@ async def serve_until_told(console: Console, admission: Admission, known_by: str
         sys.stdout.write(f"{admission.address}\n")
         sys.stdout.flush()
         if known_by:
-            sys.stderr.write(f"its certificate signs itself; the browser has to show this SHA-256 fingerprint: {known_by}\n")
+            sys.stderr.write(f"the certificate is self-signed; check that the browser shows this SHA-256 fingerprint: {known_by}\n")
         sys.stderr.write("the operator's page is served there; Ctrl-C ends the server, not a flight\n")
         await told.wait()
 

@@ -137,10 +137,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="alula bench prove", description="Measure how far the proofs of skillsets scale.")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured to this file, too")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
     parser.add_argument("--sizes", type=_sizes, default=_sizes("10,20,50,100,200"), help="numbers of skills")
-    parser.add_argument("--timeout", type=float, default=30.0, metavar="SECONDS", help="for each proof (30)")
-    parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure this one only, in this process")
+    parser.add_argument("--timeout", type=float, default=30.0, metavar="SECONDS", help="time limit of each proof (default 30)")
+    parser.add_argument("--one", nargs=3, metavar=("FAMILY", "SIZE", "METHOD"), help="measure only this skillset, in this process")
     return parser
 
 

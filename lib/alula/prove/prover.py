@@ -100,5 +100,5 @@ def _undecided(skillset: Skillset, deadline: Deadline) -> Diagnostic:
 
 
 def _unsure(suspect: Suspect, deadline: Deadline) -> Diagnostic:
-    message = f"{suspect.finding.message}; whether it comes to that was not found out within {deadline.given_s:.3g} s"
+    message = f"{suspect.finding.message}; whether that is reachable was not decided within {deadline.given_s:.3g} s"
     return replace(suspect.finding, message=message)

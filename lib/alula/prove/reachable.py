@@ -101,7 +101,7 @@ def crowded(skillset: Skillset, names: set[str], copies: int) -> list[Diagnostic
     return [
         Diagnostic(
             "ALU526",
-            f"more than {copies} executions of `{skill.name}` can run at once: what comes of that is not looked at",
+            f"more than {copies} executions of `{skill.name}` can run at once; the proof looks at no more than that",
             skill.span,
             Severity.WARNING,
             "let a precondition and an invariant exclude each other, so that it runs once",

@@ -195,5 +195,5 @@ class _Search:
 
 
 def _unsure(wanted: Property) -> Diagnostic:
-    message = f"property `{wanted.name}` was neither proved nor refuted: a run against it may exist, but none was found to show"
+    message = f"property `{wanted.name}` was neither proved nor refuted: a run against it may exist, but none was found"
     return Diagnostic("ALU540", message, wanted.span, Severity.ERROR)

@@ -21,9 +21,11 @@ def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="alula.report", description="Make summary, pictures and page of a run.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--scenario", required=True)
-    parser.add_argument("--seed", type=int, help="of the flight, where it is known")
-    parser.add_argument("--of", default="", metavar="RUN", help="of a replay: the name of the run whose decisions were made again")
-    parser.add_argument("--fail", action="append", default=[], help="what failed; of a replay, what did not fail then")
+    parser.add_argument("--seed", type=int, help="seed of the run, if known")
+    parser.add_argument("--of", default="", metavar="RUN", help="for a replay: name of the recorded run")
+    parser.add_argument(
+        "--fail", action="append", default=[], help="a fault of the run; for a replay, a fault that the recorded run did not have"
+    )
     given = parser.parse_args(words)
     facts = RunFacts(given.scenario, given.seed, given.folder, given.fail, (), None, mock=bool(given.of), replay_of=given.of)
     sys.stdout.write("\n".join(verdict_lines(make_report(facts), (), given.folder)) + "\n")

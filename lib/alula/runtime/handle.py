@@ -51,7 +51,7 @@ class Ended(Generic[OutputsT, ResultT]):
         if self.state is ExecutionState.TERMINATED and (not results or self.result in results):
             return self
         wanted = " or ".join(results) or "a result"
-        raise SkillFailedError(f"{self.skill} was to end with {wanted}, but {self}")
+        raise SkillFailedError(f"{self.skill} should have ended with {wanted}, but {self}")
 
     def __str__(self) -> str:
         # The message of a precondition or an invariant begins with its name.

@@ -146,7 +146,7 @@ class Pending(Waitable, Generic[T]):
             NoResponseError: there is none, or not yet.
         """
         if not self.done or self._failure:
-            raise NoResponseError(self._failure or "the answer is still under way; wait for it or await it")
+            raise NoResponseError(self._failure or "the response is still under way; wait for it or await it")
         return self._value  # type: ignore[return-value]  # set by `resolve`, before the end
 
     def get(self, timeout_s: float) -> T:

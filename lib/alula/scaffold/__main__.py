@@ -64,10 +64,10 @@ def write(folder: Path, files: dict[str, str]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make what the command line asks for; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula new", description="Make a robot, a working repository to begin with.")
-    parser.add_argument("what", choices=["robot"], help="what to make")
+    parser = argparse.ArgumentParser(prog="alula new", description="Make a robot: a working repository to start from.")
+    parser.add_argument("what", choices=["robot"], help="always robot")
     parser.add_argument("folder", metavar="DIR", type=Path, help="a new folder, whose name is the robot's: a-z, 0-9, _")
-    parser.add_argument("--git", action="store_true", help="make it a repository of git")
+    parser.add_argument("--git", action="store_true", help="run git init in it")
     options = parser.parse_args(arguments)
     folder = options.folder.expanduser().absolute()
     files = files_of(folder.name)

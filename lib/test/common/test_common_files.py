@@ -40,7 +40,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("a: 1\na: 2\n", "file.yaml:2: the file: `a` is there twice"),
+        ("a: 1\na: 2\n", "file.yaml:2: the file: `a` is given twice"),
         ("a: 1\nrat: 2\n", "file.yaml:2: the file has no `rat`; it may have a, rate (did you mean `rate`?)"),
         ("- 1\n", "file.yaml:1: the file should be a mapping"),
         ("a: [1\n", "file.yaml:2: is no YAML"),

@@ -32,7 +32,7 @@ def folders(tmp_path_factory):
 
 def test_the_same_flight_twice_is_decided_alike(folders, capsys):
     assert main([str(folders["nominal"]), str(folders["again"])]) == 0
-    assert "decided alike: " in capsys.readouterr().out
+    assert "same decisions: " in capsys.readouterr().out
 
 
 def test_another_flight_is_told_with_its_first_other_decision_and_its_figures(folders, capsys, tmp_path):

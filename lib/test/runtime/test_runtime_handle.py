@@ -48,7 +48,7 @@ def test_an_execution_has_one_end():
     ended = one.get(0.0)
     assert (ended.outcome, ended.result, ended.message, ended.outputs) == ("TERMINATED", "DONE", "there", {"height": 3.0})
     assert ended.expect("DONE") is ended.expect() is ended
-    with pytest.raises(SkillFailedError, match=r"takeoff was to end with HIGH or HIGHER, but TERMINATED \(DONE: there\)"):
+    with pytest.raises(SkillFailedError, match=r"takeoff should have ended with HIGH or HIGHER, but TERMINATED \(DONE: there\)"):
         ended.expect("HIGH", "HIGHER")
 
 

@@ -66,7 +66,7 @@ def test_a_stop_that_is_too_late_is_an_emergency(in_model, options, limit_s):
     wait_until_late(bench, limit_s)
     assert bench.hooks["takeoff"].calls[-2:] == ["on_interrupt", "on_emergency"]
     assert (execution.state, bench.states()["axes"]) == (S.INTERRUPTED, "AVAILABLE")
-    assert execution.message == f"the stop was not done within {limit_s:g} s; the emergency stop was called"
+    assert execution.message == f"the stop did not end within {limit_s:g} s; the emergency stop was called"
     assert not execution.interrupted()
     bench.engine.tick()
     assert bench.hooks["takeoff"].calls.count("on_emergency") == 1

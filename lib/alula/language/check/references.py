@@ -182,7 +182,7 @@ def one_in_code(what: str, elements: Sequence[Named], code_name: Callable[[str],
 def ros_name(what: str, element: Named) -> Iterator[Diagnostic]:
     """Yield a finding when ROS does not allow an element's name for a field or topic."""
     if not ros_types.is_field_name(element.name):
-        hint = "ROS wants a-z, 0-9 and single _, a letter first, no word of Python"
+        hint = "ROS allows a-z, 0-9 and single _, beginning with a letter; and it may be no keyword of Python"
         yield for_generator("ALU216", f"`{element.name}` can't be the name of a ROS {what}", element.span, hint=hint)
 
 

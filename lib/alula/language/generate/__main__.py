@@ -22,10 +22,14 @@ from alula.model.span import Span
 def main(arguments: Sequence[str] | None = None) -> int:
     """Generate for the folders named on the command line; return the exit code."""
     parser = argparse.ArgumentParser(prog="alula generate", description="Make interfaces, managers and the bridge's configuration.")
-    parser.add_argument("robots", nargs="+", metavar="FOLDER", type=Path, help="a robot: *.skill, types.yaml, bindings.yaml")
-    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder to put packages and configurations into")
-    parser.add_argument("--prune", action="store_true", help="remove whatever else is in DIR: what is left of models that are gone")
-    parser.add_argument("--name", help="what the robot is called (default: as its folder); for one robot")
+    parser.add_argument(
+        "robots", nargs="+", metavar="FOLDER", type=Path, help="folder with the robot's models: *.skill, types.yaml, bindings.yaml"
+    )
+    parser.add_argument("--out", required=True, metavar="DIR", type=Path, help="folder for the generated packages and configurations")
+    parser.add_argument(
+        "--prune", action="store_true", help="remove everything else from DIR, such as packages of models that no longer exist"
+    )
+    parser.add_argument("--name", help="name of the robot (default: its folder's); only with one FOLDER")
     options = parser.parse_args(arguments)
     if options.name and len(options.robots) > 1:
         parser.error("--name: several robots can't have one name")

@@ -74,7 +74,7 @@ def _decisions(compared: Compared) -> Iterator[str]:
     """Yield where each run decides otherwise than the first."""
     first = compared.sides[0]
     if compared.alike:
-        yield f"decided alike: {len(first.decisions)} decisions"
+        yield f"same decisions: {len(first.decisions)} decisions"
     for side, at in zip(compared.sides[1:], compared.differs_at, strict=True):
         if at is not None:
             yield f"decision {at + 1} differs: {_told(first, at)}; {_told(side, at)}"

@@ -274,7 +274,7 @@ class SkillsetEngine:
     def _escalate(self, entry: Entry, limit_s: float) -> None:
         """Call the strongest stop, then give back what the execution holds."""
         self._defer(functools.partial(self._call, entry, "on_emergency"))
-        self._interrupted(entry.key.id, f"the stop was not done within {limit_s:g} s; the emergency stop was called")
+        self._interrupted(entry.key.id, f"the stop did not end within {limit_s:g} s; the emergency stop was called")
 
     # --- pause and resume: a paused execution holds its resources, and its invariants are watched --------------------------
 
@@ -573,7 +573,7 @@ class SkillsetEngine:
 def _known_reply(execution_id: str, entry: Entry | None, *, paused: bool, wait: bool) -> PauseReply | None:
     """Return the answer to a pause or a resumption where no hook has to be asked for it."""
     if entry is None:
-        return PauseReply(accepted=False, reason=f"there is no execution {execution_id} that has not ended")
+        return PauseReply(accepted=False, reason=f"execution {execution_id} is not known, or has ended")
     state = entry.execution.state
     if state is (ExecutionState.PAUSED if paused else ExecutionState.RUNNING) and not entry.dispatching:
         return PauseReply(accepted=True)

@@ -207,4 +207,4 @@ def _take_over(address: str) -> None:
     except OSError:
         Path(address).unlink(missing_ok=True)
         return
-    raise SkillRuntimeError(f"another process manages this skillset already ({address}); end it first")
+    raise SkillRuntimeError(f"another process already manages this skillset ({address}); end it first")

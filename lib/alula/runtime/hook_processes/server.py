@@ -101,7 +101,7 @@ class HookServer:
         try:
             self._send(("ask", number, method, (execution_id, *arguments)))
         except Exception as error:  # noqa: BLE001 - of pickle, for whatever a hook hands over
-            return self._ask("fail", execution_id, f"what {self._skill} handed over can't be sent: {error_line(error)}")
+            return self._ask("fail", execution_id, f"the outcome of {self._skill}'s hook can't be sent: {error_line(error)}")
         arrived.wait(REPLY_S if self._pipe is not None else 0.0)
         self._replies.pop(number, None)
         return bool(value and value[0])
@@ -119,7 +119,7 @@ class HookServer:
                 continue
             except (AuthenticationError, AssertionError):
                 if not strange:
-                    self._on_error(f"what listens at {self._address} does not have this user's key; end it")
+                    self._on_error(f"the process that listens at {self._address} does not have this user's key; end it")
                 strange = True
                 self._over.wait(AGAIN_S)
                 continue

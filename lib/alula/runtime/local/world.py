@@ -78,7 +78,7 @@ class LocalWorld:
         """
         before = self.managers.get(skillset.name)
         if before is not None and before.alive:
-            raise WorldError(f"the managers of {skillset.name} are there already; kill them first")
+            raise WorldError(f"the managers of {skillset.name} run already; kill them first")
         managers = self.managers[skillset.name] = LocalManagers(self._bus, skillset, make_hooks)
         return managers
 

@@ -95,7 +95,7 @@ class Managers:
         """Fail whatever runs for this reason, so that functions are stopped, and take no more requests."""
         self.engine.close(reason)
         if not self.middleware.close_hooks(HOOKS_RETURN_S):
-            self.middleware.log(f"a hook has not returned within {HOOKS_RETURN_S:g} s; it is left behind")
+            self.middleware.log(f"a hook has not returned within {HOOKS_RETURN_S:g} s; its thread is abandoned")
         self._records.publish()
         self._events.flush(FLUSH_S)
 

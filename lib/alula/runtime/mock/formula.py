@@ -126,9 +126,9 @@ def _names(tree: ast.Expression, text: str) -> frozenset[str]:
     names: set[str] = set()
     for node in ast.walk(tree):
         if not isinstance(node, _NODES):
-            raise FormulaError(f"`{text}`: {type(node).__name__} is not for formulas")
+            raise FormulaError(f"`{text}`: {type(node).__name__} is not allowed in formulas")
         if isinstance(node, ast.Attribute) and node.attr.startswith("_"):
-            raise FormulaError(f"`{text}`: the field {node.attr} is not for formulas")
+            raise FormulaError(f"`{text}`: the field {node.attr} is not allowed in formulas")
         if isinstance(node, ast.Call):
             if not isinstance(node.func, ast.Name) or node.func.id not in {*FUNCTIONS, *DRAWS} or node.keywords:
                 known = ", ".join((*FUNCTIONS, *DRAWS))

@@ -100,7 +100,7 @@ class _Reader:
             return NEVER
         reason = entry.text(f"`{given[0]}`")
         if not reason:
-            raise entry.wrong(f"`{given[0]}` is the reason that is given; it should not be empty")
+            raise entry.wrong(f"`{given[0]}` is the reason of the refusal or crash; it should not be empty")
         return Ending(refuse=reason) if given == ["refuse"] else Ending(crash=reason)
 
     def _results(self, name: str, skill: Skill, entry: Located) -> tuple[tuple[str, float], ...]:
@@ -240,7 +240,7 @@ class _Reader:
     def _duration(self, part: Located, known: Collection[str]) -> Value:
         value = self._value(part, known)
         if isinstance(value, bool) or (isinstance(value, int | float) and not 0.0 <= value < float("inf")):
-            raise part.wrong(f"a time is a number of seconds from 0 on, or a formula of one, not {part.value!r}")
+            raise part.wrong(f"a time is a number of seconds from 0 on, or a formula for one, not {part.value!r}")
         return value
 
     def _member(self, name: str, part: Located, what: str) -> tuple[Skillset, str]:

@@ -125,7 +125,7 @@ ground: {x: [-5, 20], y: [-9, 9]}
     [
         ("colour: 1", ":6: a world has no `colour`; it may have name"),
         ("boxs: []", "did you mean `boxes`?"),
-        ("route: []", ":6: a world: `route` is there twice"),
+        ("route: []", ":6: a world: `route` is given twice"),
         ("obstacles: [{kind: dragon, at: [1, 2]}]", ":6: the kind of an obstacle is `dragon`; it may be pillar"),
         ("obstacles: {kind: tree}", ":6: `obstacles` should be a list"),
         ("boxes:\n  - {name: b, low: [1, 0, 0], high: [0, 1, 1]}", ":7: box 'b': `low` must be below `high`"),

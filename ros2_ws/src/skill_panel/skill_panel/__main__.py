@@ -39,11 +39,11 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         epilog="Without --run and --domain: the run that is under way (the newest), else the domain of ROS_DOMAIN_ID, else domain 0.",
     )
     parser.add_argument("skillsets", nargs="*", metavar="SKILLSET", help="show only these")
-    parser.add_argument("--namespace", default="", metavar="NS", help="show only the robot of this namespace, as /robot1")
+    parser.add_argument("--namespace", default="", metavar="NS", help="show only the robot in this namespace, such as /robot1")
     place = parser.add_mutually_exclusive_group()
-    place.add_argument("--run", metavar="DIR|latest", help="the flight of this run's folder, or the newest one under way")
-    place.add_argument("--domain", type=int, metavar="N", help="this DDS domain")
-    parser.add_argument("--list", action="store_true", help="say what runs on this machine, and end")
+    place.add_argument("--run", metavar="DIR|latest", help="the run of this folder, or the newest one under way")
+    place.add_argument("--domain", type=int, metavar="N", help="the skillsets in this DDS domain")
+    parser.add_argument("--list", action="store_true", help="list the runs under way on this machine, and exit")
     options = parser.parse_args(arguments)
     if options.domain is not None and options.domain not in DOMAINS:
         parser.error(f"--domain {options.domain}: a DDS domain is a number from 0 to {DOMAINS[-1]}")

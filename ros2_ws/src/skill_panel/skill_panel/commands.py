@@ -220,22 +220,24 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     for name, function in COMMANDS.items():
         command = commands.add_parser(name, help=str(function.__doc__), description=function.__doc__)
         if name in {"start", "interrupt", "why"}:
-            command.add_argument("skill", metavar="SKILL", help="a skill, as takeoff or navigation.takeoff")
+            command.add_argument("skill", metavar="SKILL", help="a skill, such as takeoff or navigation.takeoff")
         if name in {"start", "why"}:
-            command.add_argument("inputs", nargs="*", metavar="key=value", help="inputs; values as in YAML")
+            command.add_argument("inputs", nargs="*", metavar="key=value", help="inputs of the skill; values as in YAML")
         if name == "transition":
             command.add_argument("resource", metavar="SKILLSET.RESOURCE")
             command.add_argument("state", metavar="STATE")
         if name == "data":
-            command.add_argument("data", nargs="?", metavar="SKILLSET.DATA", help="one data; without it, all")
+            command.add_argument("data", nargs="?", metavar="SKILLSET.DATA", help="a data of a skillset (default: all)")
         if name == "events":
-            command.add_argument("--follow", action="store_true", help="what happens from now on; without it, what the run has recorded")
-            command.add_argument("--skillset", metavar="NAME", help="of this skillset only")
+            command.add_argument(
+                "--follow", action="store_true", help="print events as they happen (default: those that the run has recorded)"
+            )
+            command.add_argument("--skillset", metavar="NAME", help="only events of this skillset")
         place = command.add_mutually_exclusive_group()
-        place.add_argument("--run", metavar="DIR|latest", help="the flight of this run's folder, or the newest one under way")
-        place.add_argument("--domain", type=int, choices=DOMAINS, metavar="N", help="this DDS domain")
-        command.add_argument("--namespace", default="", metavar="NS", help="the robot of this namespace")
-        command.add_argument("--json", action="store_true", help="a JSON object a line")
+        place.add_argument("--run", metavar="DIR|latest", help="the run of this folder, or the newest one under way")
+        place.add_argument("--domain", type=int, choices=DOMAINS, metavar="N", help="the skillsets in this DDS domain")
+        command.add_argument("--namespace", default="", metavar="NS", help="only the robot in this namespace")
+        command.add_argument("--json", action="store_true", help="print a JSON object a line")
     return parser.parse_args(arguments)
 
 

@@ -24,9 +24,9 @@ from skillset_ros2.mission_node import run_mission
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(prog="mission", description="Run a mission of the robot.")
-    parser.add_argument("--scenario", required=True, help="one of the robot's")
+    parser.add_argument("--scenario", required=True, help="name of a scenario of the robot")
     parser.add_argument("--out", type=Path, required=True, help="the run's folder")
-    parser.add_argument("--world", default="", help="world that the mission's inputs come from, by name or file")
+    parser.add_argument("--world", default="", help="world that the mission's inputs are taken from, by name or file")
     return parser.parse_args(arguments)
 
 

@@ -97,11 +97,21 @@ def parse(words: Sequence[str], *, program: str, folder: bool) -> argparse.Names
     if folder:
         models = f"a folder of models, bindings, and {BEHAVIOUR} if there is one (default: the robot's)"
         parser.add_argument("robot", type=Path, nargs="?", help=models)
-        parser.add_argument("--skillset", action="append", default=[], metavar="NAME", help="only this one of the robot's (several)")
-    parser.add_argument("--behaviour", action="append", default=[], type=Path, metavar="FILE", help="what they do, on top of the robot's")
-    parser.add_argument("--fail", action="append", default=[], metavar="WHAT[:HOW][@SECONDS[-SECONDS]]", help="a fault of the behaviour")
-    parser.add_argument("--seed", type=int, default=0, help="of the behaviour's chance (default 0)")
-    parser.add_argument("--starter", action="store_true", help="print a behaviour file to begin with, and end")
+        parser.add_argument(
+            "--skillset", action="append", default=[], metavar="NAME", help="mock only this skillset of the robot; repeatable"
+        )
+    parser.add_argument(
+        "--behaviour", action="append", default=[], type=Path, metavar="FILE", help="behaviour file, on top of the robot's own"
+    )
+    parser.add_argument(
+        "--fail",
+        action="append",
+        default=[],
+        metavar="WHAT[:HOW][@SECONDS[-SECONDS]]",
+        help="inject a fault that the behaviour file declares",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the mocks' random choices (default 0)")
+    parser.add_argument("--starter", action="store_true", help="print a behaviour file to start from, and exit")
     return parser.parse_args(words)
 
 

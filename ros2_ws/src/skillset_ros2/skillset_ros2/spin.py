@@ -151,10 +151,12 @@ def _options(skillset: Skillset, arguments: Sequence[str]) -> tuple[argparse.Nam
     words = ros2_arguments(arguments)
     split = words.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in words else len(words)
     skills = [skill.name for skill in skillset.skills]
-    parser = argparse.ArgumentParser(description=f"Serve the skillset {skillset.name}.", epilog="after these: --ros-args ...")
-    parser.add_argument("--processes", choices=["single", "separate"], default="single", help="separate: each skill manager in its own")
+    parser = argparse.ArgumentParser(description=f"Serve the skillset {skillset.name}.", epilog="ROS arguments follow after --ros-args.")
+    parser.add_argument(
+        "--processes", choices=["single", "separate"], default="single", help="separate: each skill manager in a process of its own"
+    )
     parser.add_argument("--part", choices=[ALL, RESOURCES, *skills], default=ALL, metavar="PART", help=f"serve {RESOURCES} or a skill only")
-    parser.add_argument("--parent", type=int, default=0, metavar="PID", help="end when this process, the parent, ends")
+    parser.add_argument("--parent", type=int, default=0, metavar="PID", help="end when the process with this id, the parent, ends")
     return parser.parse_args(words[:split]), words[split:]
 
 

@@ -131,7 +131,7 @@ def test_the_emergency_follows_the_mission_clock(spinning, separate):
     set_time(103.1)
     assert handle.wait(SOON_S)
     assert handle.state is S.INTERRUPTED
-    assert handle.message == "the stop was not done within 3 s; the emergency stop was called"
+    assert handle.message == "the stop did not end within 3 s; the emergency stop was called"
     until(lambda: "on_emergency" in hooks.calls, "the emergency stop")
     release.set()
 

@@ -178,7 +178,7 @@ def test_of_managers_without_the_key_nothing_is_unpickled(place, told, tmp_path)
                 read_to_the_end(pipe)
         server.close("over", SOON_S)
     assert not marker.exists()
-    assert told == [f"what listens at {address} does not have this user's key; end it"]
+    assert told == [f"the process that listens at {address} does not have this user's key; end it"]
 
 
 def test_a_silent_connection_does_not_keep_others_out(remote, told):

@@ -89,8 +89,8 @@ def step(camera: Camera) -> dict[str, float]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(prog="alula bench video", description="Measure the telepilot's video, without a simulator.")
-    parser.add_argument("--world", default="building", help="what the camera sees")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
+    parser.add_argument("--world", default="building", help="source of the camera's images")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
     options = parser.parse_args(arguments)
     cv2.setNumThreads(1)
     camera = simulated_camera(options.world)

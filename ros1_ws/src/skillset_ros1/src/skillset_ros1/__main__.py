@@ -25,7 +25,7 @@ class _UsageError(Exception):
 def main(arguments: Sequence[str]) -> int:
     """Serve the skillset that the command line names; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m skillset_ros1", description="Serve a skillset as a node of ROS 1.")
-    parser.add_argument("skillset", help="its name, as in the model")
+    parser.add_argument("skillset", help="name of the skillset, as in its model")
     parser.add_argument("--hooks", required=True, metavar="MODULE:FACTORY", help="factory(managers) returns the hooks by skill")
     options = parser.parse_args(arguments)
     try:
