@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class NoResponseError(SkillRuntimeError):
-    """The managers gave no answer to a question within its time, or have gone."""
+    """The managers gave no response within the time of a request, or have gone."""
 
 
 class CannotWaitError(SkillRuntimeError):
@@ -135,7 +135,7 @@ class Pending(Waitable, Generic[T]):
 
     @property
     def failure(self) -> str:
-        """Why there is no answer; empty while it may still come, and when it has."""
+        """Why there is no response; empty while it may still come, and when it has."""
         return self._failure
 
     @property
@@ -163,7 +163,7 @@ class Pending(Waitable, Generic[T]):
         self._settle(value, "")
 
     def fail(self, reason: str) -> None:
-        """Say why there will be no answer; ignored when there is one."""
+        """Say why there will be no response; ignored when there is one."""
         self._settle(None, reason or "there is no answer")
 
     def _settle(self, value: T | None, failure: str) -> None:

@@ -278,7 +278,7 @@ def test_a_pause_that_waits_for_a_hook_that_hangs_is_answered(hanging):
     replies: list = []
     hanging.bench.engine.set_paused(execution.id, replies.append, paused=True)
     waits.until(lambda: replies, "the pause is answered", SOON_S)
-    assert "is not known, or has ended" in replies[0].reason
+    assert "is open: it has ended, or never was" in replies[0].reason
 
 
 def test_progress_that_takes_its_time_is_not_asked_again_and_holds_up_no_other_skill(hanging):

@@ -61,7 +61,7 @@ def test_a_message_that_begins_with_the_name_of_its_reason_does_not_get_it_twice
 def test_an_end_that_is_no_result_is_never_expected():
     one = handle()
     one.fail("gone")
-    with pytest.raises(SkillFailedError, match=r"end with a result, but FAILED \(gone\)"):
+    with pytest.raises(SkillFailedError, match=r"ended with a result, but FAILED \(gone\)"):
         one.get(0.0).expect()
 
 

@@ -573,7 +573,7 @@ class SkillsetEngine:
 def _known_reply(execution_id: str, entry: Entry | None, *, paused: bool, wait: bool) -> PauseReply | None:
     """Return the answer to a pause or a resumption where no hook has to be asked for it."""
     if entry is None:
-        return PauseReply(accepted=False, reason=f"execution {execution_id} is not known, or has ended")
+        return PauseReply(accepted=False, reason=f"no execution {execution_id} is open: it has ended, or never was")
     state = entry.execution.state
     if state is (ExecutionState.PAUSED if paused else ExecutionState.RUNNING) and not entry.dispatching:
         return PauseReply(accepted=True)
