@@ -19,12 +19,12 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     """Turn the command line into a specification; raise RequestError, or exit 2 as argparse does."""
     parser = run_parser("Run a scenario of the robot, in a ROS graph of its own.")
     parser.add_argument("--console", action="store_true", help="serve the operator's page beside the run")
-    parser.add_argument("--behaviour", action="append", default=[], metavar="FILE", help="with --mock: what the mocks do")
+    parser.add_argument("--behaviour", action="append", default=[], metavar="FILE", help="with --mock: behaviour file of the mocks")
     part.add_options(parser)
     given = parser.parse_args(arguments)
     scenario = read_scenario(given.scenario)
     if given.behaviour:
-        raise RequestError("--behaviour says what mocks do; add --mock")
+        raise RequestError("--behaviour is for mocks; add --mock")
     seed, world = check_seed(given.seed), world_file(scenario, given.world)
     part.check_world(world)
     own = part.read(given, scenario)

@@ -41,7 +41,7 @@ def pixels_of(message: Any) -> NDArray[np.uint8]:
     if message.encoding == "32FC1":
         return depth_picture(np.frombuffer(message.data, "<f4").reshape(message.height, message.width))
     if message.encoding not in COLOURS:
-        raise ValueError(f"pictures of encoding {message.encoding!r} are not known")
+        raise ValueError(f"images of encoding {message.encoding!r} can't be shown")
     channels = () if message.encoding == "mono8" else (3,)
     pixels = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width, *channels)
     conversion = COLOURS[message.encoding]

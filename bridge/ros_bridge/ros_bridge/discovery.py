@@ -100,7 +100,7 @@ class Discovery:
                 self._follow()
             except Exception:  # whatever a graph in motion makes rclpy or a node raise: bridging goes on, and the graph is read again
                 if not self._stop.wait(AGAIN_AFTER_S):
-                    logger.exception("discovery begins again after an error")
+                    logger.exception("discovery restarts after an error")
 
     def _follow(self) -> None:
         changed = True

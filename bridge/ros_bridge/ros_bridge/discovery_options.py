@@ -26,8 +26,8 @@ PATTERNS = {"action": "append", "metavar": "PATTERN"}
 NAME = {"metavar": "NAME"}
 OPTIONS: Mapping[str, Option] = {
     "all": Option(config_values.flag, "bridge every topic, service and action that appears in either world", {"action": "store_true"}),
-    "include": Option(config_values.patterns, "bridge what appears under such a name: '/camera/*'", PATTERNS),
-    "exclude": Option(config_values.patterns, "but not what has such a name in either world", PATTERNS),
+    "include": Option(config_values.patterns, "bridge names that match, such as '/camera/*'", PATTERNS),
+    "exclude": Option(config_values.patterns, "leave out names that match in either world", PATTERNS),
     "namespace1": Option(config_values.name, "put ROS 2's names below this one in ROS 1", NAME),
     "namespace2": Option(config_values.name, "put ROS 1's names below this one in ROS 2", NAME),
     "rename": Option(config_values.mapping(config_values.name, config_values.name)),

@@ -165,7 +165,7 @@ class MasterMonitor:
             try:
                 self._look()
             except Exception:  # whatever garbage comes from there; the next look must come
-                logger.exception("a look at the ROS master failed")
+                logger.exception("reading the state of the ROS master failed")
             if self._stop.wait(ASK_EVERY_S):
                 return
 

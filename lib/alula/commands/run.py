@@ -43,10 +43,10 @@ CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """Read the command line; raises RequestError."""
     parser = run_parser("Run a scenario of the robot over mocks, in virtual time.")
-    parser.add_argument("--behaviour", type=Path, action="append", default=[], metavar="FILE", help="of the mocks, on top of the robot's")
+    parser.add_argument("--behaviour", type=Path, action="append", default=[], metavar="FILE", help="behaviour file, on top of the robot's")
     given, others = parser.parse_known_args(words)
     if not given.mock:
-        raise RequestError("without --mock a run needs an installation with ROS: ./alula of a checkout has it")
+        raise RequestError("without --mock a run needs an installation with ROS: use ./alula of a checkout")
     if others:
         raise RequestError(f"{others[0]}: a run over mocks has no such option; leave it out, or --mock")
     return given

@@ -18,13 +18,13 @@ MAX_SEED = 2**31 - 1
 def run_parser(about: str) -> argparse.ArgumentParser:
     """Return a parser with the options of every run."""
     parser = argparse.ArgumentParser(prog="alula run", description=about)
-    parser.add_argument("scenario", help=f"what to run: {', '.join(scenario_names())}")
-    parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="what fails, seconds after the departure")
-    parser.add_argument("--world", default="", metavar="FILE|NAME", help="where: what stands there, inputs (default: the scenario's)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of all that is drawn at random (default 0)")
+    parser.add_argument("scenario", help=f"name of the scenario: {', '.join(scenario_names())}")
+    parser.add_argument("--fail", action="append", default=[], metavar=FAULT, help="a fault, seconds after the departure; repeatable")
+    parser.add_argument("--world", default="", metavar="FILE|NAME", help="surroundings and inputs of the mission (default: the scenario's)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default 0)")
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
-    parser.add_argument("--monitor", action="store_true", help="hold every event against the models")
-    parser.add_argument("--mock", action="store_true", help="over mocks in virtual time: no simulator, no ROS, a second")
+    parser.add_argument("--monitor", action="store_true", help="check every event against the models")
+    parser.add_argument("--mock", action="store_true", help="run over mocks in virtual time: without simulator and ROS, in about a second")
     return parser
 
 

@@ -13,7 +13,7 @@ setup(
     zip_safe=True,
     maintainer="The Alula developers",
     maintainer_email="alula@alula-robotics.org",
-    description="A panel in the terminal to look at running skillsets and to drive them by hand.",
+    description="A panel in the terminal that shows running skillsets and controls them manually.",
     license="Apache-2.0",
     entry_points={"console_scripts": ["panel = skill_panel.__main__:main"]},
 )

@@ -1,4 +1,4 @@
-"""`./alula panel`: look at running skillsets and drive them by hand.
+"""`./alula panel`: show running skillsets and control them manually.
 
 Ends with 0, and with 2 when what was asked for can't be.
 """
@@ -35,7 +35,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the command line's values; wrong ones print the usage on stderr and exit with code 2."""
     parser = argparse.ArgumentParser(
         prog="alula panel",
-        description="Look at running skillsets and drive them by hand.",
+        description="Show running skillsets and control them manually.",
         epilog="Without --run and --domain: the run that is under way (the newest), else the domain of ROS_DOMAIN_ID, else domain 0.",
     )
     parser.add_argument("skillsets", nargs="*", metavar="SKILLSET", help="show only these")
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say_what_runs(options)
         return 0
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        sys.stderr.write("alula panel: this is no terminal; --list says what runs without one\n")
+        sys.stderr.write("alula panel: needs a terminal; --list prints what runs without one\n")
         return 2
     from skill_panel.app import Panel
 

@@ -162,7 +162,7 @@ class RclpyMiddleware(RclpyBase):
             if others[1] != instance_id and others < mine:
                 on_rival(told)
             elif others[1] != instance_id:
-                self.log(f"second managers of {self._skillset} were started; they have to end")
+                self.log(f"other managers of {self._skillset} were started later; they will end")
 
         self.listen(self.name("alive"), Header, hear, latched(1))
         publisher: Any = self.node.create_publisher(Header, self.name("alive"), ALIVE)

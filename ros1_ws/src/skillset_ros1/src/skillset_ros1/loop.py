@@ -62,7 +62,7 @@ class Loop:
             CannotWaitError: the caller is on this thread, or it has ended.
         """
         if threading.current_thread() is self._thread:
-            raise CannotWaitError("this thread brings all news of the skillset and can't wait for them: use a callback, or another thread")
+            raise CannotWaitError("this thread delivers the skillset's messages and can't wait for them: use a callback, or another thread")
         end_s = float("inf") if timeout_s is None else time.monotonic() + timeout_s
         while not event.wait(min(LONGEST_WAIT_S, max(0.0, end_s - time.monotonic()))):
             if time.monotonic() >= end_s:

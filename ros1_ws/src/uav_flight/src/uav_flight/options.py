@@ -29,7 +29,7 @@ class Options(Namespace):
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add them."""
+    """Add the drone's options to those of any robot's run."""
     parser.add_argument("--rate", type=float, default=1.0, help="simulated seconds per second at most, 0: no limit (default 1)")
     parser.add_argument(
         "--record", choices=["functional", "sensors"], default="functional", help="sensors: functional.bag also holds raw measurements"
@@ -38,8 +38,8 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--sensors",
         metavar="simulated|followed:URL",
-        help="with --autopilot, simulated ones. simulated: ArduPilot flies the simulator's body (its JSON interface); "
-        "followed:URL: they are where the autopilot says over a second MAVLink connection",
+        help="with --autopilot: use simulated sensors. simulated: ArduPilot flies the simulator's body (its JSON interface); "
+        "followed:URL: they follow the position that the autopilot reports over a second MAVLink connection",
     )
     parser.add_argument(
         "--physics-port",
@@ -51,7 +51,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--imperfections",
         default="off",
         metavar="off|realistic|NAME=VALUE,...",
-        help="of the simulated autopilot and sensors (default off)",
+        help="imperfections of the simulated autopilot and sensors (default off)",
     )
 
 
@@ -79,7 +79,7 @@ def read_options(given: Options, scenario: Scenario) -> Mapping[str, Any]:
 def _check_autopilot(given: Options, scenario: Scenario) -> None:
     """Refuse what does not go together with another autopilot, or without one."""
     if given.sensors is not None and given.autopilot is None:
-        raise RequestError("--sensors says what a real autopilot has for sensors; add --autopilot URL")
+        raise RequestError("--sensors is for a real autopilot; add --autopilot URL")
     if given.physics_port is not None and given.sensors != "simulated":
         raise RequestError("--physics-port is where ArduPilot looks for the simulated body; add --autopilot URL --sensors simulated")
     if given.autopilot is None:

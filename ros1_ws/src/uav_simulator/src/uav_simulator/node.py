@@ -164,7 +164,9 @@ class SimulatorNode:
         late_s = self._simulation.flown.late_s(self._simulation.now_s)
         if late_s > LATE_S and time.monotonic() - self._late_told_s >= LATE_TOLD_S:
             self._late_told_s = time.monotonic()
-            rospy.logwarn(f"{late_s:.2f} s behind the autopilot, which does not wait: pictures and sweeps are left out; a slower one helps")
+            rospy.logwarn(
+                f"{late_s:.2f} s behind the autopilot, which does not wait: images and sweeps are dropped; slow the autopilot down"
+            )
         return late_s > LATE_S
 
     def _publish_clock(self) -> None:

@@ -61,7 +61,7 @@ class Camera:
                     return
                 yield np.asarray(frame.to_ndarray(format="rgb24"), dtype=np.uint8)
             if not self._is_file or first_s is None:
-                raise CameraError(f"camera {self._source.name}: no more pictures come")
+                raise CameraError(f"camera {self._source.name}: no more images come")
             self._container.close()
             self._container = self._opened(self._source)
 
@@ -88,7 +88,7 @@ class Camera:
             ) from error
         if not container.streams.video:
             container.close()
-            raise CameraError(f"camera {source.name}: there are no pictures in it")
+            raise CameraError(f"camera {source.name}: it delivers no images")
         return container
 
 
