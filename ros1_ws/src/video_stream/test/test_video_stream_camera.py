@@ -90,7 +90,7 @@ def test_a_source_that_ends_tells_why(film, tmp_path):
     thread = CameraThread(CameraSource(name=str(pipe)), given.append, now_s=lambda: 0.0, ended=told.append)
     thread.start()
     until(lambda: told, "the camera's end", 10.0)
-    assert told == [f"camera {pipe}: no more pictures come"]
+    assert told == [f"camera {pipe}: no more images come"]
     assert len(given) == FRAMES
     thread.close()
     feeder.join(10.0)

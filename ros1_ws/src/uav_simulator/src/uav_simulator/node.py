@@ -164,9 +164,7 @@ class SimulatorNode:
         late_s = self._simulation.flown.late_s(self._simulation.now_s)
         if late_s > LATE_S and time.monotonic() - self._late_told_s >= LATE_TOLD_S:
             self._late_told_s = time.monotonic()
-            rospy.logwarn(
-                f"{late_s:.2f} s behind the autopilot, which does not wait: images and sweeps are dropped; slow the autopilot down"
-            )
+            rospy.logwarn(f"{late_s:.2f} s behind the autopilot, which does not wait: images and sweeps are dropped; slow it down")
         return late_s > LATE_S
 
     def _publish_clock(self) -> None:
