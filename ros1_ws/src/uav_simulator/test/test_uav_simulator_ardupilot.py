@@ -201,7 +201,7 @@ def test_garbage_is_left_alone_and_a_taken_port_is_named(vehicle):
 def test_a_world_whose_home_is_not_its_origin_is_refused_for_an_autopilot_that_counts_from_where_it_stands(kind):
     settings = Settings(vehicle=kind, ardupilot_port=0)
     make_pilot(settings, (0.0, 0.0, 0.0)).close()
-    with pytest.raises(ConfigError, match=r"`home` is \(5, -2, 0\): .* measures froms from where it is switched on"):
+    with pytest.raises(ConfigError, match=r"`home` is \(5, -2, 0\): .* measures from where it is switched on"):
         make_pilot(settings, (5.0, -2.0, 0.0))
     pilot = make_pilot(Settings(mavlink_port=0), (5.0, -2.0, 0.0))
     assert pilot.flown.body.position == (5.0, -2.0, 0.0)

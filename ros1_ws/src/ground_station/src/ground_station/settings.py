@@ -1,4 +1,4 @@
-"""The node's parameters."""
+"""Private parameters of the node `/ground_station`, with their defaults."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class State:
 
     @property
     def matrix(self) -> Floats:
-        """T_map_base, (4, 4)."""
+        """The pose as a transform, T_map_base, (4, 4) float64."""
         transform = np.eye(4)
         transform[:3, :3], transform[:3, 3] = self.rotation, self.position
         return transform

@@ -122,7 +122,7 @@ class LidarInertialOdometry:
 
     @property
     def state(self) -> State:
-        """Where the vehicle is."""
+        """Pose, velocity and biases as the filter has them now."""
         return self.filter.state
 
     def move(self, correction: Floats) -> None:

@@ -83,7 +83,7 @@ class ReadingQueue:
         return taken
 
     def clear(self) -> None:
-        """Forget all."""
+        """Forget all readings, also which was the last."""
         self._readings.clear()
         self._last_ns, self._taken = -1, None
 

@@ -71,7 +71,7 @@ class Registration:
 
     @property
     def believed(self) -> bool:
-        """Whether it was taken."""
+        """Whether the scan was registered: there is no reason of refusal."""
         return not self.refusal
 
     @property

@@ -53,7 +53,7 @@ class Seen:
         return cls(np.arctan2(y, x), z / np.maximum(ranges_m, np.float32(1e-6)), ranges_m)
 
     def select(self, mask: NDArray[np.bool_]) -> Seen:
-        """Return only these points."""
+        """Return the points where the mask (N,) is true."""
         return self if mask.all() else Seen(self.azimuth_rad[mask], self.sine_up[mask], self.ranges_m[mask])
 
 

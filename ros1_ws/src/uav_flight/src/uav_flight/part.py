@@ -80,7 +80,7 @@ class DronePart(RunPart):
         add_options(parser)
 
     def read(self, given: Namespace, scenario: Scenario) -> Mapping[str, Any]:
-        """Check them."""
+        """Return the drone's options as fields of the run; raises RequestError where they do not go together."""
         return read_options(Options(**vars(given)), scenario)
 
     def check_world(self, path: str) -> None:
@@ -172,7 +172,7 @@ class DronePart(RunPart):
         return []
 
     def bring_to_rest(self, clock: Clock) -> None:
-        """Land."""
+        """Have the guidance land the vehicle, and wait until it stands."""
         if clock.now_s is not None:
             from uav_flight.landing import Landing  # late: it needs ROS
 

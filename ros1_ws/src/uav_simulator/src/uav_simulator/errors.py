@@ -1,4 +1,4 @@
-"""The package's errors."""
+"""Errors of the simulator, under one root."""
 
 
 class SimulatorError(Exception):

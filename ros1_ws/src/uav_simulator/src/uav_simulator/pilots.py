@@ -120,7 +120,7 @@ def make_pilot(settings: Settings, home: Vec3) -> Pilot:
     """Return the pilot that the settings name; raises SimulatorError when its port is taken, ConfigError for a home that it can't know."""
     if settings.vehicle != "simulated" and any(home):
         raise ConfigError(
-            f"the world's `home` is ({home[0]:g}, {home[1]:g}, {home[2]:g}): a real autopilot measures positions from where it is switched on; "
+            f"the world's `home` is ({home[0]:g}, {home[1]:g}, {home[2]:g}): a real autopilot measures from where it is switched on; "
             "write the world so that home is [0, 0, 0]"
         )
     if settings.followed_url:

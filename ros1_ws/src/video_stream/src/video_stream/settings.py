@@ -1,4 +1,4 @@
-"""The node's parameters."""
+"""Private parameters of the node `/video_stream`, with their defaults."""
 
 from __future__ import annotations
 

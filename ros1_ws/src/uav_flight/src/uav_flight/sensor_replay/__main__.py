@@ -116,7 +116,7 @@ class Perception:
         offline.install(self._graph)
 
     def run(self) -> None:
-        """Perceive all of it."""
+        """Give every recorded measurement to the nodes, in the order of the bag."""
         with tempfile.TemporaryDirectory() as folder:
             self._graph.now_ns = round(self._source.get_start_time() * 1e9)
             nodes = make_nodes(self._graph, str(Path(folder) / "map.ply"))

@@ -48,7 +48,7 @@ class Graph:
         self._node = ""
 
     def resolve(self, name: str) -> str:
-        """Return a whole name."""
+        """Return the name with the node's namespace where it begins with ``~``."""
         return f"/{self._node}/{name[1:]}" if name.startswith("~") else name
 
     def own_parameters(self) -> dict[str, object]:
@@ -94,11 +94,11 @@ class OfflinePublisher:
         self._topic = graph.resolve(name)
 
     def publish(self, message: Any) -> None:
-        """Publish."""
+        """Give the message to all subscribers of the topic, on this thread."""
         self._graph.publish(self._topic, message)
 
     def get_num_connections(self) -> int:
-        """Return how many listen."""
+        """Return 0: nothing is to be made for subscribers alone."""
         return 0
 
 
@@ -106,12 +106,12 @@ class OfflineSubscription:
     """A topic's reading end; the bag stands for the driver that publishes there."""
 
     def get_num_connections(self) -> int:
-        """Return how many publish."""
+        """Return 1: the bag."""
         return 1
 
 
 class OfflineService:
-    """A service."""
+    """Registers a service's handler in the graph, for calls of this process."""
 
     def __init__(self, graph: Graph, name: str, kind: Any, handler: Callable[[Any], Any]) -> None:
         self.resolved_name = graph.resolve(name)

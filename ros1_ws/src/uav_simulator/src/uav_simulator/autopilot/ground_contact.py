@@ -1,4 +1,4 @@
-"""Believe a touch-down [8]."""
+"""Detects a touch-down as ArduCopter's land detector does [8]."""
 
 from __future__ import annotations
 
