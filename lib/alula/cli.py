@@ -13,6 +13,8 @@ from alula.common.suggestions import nearest
 
 COMMANDS = {
     "check": ("alula.commands.check", "check skill models: errors and warnings, then proofs"),
+    "tree": ("alula.commands.tree", "draw a mission, or tick it without any robot: alula tree FILE [--svg FILE] [--answers FILE]"),
+    "palette": ("alula.commands.palette", "write a robot's skills as a palette for Groot2: alula palette FOLDER"),
     "new": ("alula.scaffold.__main__", "make a robot: alula new robot FOLDER"),
     "run": ("alula.commands.run", "run a scenario over mocks, in virtual time: alula run SCENARIO --mock [--fail WHAT@SECONDS]"),
     "replay": ("alula.commands.replay", "make a recorded mission's decisions again, with one thing changed"),

@@ -13,7 +13,8 @@ from py_trees.common import Status
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition
 from alula.missions.pausing import Pause, PauseRefusedError
-from alula.missions.treeview import NodeView, TreeWatch
+from alula.missions.treeview import TreeWatch
+from alula.trees.view import NodeView
 
 START_TIMEOUT_S = 90.0
 """An autopilot that was just switched on has a position after 42 s, sometimes later."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
 from alula.missions.leaves import Check, SkillLeaf, Stays
+from alula.trees.view import NodeView
 
 INTERRUPTED = "INTERRUPTED"
 KINDS: tuple[tuple[type[Behaviour], str], ...] = (
@@ -22,35 +20,6 @@ KINDS: tuple[tuple[type[Behaviour], str], ...] = (
     (Check, "condition"),
     (Stays, "condition"),
 )
-
-
-@dataclass(frozen=True)
-class NodeView:
-    """A node at one moment; ``status`` is the last one that said something: a node that is left keeps it."""
-
-    name: str
-    kind: str
-    status: str
-    message: str
-    skill: str
-    children: tuple[NodeView, ...]
-
-    def as_dict(self) -> dict[str, object]:
-        """Return what is written as JSON."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "status": self.status,
-            "message": self.message,
-            "skill": self.skill,
-            "children": [child.as_dict() for child in self.children],
-        }
-
-    def walk(self) -> Iterator[NodeView]:
-        """Yield this node and all below, top to bottom."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
 
 
 def kind_of(node: Behaviour) -> str:

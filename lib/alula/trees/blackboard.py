@@ -52,7 +52,8 @@ class Blackboard:
 
     def values(self) -> Mapping[str, object]:
         """Return its own entries that have a value."""
-        return {name: entry.value for name, entry in self._entries.items() if entry.value is not None}
+        # A list is made in one step: a viewer's thread asks, too, while the mission writes.
+        return {name: entry.value for name, entry in list(self._entries.items()) if entry.value is not None}
 
     def entry(self, key: str) -> Entry | None:
         """Return an entry, its own or one above; None when there is none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -68,7 +68,7 @@ class NodeType:
     category: Category
     ports: Mapping[str, Port] = field(default_factory=dict)
     doc: str = ""
-    make: type[Node] | None = None
+    make: Callable[[Wiring], Node] | None = None
     children: tuple[int, int | None] = (0, 0)
     """How many it may have, from and to; None: any number."""
 

@@ -14,6 +14,8 @@ from alula.trees.values import ANY, TYPES
 FORMAT = "4"
 MODELS = "TreeNodesModel"
 CATEGORIES = {category.value: category for category in Category}
+DIRECTIONS = {**{direction.value: direction for direction in Direction}, "bidirectional_port": Direction.INOUT}
+"""Of ports, also as Nav2's palette writes them."""
 PRECONDITIONS = ("_failureIf", "_successIf", "_skipIf", "_while")
 POSTCONDITIONS = ("_onHalted", "_onFailure", "_onSuccess", "_post")
 AUTOREMAP = "_autoremap"
@@ -68,6 +70,13 @@ def read_files(path: Path, report: Report = refuse) -> TreeFiles:
     return _with_main(files, report)
 
 
+def read_models(path: Path) -> Palette:
+    """Return the types of node that a file tells of in its TreeNodesModel; it may have no trees. Raises FileError."""
+    files = TreeFiles()
+    _Reader(files, refuse).add(read_document(path), (path.resolve(),))
+    return files.declared()
+
+
 def read_text(text: str, path: str = "<text>", report: Report = refuse) -> TreeFiles:
     """Read the text of a file; what it includes is looked for beside ``path``. Raises as `read_files`."""
     files = TreeFiles()
@@ -77,7 +86,10 @@ def read_text(text: str, path: str = "<text>", report: Report = refuse) -> TreeF
 
 def _with_main(files: TreeFiles, report: Report) -> TreeFiles:
     root = files.documents[0].root
-    files.main = root.get("main_tree_to_execute") or (next(iter(files.trees)) if len(files.trees) == 1 else "")
+    used = {type_name(one) for tree in files.trees.values() for one in tree.iterate() if one.tag == Category.SUBTREE.value}
+    tops = [name for name in files.trees if name not in used]
+    tops = [name for name in tops if files.trees[name].place.path == files.path] or tops
+    files.main = root.get("main_tree_to_execute") or (tops[0] if len(tops) == 1 else "")
     if not files.trees:
         report(Problem(root.place, "has no <BehaviorTree>", "a file of missions needs one"))
     elif not files.main:
@@ -149,11 +161,11 @@ def _models(element: Element, report: Report) -> Iterator[NodeType]:
         if category is None or not one.get("ID"):
             report(Problem(one.place, f"<{one.tag}> is no model of a node", 'write <Action ID="..."> or another category'))
         else:
-            ports = [_port(port) for port in one.children if port.tag in {direction.value for direction in Direction}]
+            ports = [_port(port) for port in one.children if port.tag in DIRECTIONS]
             yield node_type(one.get("ID"), category, ports)
 
 
 def _port(element: Element) -> Port:
     default = element.get("default") if "default" in element.attributes else None
     doc = element.get("description") or "".join(part for part in element.content if isinstance(part, str)).strip()
-    return Port(element.get("name"), TYPES.get(element.get("type"), ANY), Direction(element.tag), default, doc)
+    return Port(element.get("name"), TYPES.get(element.get("type"), ANY), DIRECTIONS[element.tag], default, doc)

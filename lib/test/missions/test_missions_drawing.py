@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("py_trees")
 
 from alula.missions.drawing import NOTE_LETTERS, draw
-from alula.missions.treeview import NodeView
+from alula.trees.view import NodeView
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -13,12 +13,11 @@ from alula.trees.groot.protocol import Status, Transition
 
 @pytest.fixture
 def written(tmp_path) -> Path:
-    now = [5_000_000]
+    now_us = 5_000_000
     path = tmp_path / "run.btlog"
-    log = LogWriter(path, "<root/>", lambda: now[0])
-    log.changed(258, Status.IDLE, Status.RUNNING)
-    now[0] += (1 << 32) + 3
-    log.changed(1, Status.RUNNING, Status.SKIPPED)
+    log = LogWriter(path, "<root/>", now_us)
+    log.take([(258, Status.IDLE, Status.RUNNING)], now_us)
+    log.take([(1, Status.RUNNING, Status.SKIPPED)], now_us + (1 << 32) + 3)
     log.close()
     return path
 
@@ -41,11 +40,10 @@ def test_it_reads_back(written):
     assert log.transitions == (Transition(0, 258, Status.RUNNING), Transition((1 << 32) + 3, 1, Status.SKIPPED))
 
 
-def test_what_was_flushed_is_there_without_an_end(tmp_path):
-    log = LogWriter(tmp_path / "run.btlog", "<root/>", lambda: 0)
-    log.changed(1, Status.IDLE, Status.RUNNING)
+def test_what_was_taken_is_there_without_an_end(tmp_path):
+    log = LogWriter(tmp_path / "run.btlog", "<root/>", 0)
     assert read_log(tmp_path / "run.btlog").transitions == ()
-    log.flush()
+    log.take([(1, Status.IDLE, Status.RUNNING)], 0)
     assert len(read_log(tmp_path / "run.btlog").transitions) == 1
     log.close()
 
@@ -86,9 +84,7 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 
 def test_a_full_disk_ends_the_log_and_not_the_flight():
-    log = LogWriter(Path("/dev/full"), "<root/>", lambda: 0)
+    log = LogWriter(Path("/dev/full"), "<root/>", 0)
     assert log.error == "full ends early: No space left on device"
-    for _ in range(10_000):
-        log.changed(1, Status.IDLE, Status.RUNNING)
-    log.flush()
+    log.take([(1, Status.IDLE, Status.RUNNING)], 0)
     log.close()

@@ -14,12 +14,12 @@ pytest.importorskip("zmq")
 
 import msgpack
 import zmq
+from trees_viewer import Viewer
 
 from alula.trees.groot.protocol import Request, Status
-from alula.trees.groot.server import NO_HOOKS, Address, Server, ServerError, Shown
-from alula.trees.groot.states import KEPT_TRANSITIONS, NodeStates
+from alula.trees.groot.server import NO_HOOKS, Address, Server, ServerError
+from alula.trees.groot.states import KEPT_TRANSITIONS, NodeStates, Shown
 
-TIMEOUT_MS = 20_000
 IDLE, RUNNING, SUCCESS = b"\x00", b"\x01", b"\x02"
 
 
@@ -34,20 +34,8 @@ class Rig:
         shown = Shown("<root/>", self.states, {"Main": lambda: self.values, "Sub::4": dict})
         self.server = Server(shown, Address(port=0))
 
-
-class Viewer:
-    def __init__(self, address: Address) -> None:
-        self.socket = zmq.Context.instance().socket(zmq.REQ)
-        self.socket.setsockopt(zmq.RCVTIMEO, TIMEOUT_MS)
-        self.socket.setsockopt(zmq.LINGER, 0)
-        self.socket.connect(f"tcp://{address.host}:{address.port}")
-
-    def raw(self, *parts: bytes) -> list[bytes]:
-        self.socket.send_multipart(parts)
-        return self.socket.recv_multipart()
-
-    def ask(self, request: str, *more: bytes) -> list[bytes]:
-        return self.raw(struct.pack("<BBI", 2, ord(request), 77), *more)
+    def change(self, uid: int, previous: Status, status: Status) -> None:
+        self.states.take([(uid, previous, status)], self.now_us)
 
 
 @pytest.fixture
@@ -77,10 +65,10 @@ def test_a_reply_begins_with_the_request_and_the_trees_own_number(rig, viewer):
 
 def test_a_status_is_the_last_one_plus_ten_once_a_node_is_idle(rig, viewer):
     assert viewer.ask("S")[1] == b"\x01\x00" + IDLE + b"\x02\x01" + IDLE
-    rig.states.changed(1, Status.IDLE, Status.RUNNING)
-    rig.states.changed(258, Status.RUNNING, Status.SUCCESS)
+    rig.change(1, Status.IDLE, Status.RUNNING)
+    rig.change(258, Status.RUNNING, Status.SUCCESS)
     assert viewer.ask("S")[1] == b"\x01\x00" + RUNNING + b"\x02\x01" + SUCCESS
-    rig.states.changed(258, Status.SUCCESS, Status.IDLE)
+    rig.change(258, Status.SUCCESS, Status.IDLE)
     assert viewer.ask("S")[1][-1] == 12
 
 
@@ -88,7 +76,7 @@ def test_blackboards_come_by_the_names_of_subtrees(viewer):
     # Keys in order; a number as short as it can be without a loss.
     plain = {"at": {"y": 2, "z": 1}, "big": str(1 << 70), "far": 1e300, "height": 2.5, "names": ["a", None, True], "third": 1 / 3, "x": 1}
     packed = viewer.ask("B", b"Main;nowhere;Sub::4")[1]
-    assert msgpack.unpackb(packed) == {"Main": plain, "Sub::4": {}}
+    assert msgpack.unpackb(packed) == {"Main": plain, "Sub::4": None}
     assert list(msgpack.unpackb(packed)["Main"]) == sorted(plain)
     assert b"\xa6height\xca\x40\x20\x00\x00" in packed
     assert viewer.ask("B", b"nowhere")[1] == b"\xc0"
@@ -103,12 +91,12 @@ def test_a_value_that_can_not_be_read_is_told_to_its_viewer(rig, viewer):
 
 
 def test_transitions_are_recorded_from_start_to_stop_in_mission_time(rig, viewer):
-    rig.states.changed(1, Status.IDLE, Status.RUNNING)
+    rig.change(1, Status.IDLE, Status.RUNNING)
     assert viewer.ask("r", b"start")[1] == b"7000000"
     rig.now_us += (1 << 33) + 5
-    rig.states.changed(1, Status.RUNNING, Status.IDLE)
+    rig.change(1, Status.RUNNING, Status.IDLE)
     viewer.ask("r", b"stop")
-    rig.states.changed(1, Status.IDLE, Status.RUNNING)
+    rig.change(1, Status.IDLE, Status.RUNNING)
     # microseconds (6 bytes), uid, status
     assert viewer.ask("t")[1] == b"\x05\x00\x00\x00\x02\x00" + b"\x01\x00" + IDLE
     assert viewer.ask("t")[1] == b""
@@ -118,7 +106,7 @@ def test_a_recording_that_nobody_fetches_keeps_the_newest(rig, viewer):
     viewer.ask("r", b"start")
     for n in range(KEPT_TRANSITIONS + 3):
         rig.now_us = 7_000_000 + n
-        rig.states.changed(1, Status.IDLE, Status.RUNNING)
+        rig.change(1, Status.IDLE, Status.RUNNING)
     kept = viewer.ask("t")[1]
     assert len(kept) == 9 * KEPT_TRANSITIONS
     assert kept[0] == 3

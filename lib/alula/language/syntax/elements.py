@@ -53,10 +53,10 @@ def read_data(cursor: Cursor) -> Data:
     # `data { a: T  period: U }` has a second data of that name.
     another = cursor.ahead().text == ":" and cursor.ahead(2).kind is Kind.NAME
     period = setting(cursor, "period") if cursor.at("period") and not another else None
-    return Data(name.text, kind.text, period, _told_unit(cursor.previous.comment), span=cursor.span(name, kind))
+    return Data(name.text, kind.text, period, told_unit(cursor.previous.comment), span=cursor.span(name, kind))
 
 
-def _told_unit(comment: str) -> str:
+def told_unit(comment: str) -> str:
     """Return the unit that a comment begins with, as `Hz` or `m/s, over the ground`; else nothing."""
     unit = re.split(r"[,;:]", comment, maxsplit=1)[0].strip()
     return unit if unit in KIND_OF_UNIT else ""

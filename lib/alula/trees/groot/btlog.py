@@ -11,12 +11,12 @@ from __future__ import annotations
 import contextlib
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from alula.trees.groot.protocol import ProtocolError, Status, Transition
+from alula.trees.groot.protocol import Change, ProtocolError, Transition, pack_transitions
 
 SUFFIX = ".btlog"
 MAGIC = b"BTCPP4-FileLogger2"
@@ -32,38 +32,33 @@ class LogError(Exception):
 class LogWriter:
     """Writes a log while the tree is ticked. A disk that is full ends the log, not the flight: ``error`` says so from then on.
 
-    ``clock_us``: mission clock, microseconds. What was flushed survives a crash of the process.
+    ``now_us``: mission clock, microseconds, as `take` is told it. What `take` was given survives a crash of the process.
     """
 
-    def __init__(self, path: Path, xml: str, clock_us: Callable[[], int]) -> None:
+    def __init__(self, path: Path, xml: str, now_us: int) -> None:
         """Raises OSError when the file can't be made."""
         self.error = ""
         self._name = path.name
-        self._clock_us = clock_us
-        self._began_us = clock_us()
-        self._waiting = bytearray()
+        self._began_us = now_us
         self._file: BinaryIO = path.open("wb")
         content = xml.encode()
-        self._waiting += MAGIC + bytes([VERSION]) + _LENGTH.pack(len(content)) + content + _DATE.pack(time.time_ns() // 1000)
-        self.flush()
+        self._write(MAGIC + bytes([VERSION]) + _LENGTH.pack(len(content)) + content + _DATE.pack(time.time_ns() // 1000))
 
-    def changed(self, uid: int, _previous: Status, status: Status) -> None:
-        """Write that a node changed its status now."""
-        self._waiting += Transition(self._clock_us() - self._began_us, uid, status).pack()
+    def take(self, changes: Sequence[Change], now_us: int) -> None:
+        """Write what has changed in a tick, in the order of the changes."""
+        self._write(pack_transitions(changes, now_us - self._began_us))
 
-    def flush(self) -> None:
-        """Hand to the system what came since the last time; to be called after each tick."""
-        if self._waiting and not self.error:
-            try:
-                self._file.write(self._waiting)
-                self._file.flush()
-            except OSError as error:
-                self.error = f"{self._name} ends early: {error.strerror or error}"
-        self._waiting.clear()
+    def _write(self, data: bytes) -> None:
+        if self.error:
+            return
+        try:
+            self._file.write(data)
+            self._file.flush()
+        except OSError as error:
+            self.error = f"{self._name} ends early: {error.strerror or error}"
 
     def close(self) -> None:
-        """Write what is still buffered and close the file."""
-        self.flush()
+        """Close the file."""
         with contextlib.suppress(OSError):
             self._file.close()
 

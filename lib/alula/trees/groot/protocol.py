@@ -7,8 +7,10 @@ a reply is the header again with the tree's UUID, for most a second part; a refu
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from typing import TypeAlias
 
 PROTOCOL = 2
 DEFAULT_PORT = 1667
@@ -76,20 +78,19 @@ class Header:
         return _HEADER.pack(PROTOCOL, self.request.value, self.number) + tree
 
 
+Change: TypeAlias = tuple[int, int, int]
+"""Of a node: its uid, what it was, what it is, by the numbers of `Status`."""
+
+
 @dataclass(frozen=True)
 class Transition:
-    """A node's change of status; ``at_us``: microseconds since the recording began."""
+    """A node's change of status as records have it; ``at_us``: microseconds since the record began."""
 
     at_us: int
     uid: int
     status: Status
 
     SIZE = _TRANSITION.size
-
-    def pack(self) -> bytes:
-        """Return the record's nine bytes: time in microseconds (6), node id (2), status (1)."""
-        at_us = min(max(self.at_us, 0), _LONGEST_US)
-        return _TRANSITION.pack(at_us & 0xFFFFFFFF, at_us >> 32, self.uid, self.status)
 
     @classmethod
     def unpack(cls, data: bytes) -> Transition:
@@ -99,6 +100,12 @@ class Transition:
             return cls(high << 32 | low, uid, Status(status))
         except ValueError:
             raise ProtocolError(f"there is no status {status}; a status is 0 to {max(Status)}") from None
+
+
+def pack_transitions(changes: Iterable[Change], at_us: int) -> bytes:
+    """Return the nine bytes of each change, all of one moment."""
+    moment, pack = min(max(at_us, 0), _LONGEST_US).to_bytes(6, "little"), _STATUS.pack
+    return moment.join([b"", *[pack(uid, status) for uid, _, status in changes]])
 
 
 def pack_status(uid: int, code: int) -> bytes:

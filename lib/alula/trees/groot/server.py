@@ -19,7 +19,7 @@ import zmq
 
 from alula.common.network import free_port
 from alula.trees.groot.protocol import DEFAULT_PORT, REFUSAL, Header, ProtocolError, Request
-from alula.trees.groot.states import NodeStates
+from alula.trees.groot.states import Shown
 from alula.trees.groot.values import pack_values
 
 LOOPBACK = "127.0.0.1"
@@ -31,7 +31,6 @@ NO_HOOKS = "a mission takes no breakpoints and no results from a viewer"
 NO_HOOK = "Node ID not found"
 TWO_PARTS = "must be 2 parts message"
 
-Values = Callable[[], Mapping[str, object]]
 Handler = Callable[["Server", str], list[bytes]]
 
 
@@ -55,15 +54,6 @@ class Address:
         if not port.isdecimal() or not 0 <= int(port) < LAST_PORT:
             raise ServerError(f"'{text}' is no [HOST:]PORT: the port is a number from 1 to {LAST_PORT - 1}, as 1667")
         return cls(host or LOOPBACK, int(port))
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A tree as viewers see it. ``values``: of each subtree's blackboard, by its name; called by the server's thread."""
-
-    xml: str
-    states: NodeStates
-    values: Mapping[str, Values]
 
 
 class Server:
@@ -163,7 +153,7 @@ HANDLERS: Mapping[Request, Handler] = {
     Request.STATUS: lambda server, _: [server.shown.states.codes()],
     Request.BLACKBOARD: Server._values,  # noqa: SLF001
     Request.TOGGLE_RECORDING: Server._record,  # noqa: SLF001
-    Request.GET_TRANSITIONS: lambda server, _: [b"".join(one.pack() for one in server.shown.states.fetch())],
+    Request.GET_TRANSITIONS: lambda server, _: [server.shown.states.fetch()],
     Request.HOOKS_DUMP: lambda _server, _: [b"[]"],
     Request.REMOVE_ALL_HOOKS: lambda _server, _: [],
     Request.DISABLE_ALL_HOOKS: lambda _server, _: [],

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from threading import Lock
 
-from alula.trees.groot.protocol import IDLE_FROM, Status, Transition, pack_status
+from alula.trees.groot.protocol import IDLE_FROM, Change, Status, Transition, pack_status, pack_transitions
 
 KEPT_TRANSITIONS = 1000
 """Of a recording that nobody fetches, the newest; as many as BehaviorTree.CPP keeps."""
+
+Values = Callable[[], Mapping[str, object]]
 
 
 class NodeStates:
@@ -29,15 +32,17 @@ class NodeStates:
             self._places[uid] = len(self._codes) - 1
         self._recording = False
         self._began_us = 0
-        self._transitions: deque[Transition] = deque(maxlen=KEPT_TRANSITIONS)
+        self._transitions: deque[bytes] = deque(maxlen=KEPT_TRANSITIONS)
 
-    def changed(self, uid: int, previous: Status, status: Status) -> None:
-        """Take a node's change; called by the mission, in the order of the changes."""
-        code = IDLE_FROM + previous if status is Status.IDLE else status
+    def take(self, changes: Sequence[Change], now_us: int) -> None:
+        """Take what has changed in a tick, in the order of the changes; called by the mission."""
         with self._lock:
-            self._codes[self._places[uid]] = code
+            codes, places = self._codes, self._places
+            for uid, previous, status in changes:
+                codes[places[uid]] = status or IDLE_FROM + previous
             if self._recording:
-                self._transitions.append(Transition(self._clock_us() - self._began_us, uid, status))
+                packed = pack_transitions(changes, now_us - self._began_us)
+                self._transitions.extend(packed[at : at + Transition.SIZE] for at in range(0, len(packed), Transition.SIZE))
 
     def codes(self) -> bytes:
         """Return the reply to STATUS: three bytes a node."""
@@ -56,9 +61,18 @@ class NodeStates:
         with self._lock:
             self._recording = False
 
-    def fetch(self) -> list[Transition]:
-        """Return what was recorded since the start or the last call."""
+    def fetch(self) -> bytes:
+        """Return what was recorded since the start or the last call: nine bytes a transition."""
         with self._lock:
-            transitions = list(self._transitions)
+            transitions = b"".join(self._transitions)
             self._transitions.clear()
         return transitions
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A tree as viewers see it. ``values``: of each subtree's blackboard, by its name; called by the server's thread."""
+
+    xml: str
+    states: NodeStates
+    values: Mapping[str, Values]

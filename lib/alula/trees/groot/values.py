@@ -13,8 +13,8 @@ _FLOAT32 = struct.Struct("<f")
 
 
 def pack_values(values: Mapping[str, Mapping[str, object]]) -> bytes:
-    """Return the values on blackboards of subtrees, by the subtrees' names; null where there is none of them."""
-    return _packed(to_plain(values) if values else None)
+    """Return the values on blackboards of subtrees, by the subtrees' names; null where there is nothing."""
+    return _packed({name: to_plain(board) or None for name, board in values.items()} or None)
 
 
 def _packed(value: object) -> bytes:

@@ -1,0 +1,58 @@
+"""``alula palette FOLDER``: the skills, resources and own nodes of a robot as a TreeNodesModel, which Groot2 imports.
+
+Ends with 0, and with 2 when a model is wrong or can't be read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+
+from alula.language.errors import LanguageError, has_errors
+from alula.language.models import ModelFile, check_files, models_in
+from alula.missions.skill_types import resource_type, skill_type
+from alula.trees.groot.tree_xml import model_xml
+from alula.trees.palette import NodeType
+
+WRONG = 2
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Write the palette to the standard output; return the exit code."""
+    parser = argparse.ArgumentParser(prog="alula palette", description="Write a robot's skills as a TreeNodesModel for Groot2.")
+    parser.add_argument("folder", metavar="FOLDER", help="the robot's models, as skillsets/uav")
+    given = parser.parse_args(words)
+    try:
+        types = list(robot_types(given.folder))
+    except LanguageError as error:
+        sys.stderr.write(f"{error}\n")
+        return WRONG
+    sys.stdout.write(model_xml(types))
+    return 0
+
+
+def robot_types(folder: str) -> Iterator[NodeType]:
+    """Yield the types of node of a folder of models; raises LanguageError."""
+    files = check_files(models_in(folder))
+    for file in files:
+        if has_errors(file.findings):
+            raise LanguageError(file.findings)
+    for file in files:
+        for skillset in file.skillsets:
+            yield from (skill_type(skillset.name, skill, told_above(file, skill.span.line)) for skill in skillset.skills)
+            yield from (resource_type(skillset.name, resource) for resource in skillset.resources)
+
+
+def told_above(file: ModelFile, line: int) -> str:
+    """Return the comment that stands above a line, its first paragraph."""
+    told: list[str] = []
+    while file.line(line - 1).strip().startswith("//"):
+        line -= 1
+        told.insert(0, file.line(line).strip()[2:].strip())
+    paragraph = told[: told.index("")] if "" in told else told
+    return " ".join(paragraph)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,79 @@
+"""``alula tree FILE``: draw a mission, and tick it without any robot.
+
+Ends with 0, and with 2 when a file can't be read or is wrong, or the tree can't be ticked.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from alula.common.files import write_text
+from alula.missions.drawing import draw, drawn_as_text
+from alula.trees import nav2
+from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
+from alula.trees.errors import TreeError
+from alula.trees.palette import Palette
+from alula.trees.reading import TreeFiles, read_files, read_models
+from alula.trees.standard import standard_palette
+from alula.trees.view import view_of
+
+WRONG = 2
+DEFAULT_TICKS = 10
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Draw; return the exit code."""
+    given = _parser().parse_args(words)
+    try:
+        return run(given)
+    except (AnswersError, TreeError, OSError) as error:
+        sys.stderr.write(f"alula tree: {error}\n")
+        return WRONG
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="alula tree", description="Draw a mission; with answers tick it without any robot.")
+    parser.add_argument("file", type=Path, metavar="FILE", help="a mission: BehaviorTree.CPP 4's XML")
+    parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
+    parser.add_argument(
+        "--palette", type=Path, action="append", default=[], metavar="FILE", help="a TreeNodesModel with more types of node, as Groot2's"
+    )
+    parser.add_argument("--answers", type=Path, metavar="FILE", help='what leaves answer: {"leaf name": ["RUNNING", "SUCCESS"], ...}')
+    parser.add_argument("--ticks", type=int, metavar="N", help=f"with answers, how often it is ticked ({DEFAULT_TICKS})")
+    parser.add_argument("--json", action="store_true", help="print the tree, or each tick, as JSON")
+    return parser
+
+
+def run(given: argparse.Namespace) -> int:
+    """Do what is asked for; raises AnswersError, TreeError, OSError."""
+    if given.ticks is not None and (given.ticks < 0 or given.answers is None):
+        raise AnswersError(f"--ticks {given.ticks}: is a number of ticks, and goes with --answers FILE")
+    files = read_files(given.file)
+    answers = Answers({}) if given.answers is None else read_answers(given.answers)
+    clock = StepClock()
+    tree = scripted_tree(files, palette(files, given.palette), answers, clock)
+    if given.answers is not None:
+        for tick in ticks(tree, answers, DEFAULT_TICKS if given.ticks is None else given.ticks, clock):
+            sys.stdout.write((tick.as_json() if given.json else tick.as_text()) + "\n")
+    view, title = view_of(tree.root), f"{given.file.name}: {files.main}"
+    if given.svg is not None:
+        write_text(given.svg, draw(view, title))
+    if given.answers is None:
+        sys.stdout.write(json.dumps(view.as_dict()) + "\n" if given.json else drawn_as_text(view, title))
+    return 0
+
+
+def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:
+    """Return the types of node that there are: of the file, of palettes, BehaviorTree.CPP's and Nav2's own; raises TreeError."""
+    known = Palette([*files.declared(), *(one for path in more for one in read_models(path))])
+    for own in (standard_palette(), nav2.palette()):
+        known |= own
+    return known
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,53 @@
+"""Skills and resources of a robot's models as types of node: what a mission's file may name, and what ports it has."""
+
+from __future__ import annotations
+
+from alula.language.syntax.elements import told_unit
+from alula.model.model import Parameter, Resource, ResultKind, Skill
+from alula.model.ros_types import PRIMITIVES
+from alula.trees.palette import Category, Direction, NodeType, Port, node_type
+from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, UINT, PortType
+
+SUCCESS_PORT = "success"
+OUTCOME_PORT = "outcome"
+STATE_PORT = "state"
+SEPARATOR = ";"
+"""Between the results that a port names."""
+PYTHON_TYPES = {"bool": BOOL, "int": INT, "float": DOUBLE, "str": STRING}
+
+
+def skill_type(skillset: str, skill: Skill, doc: str = "") -> NodeType:
+    """Return a skill's: its inputs and outputs, which results are a success, and what to write of its end."""
+    successes = SEPARATOR.join(one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS)
+    results = ", ".join(one.name for one in skill.results)
+    ports = [
+        *(_port(one, Direction.INPUT) for one in skill.inputs),
+        *(_port(one, Direction.OUTPUT) for one in skill.outputs),
+        Port(
+            SUCCESS_PORT, STRING, Direction.INPUT, successes, f"results that mean success, of {results}" if results else "it has no results"
+        ),
+        Port(OUTCOME_PORT, STRING, Direction.OUTPUT, None, "why it ended: its result, or how it failed"),
+    ]
+    return node_type(f"{skillset}.{skill.name}", Category.ACTION, ports, doc=doc)
+
+
+def resource_type(skillset: str, resource: Resource) -> NodeType:
+    """Return a resource's: a condition that asks for its state."""
+    port = Port(STATE_PORT, STRING, Direction.INPUT, None, f"one of {', '.join(resource.states)}", required=True)
+    return node_type(f"{skillset}.{resource.name}", Category.CONDITION, [port], doc=f"asks for the state of {resource.name}")
+
+
+def _port(parameter: Parameter, direction: Direction) -> Port:
+    required = direction is Direction.INPUT and not parameter.default
+    kind = type_of(parameter.type)
+    return Port(
+        parameter.name, kind, direction, parameter.default or None, parameter.comment, told_unit(parameter.comment), required=required
+    )
+
+
+def type_of(name: str) -> PortType:
+    """Return the type of a port for a type of the models; what is no primitive has its name and takes any value."""
+    if name.startswith("uint"):
+        return UINT
+    python = PRIMITIVES.get(name)
+    return PYTHON_TYPES[python] if python else PortType(name, ANY.parse, ANY.cast)
