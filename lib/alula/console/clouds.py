@@ -8,12 +8,11 @@ from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
+from plyfile import PlyData, PlyParseError
 
 MAX_POINTS = 30_000
 CELL_M = 0.2
-MAX_HEADER_BYTES = 4096
 MAX_STEPS = 65_000
-_TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1", "uint8": "u1", "int": "<i4", "uint": "<u4"}
 
 Floats = NDArray[np.float64]
 
@@ -33,35 +32,20 @@ class Packed(TypedDict):
 
 
 def read_points(path: Path) -> Floats:
-    """Return the finite vertices of a binary PLY file, (N, 3), metres.
+    """Return the finite vertices of a PLY file, (N, 3), metres.
 
     Raises:
         CloudError: it can't be read.
     """
     try:
-        content = path.read_bytes()
+        vertices = PlyData.read(str(path), mmap=False)["vertex"].data
+        points = np.column_stack([np.asarray(vertices[axis], dtype=np.float64) for axis in "xyz"])
     except OSError as error:
         raise CloudError(f"{path.name}: {error.strerror}") from error
-    head, mark, _ = content[:MAX_HEADER_BYTES].partition(b"end_header\n")
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    if not mark or lines[:1] != [["ply"]] or ["format", "binary_little_endian", "1.0"] not in lines:
-        raise CloudError(f"{path.name}: is no binary PLY file")
-    elements = [line for line in lines if line[:1] == ["element"]]
-    begin = lines.index(elements[0]) if elements and elements[0][1] == "vertex" else -1
-    fields: list[tuple[str, str]] = []
-    for line in lines[begin + 1 :] if begin >= 0 else []:
-        if line[:1] == ["element"]:
-            break
-        if len(line) == 3 and line[0] == "property" and line[1] in _TYPES:
-            fields.append((line[2], _TYPES[line[1]]))
-    if not {"x", "y", "z"} <= {name for name, _ in fields}:
-        raise CloudError(f"{path.name}: has no vertices with x, y and z")
-    kind, count = np.dtype(fields), int(elements[0][2])
-    body = content[len(head) + len(mark) :]
-    if len(body) < count * kind.itemsize:
-        raise CloudError(f"{path.name}: is cut off")
-    rows = np.frombuffer(body, kind, count)
-    points = np.column_stack([rows[axis].astype(np.float64) for axis in "xyz"])
+    except KeyError as error:
+        raise CloudError(f"{path.name}: has no {error.args[0]}") from error
+    except (PlyParseError, ValueError) as error:
+        raise CloudError(f"{path.name}: {error}") from error
     return np.asarray(points[np.isfinite(points).all(axis=1)])
 
 

@@ -64,6 +64,8 @@ def test_files_are_whole_and_come_back(tmp_path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["map.ply"]
     with pytest.raises(OSError, match="nowhere"):
         write_ply(tmp_path / "nowhere" / "map.ply", points)
-    path.write_bytes(path.read_bytes()[:-5])
-    with pytest.raises(ValueError, match="not a map of ours"):
-        read_ply(path)
+    whole = path.read_bytes()
+    for content in (whole[:-5], b"", b"\xff\xfe\n", b"ply\nformat ascii 1.0\nend_header\n", whole.replace(b"float z", b"float q")):
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match=r"map\.ply is no map: "):
+            read_ply(path)

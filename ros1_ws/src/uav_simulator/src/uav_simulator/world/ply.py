@@ -6,29 +6,19 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from plyfile import PlyData, PlyElement
 
-_HEADER = """ply
-format binary_little_endian 1.0
-comment true surfaces, frame map (ENU), metres
-element vertex {vertices}
-property float x
-property float y
-property float z
-element face {faces}
-property list uchar int vertex_indices
-end_header
-"""
+_VERTEX = np.dtype([(axis, "<f4") for axis in "xyz"])
+_FACE = np.dtype([("vertex_indices", "<i4", (3,))])
 
 
 def write_mesh(path: Path, vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> None:
     """Write the mesh aside and rename it, so that a reader never meets half a file."""
-    faces = np.empty(len(triangles), dtype=[("count", "u1"), ("index", "<i4", 3)])
-    faces["count"] = 3
-    faces["index"] = triangles
+    elements = [
+        PlyElement.describe(np.ascontiguousarray(vertices, dtype="<f4").view(_VERTEX)[:, 0], "vertex"),
+        PlyElement.describe(triangles.astype("<i4").view(_FACE)[:, 0], "face"),
+    ]
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = path.with_name(path.name + ".part")
-    with aside.open("wb") as file:
-        file.write(_HEADER.format(vertices=len(vertices), faces=len(triangles)).encode("ascii"))
-        file.write(vertices.astype("<f4").tobytes())
-        file.write(faces.tobytes())
+    PlyData(elements, byte_order="<", comments=["true surfaces, frame map (ENU), metres"]).write(str(aside))
     aside.replace(path)
