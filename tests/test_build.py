@@ -63,7 +63,7 @@ def message_package(folder: Path, message: str, *needs: str) -> None:
     depends = "".join(f"<depend>{name}</depend>" for name in ("message_generation", "message_runtime", *needs))
     (folder / "package.xml").write_text(
         f'<package format="2"><name>{folder.name}</name><version>0.1.0</version><description>A message.</description>'
-        '<maintainer email="alula@alula-robotics.org">Alula</maintainer><license>Apache-2.0</license>'
+        '<maintainer email="developers@alula.example.org">Alula</maintainer><license>Apache-2.0</license>'
         f"<buildtool_depend>catkin</buildtool_depend>{depends}</package>"
     )
 
@@ -160,7 +160,7 @@ def python_package(folder: Path) -> None:
     (folder / "setup.py").write_text(SETUP_PY.format(name=name))
     (folder / "package.xml").write_text(
         f'<package format="3"><name>{name}</name><version>0.1.0</version><description>A driver.</description>'
-        '<maintainer email="alula@alula-robotics.org">Alula</maintainer><license>Apache-2.0</license>'
+        '<maintainer email="developers@alula.example.org">Alula</maintainer><license>Apache-2.0</license>'
         "<export><build_type>ament_python</build_type></export></package>"
     )
 

@@ -12,7 +12,7 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="The Alula developers",
-    maintainer_email="alula@alula-robotics.org",
+    maintainer_email="developers@alula.example.org",
     description="A panel in the terminal that shows running skillsets and controls them manually.",
     license="Apache-2.0",
     entry_points={"console_scripts": ["panel = skill_panel.__main__:main"]},

@@ -11,7 +11,7 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="The Alula developers",
-    maintainer_email="alula@alula-robotics.org",
+    maintainer_email="developers@alula.example.org",
     description="Missions of the drone as Behaviour Trees whose leaves are skills",
     license="Apache-2.0",
 )

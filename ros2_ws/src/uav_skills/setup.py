@@ -11,7 +11,7 @@ setup(
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="The Alula developers",
-    maintainer_email="alula@alula-robotics.org",
+    maintainer_email="developers@alula.example.org",
     description="What the drone's skills do",
     license="Apache-2.0",
     entry_points={

@@ -39,7 +39,7 @@ $package_data    data_files=[
     install_requires=["setuptools"],
     zip_safe=True,
     maintainer="The Alula developers",
-    maintainer_email="alula@alula-robotics.org",
+    maintainer_email="developers@alula.example.org",
     description="$subject.",
     license="Apache-2.0",
 $entry_points)

@@ -9,7 +9,7 @@ from alula.language.robot import Robot
 from alula.model.model import Skillset
 from alula.model.ros_types import RosType
 
-MAINTAINER = '<maintainer email="alula@alula-robotics.org">The Alula developers</maintainer>'
+MAINTAINER = '<maintainer email="developers@alula.example.org">The Alula developers</maintainer>'
 
 
 def header(robot: Robot, skillset: Skillset) -> str:
