@@ -3,6 +3,9 @@
 The rule (ROS wiki, "ROS/Technical Overview", and what genmsg does): constants first, in order, as ``type name=value``; then
 fields as ``type name``, where a message type is replaced by its own sum; comments and blanks removed. A service's sum is taken
 over the texts of request and response, one behind the other without anything between.
+
+Not rosbags' ``generate_msgdef``: it knows no services, sums constants by their values instead of as they are written (``0x10`` as
+``16``), and takes underscores off the ends of names. A peer with the other sum refuses the connection. A test tells when it is right.
 """
 
 from __future__ import annotations

@@ -185,6 +185,18 @@ def test_constants_count_for_the_sum_as_they_are_written(tmp_path):
     assert "MSG: std_msgs/Header" in one.full_text
 
 
+@pytest.mark.parametrize("line", ["uint8 MASK=0x10", "float64 TINY=1e-3", "bool ON=true", "int32 class_"])
+def test_rosbags_own_sum_is_not_ros_1s(tmp_path, line):
+    """Why the bridge has sums of its own (``ros1_definition``): when this fails, rosbags' are good enough."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(line, "odd_msgs/msg/Odd"))
+    md5sum = hashlib.md5(line.encode(), usedforsecurity=False).hexdigest()  # the rule, for a text without comments and blanks
+    assert store.generate_msgdef("odd_msgs/msg/Odd")[1] != md5sum
+    assert Types([package(tmp_path, "odd_msgs", msg_Odd=line)]).message("odd_msgs/Odd").md5sum == md5sum
+
+
 def test_unknown_types_say_where_was_looked_and_what_to_do(tmp_path):
     types = Types([tmp_path])
     with pytest.raises(TypeUnknownError, match=r"no_msgs/No: no no_msgs/msg/No.msg in .*share; build the package"):

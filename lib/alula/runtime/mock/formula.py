@@ -2,6 +2,9 @@
 
 Python's arithmetic, comparisons, ``and``, ``or``, ``not``, ``a if b else c``, fields and elements; nothing else. Names are the
 inputs of the skill, the mock's memory, and what the place offers (``t``, ``f``, ``delay``).
+
+Not ``simpleeval``: it finds what is not allowed, and names that are not known, when it evaluates a formula. A file of behaviour is
+refused when it is read, with its line; a formula in a branch that a run does not take counts, too.
 """
 
 from __future__ import annotations
