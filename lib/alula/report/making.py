@@ -14,8 +14,9 @@ from alula.common.record import FILE as RECORD
 from alula.common.scenarios import load_scenario
 from alula.console.entries import FAULT, Wire
 from alula.console.page import write_report
+from alula.records.causes.alarms import Alarms
 from alula.records.causes.effects import EffectsByFault
-from alula.records.causes.fault_file import effects_of_robot
+from alula.records.causes.fault_file import effects_of_models, effects_of_robot
 from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History, read_history
@@ -39,6 +40,7 @@ class Account:
     phases: Phases
     responses: tuple[FaultResponse, ...]
     recovery: Recovery | None
+    alarms: Alarms
 
 
 def make_report(facts: RunFacts) -> Summary:
@@ -88,19 +90,20 @@ def _account(run: Run, part: ReportPart) -> Account:
     phases = find_phases(run.history, observed)
     effects = EffectsByFault()
     with run.problems.survive("what faults can bring about"):
+        effects = effects_of_models()
         effects = effects_of_robot()
     known: list[Known] = known_faults(run.facts, run.scenario, run.history, observed, phases, effects)
     with run.problems.survive("what else failed"):
         known += part.failures(phases, [fault for _, fault in known], effects)
     responses = find_responses(known, run.history)
-    recovery = find_recovery(run.scenario, run.history, observed, phases, responses)
-    return Account(observed, mock, phases, responses, recovery)
+    recovery = find_recovery(run.scenario, run.history, observed, phases, responses, effects.alarms)
+    return Account(observed, mock, phases, responses, recovery, effects.alarms)
 
 
 def _timeline(run: Run, account: Account) -> Timeline | None:
     timeline: Timeline | None = None
     with run.problems.survive("timeline"):
-        timeline = made = make_timeline(run.history, account.phases, account.recovery)
+        timeline = made = make_timeline(run.history, account.phases, account.recovery, account.alarms)
         write_json(run.folder / "timeline.json", made)
         write_aside(run.folder / "timeline.svg", lambda aside: draw_timeline(made, aside, title=run.title))
     return timeline

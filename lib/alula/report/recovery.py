@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from alula.common.scenarios import Scenario
-from alula.records.causes.failures import SkillFailure, skill_failures
+from alula.model.execution_state import ExecutionState
+from alula.records.causes.alarms import Alarm, Alarms
+from alula.records.causes.failures import skill_failures
 from alula.records.causes.faults import EARLY_S
 from alula.report.deaths import DIED
 from alula.report.history import History, PastExecution
@@ -15,9 +17,8 @@ from alula.report.observed import Observed
 from alula.report.phases import Phases
 from alula.report.responses import FaultResponse
 
-VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
-LOST = "LOST"  # how the skills end whose function is not heard of any more
-BROKEN = "BROKEN"
+ENDED_BY_ITSELF = frozenset({ExecutionState.RESOURCE_INVARIANT_VIOLATED, ExecutionState.TERMINATED, ExecutionState.FAILED})
+"""How what ran can fail: all other failures are refusals to start."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Recovery:
 
 
 def find_recovery(
-    scenario: Scenario, history: History, observed: Observed, phases: Phases, responses: Sequence[FaultResponse]
+    scenario: Scenario, history: History, observed: Observed, phases: Phases, responses: Sequence[FaultResponse], alarms: Alarms
 ) -> Recovery | None:
     """Return the recovery from the first fault in the air with a response of the mission, or None where nothing failed there.
 
@@ -48,7 +49,7 @@ def find_recovery(
         one = min(followed, key=lambda one: one.traced.failures[0].at)
         fallback_s = _fallback(scenario.fallback, history, one)
         return _recovery(one, fallback_s, _moving(scenario, history, observed, fallback_s))
-    noticed_s = _unexplained(history, responses)
+    noticed_s = _unexplained(history, responses, alarms)
     if noticed_s is not None:
         fallback_s = _first([e.running_s for e in history.executions if e.skill == scenario.fallback], noticed_s)
         return Recovery(None, noticed_s, fallback_s, _moving(scenario, history, observed, fallback_s))
@@ -81,17 +82,18 @@ def _fallback(skill: str, history: History, one: FaultResponse) -> float | None:
     return _first(runs, first.end.stamp_s - EARLY_S)
 
 
-def _unexplained(history: History, responses: Sequence[FaultResponse]) -> float | None:
+def _unexplained(history: History, responses: Sequence[FaultResponse], alarms: Alarms) -> float | None:
     """Return when the skill layer noticed something broken that follows from no fault that is known; None: never."""
     changes = {change for one in responses for change in one.traced.changes}
     explained = {failure.at for one in responses for failure in one.traced.failures}
-    broken = [change.stamp_s for change in history.transitions if change.to_state == BROKEN and change not in changes]
-    failed = [failure.end.stamp_s for failure in skill_failures(history.events) if _lost(failure) and failure.at not in explained]
+    broken = [
+        change.stamp_s
+        for change in history.transitions
+        if alarms.of(f"{change.skillset}.{change.resource}", change.to_state) is Alarm.ALWAYS and change not in changes
+    ]
+    ended = [failure for failure in skill_failures(history.events) if failure.end.state in ENDED_BY_ITSELF]
+    failed = [failure.end.stamp_s for failure in ended if failure.at not in explained]
     return min([*broken, *failed]) if broken else None
-
-
-def _lost(failure: SkillFailure) -> bool:
-    return failure.end.state.value == VIOLATED or failure.end.result == LOST
 
 
 def _moving(scenario: Scenario, history: History, observed: Observed, fallback_s: float | None) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypedDict
 
+from alula.records.causes.alarms import Alarm, Alarms
 from alula.report.history import History
 from alula.report.phases import Phases
 from alula.report.recovery import Recovery
@@ -39,9 +40,10 @@ class SkillRow(TypedDict):
 
 
 class Band(TypedDict):
-    """A resource was in ``state`` from ``from_s`` to ``until_s``."""
+    """A resource was in ``state`` from ``from_s`` to ``until_s``; ``alarm``: whether that is bad news (``alula.records.causes.alarms``)."""
 
     state: str
+    alarm: bool
     from_s: float
     until_s: float
 
@@ -72,14 +74,14 @@ class Timeline(TypedDict):
     marks: list[Mark]
 
 
-def make_timeline(history: History, phases: Phases, recovery: Recovery | None) -> Timeline:
+def make_timeline(history: History, phases: Phases, recovery: Recovery | None, alarms: Alarms) -> Timeline:
     """Return the rows of skills and resources and the marks, in seconds since lift-off."""
     begin_s, end_s = phases.since(history.first_s) or 0.0, phases.since(history.last_s) or 0.0
     return Timeline(
         begin_s=begin_s,
         end_s=end_s,
         skills=_skill_rows(skills(history, phases), end_s),
-        resources=_resource_rows(history.transitions, phases, begin_s, end_s),
+        resources=_resource_rows(history.transitions, phases, alarms, begin_s, end_s),
         marks=_marks(phases, recovery),
     )
 
@@ -103,15 +105,18 @@ def _skill_rows(executions: list[SkillSummary], end_s: float) -> list[SkillRow]:
     return sorted(rows.values(), key=lambda row: skillsets.index(row["skillset"]))
 
 
-def _resource_rows(transitions: tuple[TransitionEvent, ...], phases: Phases, begin_s: float, end_s: float) -> list[ResourceRow]:
+def _resource_rows(
+    transitions: tuple[TransitionEvent, ...], phases: Phases, alarms: Alarms, begin_s: float, end_s: float
+) -> list[ResourceRow]:
     rows: dict[tuple[str, str], ResourceRow] = {}
     for change in transitions:
         key = (change.skillset, change.resource)
         t_s = phases.since(change.stamp_s) or 0.0
-        first = [Band(state=change.from_state, from_s=begin_s, until_s=t_s)]
+        first = [Band(state=change.from_state, alarm=False, from_s=begin_s, until_s=t_s)]
         row = rows.setdefault(key, ResourceRow(skillset=key[0], resource=key[1], bands=first))
         row["bands"][-1]["until_s"] = t_s
-        row["bands"].append(Band(state=change.to_state, from_s=t_s, until_s=end_s))
+        alarm = alarms.of(".".join(key), change.to_state) is Alarm.ALWAYS
+        row["bands"].append(Band(state=change.to_state, alarm=alarm, from_s=t_s, until_s=end_s))
     skillsets = list(dict.fromkeys(row["skillset"] for row in rows.values()))
     return sorted(rows.values(), key=lambda row: skillsets.index(row["skillset"]))
 

@@ -35,7 +35,6 @@ MEANINGS = {
 TEXT_ON = {"success": "white", "ended": "black", "interrupted": "black", "violated": "white", "failure": "black", "running": "white"}
 MARK_STYLES = {"failure": ("#c8322b", "-"), "detected": ("#7b2cbf", "--"), "fallback": ("#1d4e89", "-."), "moving": ("#2a6f4e", ":")}
 BAND_SHADES = ("#dfe5ec", "#8fa3ba", "#c3cede", "#6d87a3")
-ALARM_STATES = {"BROKEN", "LOST", "FAILED", "ERROR"}
 WIDTH_IN = 11.0
 LEFT_IN, RIGHT_IN, BOTTOM_IN = 1.6, 0.2, 0.95
 SKILL_ROW_IN, RESOURCE_ROW_IN, MARK_ROW_IN, TITLE_IN = 0.34, 0.26, 0.17, 0.38
@@ -203,7 +202,7 @@ def _draw_bands(axes: Axes, row: ResourceRow, y: float, ruler: Ruler) -> None:
     height = BAND_HEIGHT * RESOURCE_ROW_IN / SKILL_ROW_IN
     for band in row["bands"]:
         shade = shades.setdefault(band["state"], BAND_SHADES[len(shades) % len(BAND_SHADES)])
-        colour = "#eab0ab" if band["state"] in ALARM_STATES else shade
+        colour = "#eab0ab" if band["alarm"] else shade
         length_s = band["until_s"] - band["from_s"]
         axes.barh(y, length_s, height, left=band["from_s"], color=colour, edgecolor="white", linewidth=0.4, zorder=3)
         if ruler.text_s(band["state"], BAND_PT) < length_s:

@@ -14,7 +14,7 @@ from alula.common.record import REPORTS, Entry
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import ResultKind
 from alula.model.unmet import Unmet
-from alula.records.causes.effects import EffectsByFault
+from alula.records.causes.alarms import Alarm
 from alula.records.causes.failures import skill_failures
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault, faults_asked, trace
@@ -177,11 +177,58 @@ def test_kinds_of_results_that_a_record_does_not_say_are_those_of_the_model():
     assert with_told_ends([said], []) == [said], "what a record says counts"
 
 
+ROVER = """
+skillset rover {
+  resource {
+    scanner_status {
+      initial BLIND
+      extern BLIND -> FINE
+      extern FINE -> BLIND
+      extern FINE -> DEAD
+    }
+    arm_status {
+      initial OK
+      extern OK -> BROKEN
+    }
+    gear {
+      initial IN
+      IN -> OUT
+      OUT -> IN
+    }
+  }
+  skill drive {
+    effect { engage: gear -> IN }
+    invariant {
+      sees: resource = (scanner_status == FINE and (arm_status == OK or arm_status == BROKEN))
+      engaged: resource = (gear == IN)
+    }
+    result { DONE: apply = engage }
+  }
+}
+"""
+
+
 def test_a_robot_without_a_file_has_the_rule_by_names(monkeypatch, tmp_path):
     (tmp_path / "robot.yaml").write_text("name: rover\n")
+    (tmp_path / "skillsets").mkdir()
+    (tmp_path / "skillsets/rover.skill").write_text(ROVER)
     monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
-    assert effects_of_robot() == EffectsByFault()
-    assert EffectsByFault().of("zed").states == {"*.zed_status *"}
+    effects = effects_of_robot()
+    assert effects.of("scanner").states == {"rover.scanner_status DEAD", "rover.scanner_status BLIND"}
+    assert effects.of("arm").states == frozenset(), "no invariant tells which of its states is bad"
+    told = [("scanner_status", "DEAD"), ("scanner_status", "FINE"), ("scanner_status", "BLIND"), ("arm_status", "BROKEN"), ("gear", "OUT")]
+    found = [effects.alarms.of(f"rover.{resource}", state) for resource, state in told]
+    assert found == [Alarm.ALWAYS, Alarm.NONE, Alarm.AWAY, Alarm.NONE, Alarm.NONE], "by what they break, not by how they sound"
+    well = [change(1.0, "rover.scanner_status", "BLIND", "FINE"), change(2.0, "rover.scanner_status", "FINE", "DEAD")]
+    assert [traced.changes for traced in trace([Fault("scanner", 0.0, effects=effects.of("scanner"))], well)] == [(well[1],)]
+
+
+def test_what_a_fault_of_the_robot_shows_is_an_alarm_and_where_a_resource_begins_only_away():
+    alarms = effects_of_robot().alarms
+    told = ("perception.zed_status BROKEN", "perception.zed_status UNKNOWN", "perception.zed_status OK", "video.link DOWN")
+    told += ("navigation.SDK_authority UNAVAILABLE", "navigation.flight_status ON_GROUND", "mapping.slam_status LOST")
+    A = Alarm  # noqa: N806 - for a table
+    assert [alarms.of(*one.split()) for one in told] == [A.ALWAYS, A.AWAY, A.NONE, A.ALWAYS, A.AWAY, A.NONE, A.ALWAYS]
 
 
 FLOWN = {

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from alula.common.record import EVENTS, FILE, RecordError, RecordWriter
 from alula.model.execution_state import ExecutionState
+from alula.records.causes.alarms import Alarms
 from alula.report.files import Problems
 from alula.report.history import fold, gaps, in_order, read_history
 from alula.report.phases import Phases
@@ -179,5 +180,13 @@ def test_any_interleaving_folds_to_the_same_executions(drawn):
 def test_the_timeline_shows_how_an_execution_ended_as_its_event_says_it(name, kind, shown):
     events = [started(), started(sequence=3, state="TERMINATED", result=name, result_kind=kind)]
     phases = Phases()
-    timeline = make_timeline(fold([read_event(event) for event in events], Problems()), phases, None)
+    timeline = make_timeline(fold([read_event(event) for event in events], Problems()), phases, None, Alarms())
     assert [(bar["result"], bar["ending"]) for row in timeline["skills"] for bar in row["bars"]] == [(name, shown)]
+
+
+def test_the_timeline_shows_a_state_as_bad_by_the_models_and_not_by_its_name():
+    phases, log = Phases(), [("zed_status", "OK", "BROKEN"), ("zed_status", "BROKEN", "DIM"), ("zed_status", "DIM", "OK")]
+    changes = [TransitionEvent(at, at * 10**9, *change, "extern", "perception") for at, change in enumerate(log, start=1)]
+    alarms = Alarms(always=frozenset({"perception.zed_status DIM"}), away=frozenset({"perception.zed_status OK"}))
+    (row,) = make_timeline(fold(changes, Problems()), phases, None, alarms)["resources"]
+    assert [(band["state"], band["alarm"]) for band in row["bands"]] == [("OK", False), ("BROKEN", False), ("DIM", True), ("OK", False)]

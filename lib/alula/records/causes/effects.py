@@ -6,14 +6,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
+from alula.records.causes.alarms import Alarms
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
 from alula.runtime.mock import Behaviour
 from alula.runtime.mock.behaviour import Place
 
 EXTERN = "extern"
 """The cause of a change that the functional layer reported."""
-WELL = "OK"
-"""The state of a resource ``NAME_status`` whose sensor or function works."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class FaultEffects:
 
 
 def _reported(change: TransitionEvent) -> bool:
-    return change.cause == EXTERN and change.to_state != WELL
+    return change.cause == EXTERN
 
 
 def _any(patterns: Iterable[str], text: str) -> bool:
@@ -54,23 +53,32 @@ def _any(patterns: Iterable[str], text: str) -> bool:
 
 @dataclass(frozen=True)
 class EffectsByFault:
-    """The effects of a robot's faults, and of the ends of its processes; ``known``: by name, without the way of failing."""
+    """The effects of a robot's faults, and of the ends of its processes.
+
+    Attributes:
+        known: by name, without the way of failing.
+        alarms: the states that are bad news, by the robot's models.
+    """
 
     known: Mapping[str, FaultEffects] = field(default_factory=dict)
+    alarms: Alarms = field(default_factory=Alarms)
 
     def of(self, name: str, behaviour: Behaviour | None = None) -> FaultEffects:
         """Return the effects of a fault or a process by its name, as in ``radio`` or ``radio:out``.
 
-        One that is not known affects what has its name: the resource ``NAME_status`` and the skillset NAME. A fault that a behaviour of
-        mocks declares has the states that are declared there.
+        One that is not known affects what has its name: the alarms of the resource ``NAME_status``, and the skillset NAME. A fault that a
+        behaviour of mocks declares has the states that are declared there.
         """
         what = name.partition(":")[0]
-        found = self.known.get(what) or FaultEffects(frozenset([f"*.{what}_status *"]), ends=frozenset([f"{what}.*"]))
+        found = self.known.get(what) or FaultEffects(self._of_name(what), ends=frozenset([f"{what}.*"]))
         fault = None if behaviour is None else behaviour.faults.get(name) or behaviour.faults.get(what)
         if fault is None:
             return found
         later = [_named(change.states) for change in fault.changes]
         return FaultEffects(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
+
+    def _of_name(self, what: str) -> frozenset[str]:
+        return frozenset(one for one in (*self.alarms.always, *self.alarms.away) if fnmatchcase(one, f"*.{what}_status *"))
 
 
 def _named(words: Mapping[Place, str]) -> frozenset[str]:

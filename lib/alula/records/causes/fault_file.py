@@ -10,13 +10,13 @@ from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.robots import FAULTS, RobotError, find_robot
 from alula.model.execution_state import ExecutionState as S
 from alula.model.model import Skill, Skillset
+from alula.records.causes.alarms import ANY, Alarms, alarms_of
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
 
 SECTIONS = ("faults", "processes")
 PARTS = ("states", "later", "ends")
-ANY = "*"
 BAD_ENDS = (S.FAILED.value, S.INTERRUPTED.value, S.NOT_VALIDATED.value)
 """States in which an execution ends without the name of a result or a condition."""
 
@@ -25,16 +25,33 @@ Members = Mapping[str, Collection[str]]
 
 
 def effects_of_robot() -> EffectsByFault:
-    """Return the effects that the robot declares: none without ``faults.yaml``.
+    """Return the effects that the robot declares; without ``faults.yaml`` those that follow from its models.
 
     Raises:
-        AnalysisError: the file can't be read or is wrong; the message names file and line.
+        AnalysisError: a model has errors, or the file can't be read or is wrong; the message names file and line.
     """
     try:
         file = find_robot().file(FAULTS)
     except RobotError as error:
         raise AnalysisError(str(error)) from None
-    return EffectsByFault() if file is None else load_effects(file, robot_skillsets())
+    return effects_of_models() if file is None else load_effects(file, robot_skillsets())
+
+
+def effects_of_models() -> EffectsByFault:
+    """Return the effects that follow from the robot's models; raises AnalysisError where they have errors."""
+    try:
+        there = find_robot().skillsets.is_dir()
+    except RobotError as error:
+        raise AnalysisError(str(error)) from None
+    return EffectsByFault(alarms=alarms_of(robot_skillsets() if there else ()))
+
+
+def alarms_of_robot() -> Alarms:
+    """Return the states that are bad news; none where there is no robot, or its models or faults have errors."""
+    try:
+        return effects_of_robot().alarms
+    except AnalysisError:
+        return Alarms()
 
 
 def load_effects(path: Path, skillsets: Sequence[Skillset]) -> EffectsByFault:
@@ -58,7 +75,7 @@ def load_effects(path: Path, skillsets: Sequence[Skillset]) -> EffectsByFault:
                 later=_read(said.get("later"), "resource", "state", states),
                 ends=_read(said.get("ends"), "skill", "end", ends),
             )
-    return EffectsByFault(known)
+    return EffectsByFault(known, alarms_of(skillsets, (state for one in known.values() for state in one.states)))
 
 
 def _ends(skill: Skill) -> tuple[str, ...]:

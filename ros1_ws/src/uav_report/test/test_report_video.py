@@ -8,6 +8,7 @@ import pytest
 
 from alula.common.faults import FaultChange
 from alula.common.scenarios import load_scenario
+from alula.records.causes.alarms import Alarms
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault
 from alula.report.facts import RunFacts
@@ -53,7 +54,7 @@ def test_a_process_that_died_is_not_told_as_the_radio(killed_s, failure_s, faile
     known = known_faults(facts, scenario, History(), observed, Phases(), effects)
     if not any(explains(fault, 112.5, effects.of(RADIO)) for _, fault in known):
         known.append((FaultChange(RADIO, "", 112.5), Fault(RADIO, 112.5, effects=effects.of(RADIO))))
-    recovery = find_recovery(scenario, History(), observed, Phases(), find_responses(known, History()))
+    recovery = find_recovery(scenario, History(), observed, Phases(), find_responses(known, History()), Alarms())
     assert (recovery.failure_s, recovery.failed) == (failure_s, failed)
-    (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery)["marks"]
+    (mark,) = make_timeline(History(), Phases(zero_s=100.0, zero_from="simulator"), recovery, Alarms())["marks"]
     assert (mark["t_s"], mark["label"]) == (failure_s - 100.0, f"{failed} fails")

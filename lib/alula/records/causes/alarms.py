@@ -1,0 +1,83 @@
+"""Which states of resources are bad news, by the robot's models and its file of faults; no name of a state says it.
+
+A state is an alarm that the functional layer reports, and that a fault of the robot shows (``faults.yaml``) or that breaks an invariant
+of a skill, whatever the other resources are. In the state in which a resource begins, nothing has gone wrong yet: it is an alarm only
+while the robot is away.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+from fnmatch import fnmatchcase
+
+from alula.model.conditions import NO_DATA, judge
+from alula.model.expressions import Expression, ResourceIs, atoms
+from alula.model.model import Resource, Skillset
+
+ANY = "*"
+"""In a file of faults: any state, which says of none that it is bad."""
+
+
+class Alarm(Enum):
+    """How bad the news are; the values are for the page and for files."""
+
+    NONE = ""
+    AWAY = "away"
+    ALWAYS = "always"
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """The alarms of a robot, each ``skillset.resource STATE``: those that always are, and those that are while the robot is away."""
+
+    always: frozenset[str] = field(default_factory=frozenset)
+    away: frozenset[str] = field(default_factory=frozenset)
+
+    def of(self, resource: str, state: str) -> Alarm:
+        """Return what it means that a resource, ``skillset.resource``, has come into a state."""
+        said = f"{resource} {state}"
+        return Alarm.ALWAYS if said in self.always else Alarm.AWAY if said in self.away else Alarm.NONE
+
+
+def alarms_of(skillsets: Iterable[Skillset], shown: Iterable[str] = ()) -> Alarms:
+    """Return the alarms of models; ``shown`` are patterns of what faults show, ``skillset.resource STATE``."""
+    patterns = [pattern for pattern in shown if not pattern.endswith(f" {ANY}")]
+    always: set[str] = set()
+    away: set[str] = set()
+    for skillset in skillsets:
+        breaking = set(breaking_states(skillset))
+        for resource, state in _reported(skillset):
+            said = f"{skillset.name}.{resource.name} {state}"
+            if said in breaking or any(fnmatchcase(said, pattern) for pattern in patterns):
+                (away if state == resource.initial else always).add(said)
+    return Alarms(frozenset(always), frozenset(away))
+
+
+def breaking_states(skillset: Skillset) -> Iterator[str]:
+    """Yield the states, ``skillset.resource STATE``, that the functional layer reports and that break an invariant by themselves."""
+    conditions = [invariant.condition for skill in skillset.skills for invariant in skill.invariants]
+    for resource, state in _reported(skillset):
+        if any(_breaks(resource, state, condition, skillset) for condition in conditions):
+            yield f"{skillset.name}.{resource.name} {state}"
+
+
+def _reported(skillset: Skillset) -> Iterator[tuple[Resource, str]]:
+    for resource in skillset.resources:
+        targets = dict.fromkeys(arrow.target for arrow in resource.transitions if arrow.extern)
+        yield from ((resource, state) for state in targets)
+
+
+@functools.cache
+def _breaks(resource: Resource, state: str, condition: Expression, skillset: Skillset) -> bool:
+    """Tell whether a condition is false with this state of a resource, whatever the others are."""
+    asked = dict.fromkeys(atom.resource for atom in atoms(condition) if isinstance(atom, ResourceIs))
+    if resource.name not in asked:
+        return False
+    others = [one for one in skillset.resources if one.name in asked and one.name != resource.name]
+    names = [resource.name, *(one.name for one in others)]
+    combinations = itertools.product((state,), *(one.states for one in others))
+    return all(judge(condition, dict(zip(names, states, strict=True)), NO_DATA) is False for states in combinations)
