@@ -21,6 +21,8 @@ _FAULT = re.compile(rf"(?P<what>[a-z0-9_]+)(?::(?P<how>[a-z0-9_]+))?(?:@(?P<begi
 MAX_SECONDS = 1e6
 MENDED = "ok"
 """The mode of what works again."""
+DIED = "died"
+"""The way of failing of a process that ended without being told to."""
 MOCKED = "mock"
 """The mode of what failed in mocks without a word for the way of failing."""
 

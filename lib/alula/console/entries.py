@@ -5,8 +5,9 @@ reads zero, and zero is no time of a flight whose clock is Unix time.
 
 Topics of the record (``alula.common.record``) keep their names and contents, with four exceptions. Of the tree the page gets the shape
 once and then what changed, because a tree of 500 nodes is too much to be sent at each change; of the ticks those that changed what the
-mission needs to start, met or not; of the reports none, because the events tell how executions go. Older events get the kind of their
-result.
+mission needs to start, met or not; of the reports none, because the events tell how executions go. Events and the mission's outcome get
+what the page does not judge: older ones the kind of their result (``result_kind``), ends why they were (``why``), changes of resources
+whether they are bad news (``alarm``, see ``alula.records.causes.alarms``), the mission its reason in words (``told``).
 """
 
 from __future__ import annotations
@@ -16,8 +17,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from alula.common.files import strict
-from alula.common.record import DATA, EVENTS, REPORTS, TICKS, TREE, Entry
+from alula.common.record import DATA, EVENTS, MISSION, REPORTS, TICKS, TREE, Entry
+from alula.records.causes.alarms import Alarms
+from alula.records.causes.fault_file import alarms_of_robot
+from alula.records.causes.wording import in_words, reason_in_words
 from alula.records.kinds import with_kind
+from alula.runtime.core.events import TRANSITION
 
 RUN = "/run"
 """What was asked for: the values of ``run.json``, and the ``name`` of its folder."""
@@ -37,7 +42,9 @@ FAULT = "/fault"
 """Something was made to fail: ``{sensor, mode}``."""
 HEALTH = "/health"
 """A watch changed its mind about a sensor: ``{sensor, ok, fault, reason}``."""
-FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY})
+CAUSES = "/causes"
+"""Faults, failures with their chains of causes, and what the mission did about them, see ``causes.Causes``."""
+FACTS = frozenset({RUN, ROUTE, AREAS, MAP, WORLD, SUMMARY, CAUSES})
 """Topics of which the last entry counts."""
 NODES = "/nodes"
 """Nodes of the tree that changed: ``[[index, status, message], ...]``; index as in the last tree."""
@@ -76,6 +83,7 @@ class Converter:
         self._nodes: list[tuple[str, str]] = []
         self._sampled_s: dict[tuple[object, object], float] = {}
         self._start: object = None
+        self._alarms: Alarms | None = None
 
     def convert(self, entry: Entry) -> Iterator[Wire]:
         """Yield what the page gets of an entry."""
@@ -83,7 +91,21 @@ class Converter:
         if entry.topic == TREE:
             yield from self._tree(t_s, entry.value)
         elif self._wanted(t_s, entry):
-            yield entry.topic, t_s, with_kind(entry.value) if entry.topic == EVENTS else entry.value
+            yield entry.topic, t_s, self._explained(entry)
+
+    def _explained(self, entry: Entry) -> Mapping[str, Any]:
+        """Return an entry's value with what the page can't know: how an execution ended, and why, and which states are bad news."""
+        value = entry.value
+        if entry.topic == MISSION:
+            return {**value, "told": reason_in_words(str(value.get("reason") or ""))}
+        if entry.topic != EVENTS:
+            return value
+        if value.get("kind") == TRANSITION:
+            self._alarms = self._alarms or alarms_of_robot()
+            alarm = self._alarms.of(f"{value.get('skillset')}.{value.get('resource')}", str(value.get("to_state")))
+            return {**value, "alarm": alarm.value}
+        name, message = str(value.get("result") or ""), str(value.get("message") or "")
+        return {**with_kind(value), "why": in_words(message.removeprefix(f"{name}: "))}
 
     def _wanted(self, t_s: float | None, entry: Entry) -> bool:
         if entry.topic == TICKS:

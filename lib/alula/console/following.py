@@ -10,8 +10,9 @@ from typing import Any
 from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
 from alula.console import journal
 from alula.console.areas import areas_of
+from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
-from alula.console.entries import AREAS, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
+from alula.console.entries import AREAS, CAUSES, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
 
 
@@ -23,6 +24,7 @@ class RunFollower:
         self.problems: list[str] = []
         self.behind = False
         self._converter = Converter()
+        self._causes = Causes()
         self._record = RecordFollower(folder / FILE)
         self._lines = [LinesFollower(folder / journal.FILE, OPERATOR), LinesFollower(folder / PICTURES_FILE, PICTURE)]
         self._files: list[tuple[Path, str, Callable[[Path], Any]]] = [
@@ -40,7 +42,11 @@ class RunFollower:
 
         ``limit``: read so many entries of the record at most; ``behind`` says then that there may be more.
         """
-        return [*self._changed_files(), *self._recordings(), *self._new_entries(limit)]
+        entries = [*self._changed_files(), *self._recordings(), *self._new_entries(limit)]
+        for entry in entries:
+            self._causes.take(entry)
+        told = None if self.behind else self._causes.told()
+        return entries if told is None else [*entries, (CAUSES, None, told)]
 
     def _changed_files(self) -> Iterator[Wire]:
         for path, topic, read in self._files:

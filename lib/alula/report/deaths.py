@@ -9,9 +9,6 @@ from pathlib import Path
 
 from alula.report.run_log import DEATH, note, read
 
-DIED = "died"
-"""The way of failing of a process that ended without being told to."""
-
 
 @dataclass(frozen=True)
 class Death:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from alula.common.faults import DIED
 from alula.common.scenarios import Scenario
 from alula.model.execution_state import ExecutionState
 from alula.records.causes.alarms import Alarm, Alarms
 from alula.records.causes.failures import skill_failures
 from alula.records.causes.faults import EARLY_S
-from alula.report.deaths import DIED
 from alula.report.history import History, PastExecution
 from alula.report.observed import Observed
 from alula.report.phases import Phases

@@ -7,17 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypedDict
 
-from alula.common.faults import MENDED, FaultChange, parse_fault
+from alula.common.faults import DIED, MENDED, FaultChange, parse_fault
 from alula.common.scenarios import Scenario
 from alula.records.causes.effects import EffectsByFault
-from alula.records.causes.faults import Fault, Traced, faults_asked, trace
+from alula.records.causes.faults import Fault, Traced, faults_asked, faults_told, trace
 from alula.records.causes.responses import Response, response_to_fault
-from alula.report.deaths import DIED
 from alula.report.facts import RunFacts
 from alula.report.history import History
 from alula.report.observed import Observed
 from alula.report.phases import Phases
-from alula.runtime.core.events import EngineEvent, TransitionEvent
 
 
 @dataclass(frozen=True)
@@ -34,12 +32,14 @@ class FaultResponse:
 class ResponseSummary(TypedDict):
     """A fault, a process that died, or the radio that ended the video, and what followed from it (``alula.records.causes``).
 
-    ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the
-    executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table of a campaign.
+    ``injected``: it was made to fail. ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that
+    told of it first. ``failed``: the executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table
+    of a campaign.
     """
 
     sensor: str
     mode: str
+    injected: bool
     t_s: float | None
     until_s: float | None
     detected_s: float | None
@@ -63,7 +63,11 @@ def known_faults(
     facts: RunFacts, scenario: Scenario, history: History, observed: Observed, phases: Phases, effects: EffectsByFault
 ) -> list[Known]:
     """Return every fault of the run that is known by what was asked for and recorded, and every process that died."""
-    return [*_told(observed, effects), *_asked(facts, scenario, history, phases, effects), *_died(facts, scenario, observed, effects)]
+    return [
+        *faults_told(observed.all_faults, effects),
+        *_asked(facts, scenario, history, phases, effects),
+        *_died(facts, scenario, observed, effects),
+    ]
 
 
 def find_responses(known: Sequence[Known], history: History) -> tuple[FaultResponse, ...]:
@@ -74,14 +78,6 @@ def find_responses(known: Sequence[Known], history: History) -> tuple[FaultRespo
         response, after_s = response_to_fault(traced, history.events, history.places)
         found.append(FaultResponse(change.sensor, change.mode, traced, response, after_s))
     return tuple(found)
-
-
-def _told(observed: Observed, effects: EffectsByFault) -> Iterator[Known]:
-    """Yield what the recordings tell; a fault lasts until the next change of the same thing."""
-    for at, change in enumerate(observed.all_faults):
-        if change.mode != MENDED:
-            until_s = next((later.t_s for later in observed.all_faults[at + 1 :] if later.sensor == change.sensor), math.inf)
-            yield change, Fault(change.sensor, change.t_s, until_s, effects.of(change.sensor))
 
 
 def _asked(facts: RunFacts, scenario: Scenario, history: History, phases: Phases, effects: EffectsByFault) -> Iterator[Known]:
@@ -102,29 +98,23 @@ def _died(facts: RunFacts, scenario: Scenario, observed: Observed, effects: Effe
         if death["when_s"] is not None and death["name"] not in ended:
             yield (
                 FaultChange(death["name"], DIED, death["when_s"]),
-                Fault(death["name"], death["when_s"], effects=effects.of(death["name"])),
+                Fault(death["name"], death["when_s"], effects=effects.of(death["name"]), injected=False),
             )
 
 
 def summarise_response(one: FaultResponse, phases: Phases) -> ResponseSummary:
     """Return a fault with the response to it for ``summary.json``."""
     fault = one.traced.fault
-    first = one.traced.first
     return ResponseSummary(
         sensor=one.what,
         mode=one.mode,
+        injected=fault.injected,
         t_s=phases.since(fault.at_s),
         until_s=phases.since(fault.until_s) if math.isfinite(fault.until_s) else None,
         detected_s=phases.since(one.traced.detected_s),
-        detected_by="" if first is None else _in_words(first),
+        detected_by=one.traced.detected_by,
         failed=[failure.end.id for failure in one.traced.failures],
         answered_by=one.response.branch,
         skill=one.response.skill,
         after_s=None if one.after_s is None else round(one.after_s, 3),
     )
-
-
-def _in_words(event: EngineEvent) -> str:
-    if isinstance(event, TransitionEvent):
-        return f"{event.skillset}.{event.resource} {event.from_state} -> {event.to_state}"
-    return f"{event.skillset}.{event.skill} {event.state.value} {event.result}".rstrip()

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from alula.report.deaths import DIED, Death
+from alula.common.faults import DIED
+from alula.report.deaths import Death
 from alula.report.ends import SIGNAL, Ended, read_end
 from alula.report.run_log import read_waits
 

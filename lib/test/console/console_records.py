@@ -10,6 +10,7 @@ import numpy as np
 from alula.common.record import DATA, EVENTS, FILE, MISSION, TREE, RecordWriter
 
 LIFT_OFF_S = 12.0
+VIOLATED = "RESOURCE_INVARIANT_VIOLATED"
 HOSTILE = "<img src=x onerror=\"document.title='owned'\"></script><script>document.title='owned'</script>"
 
 
@@ -25,10 +26,15 @@ def tree(watch: str, fallback: str, *, name: str = "navigate") -> dict[str, Any]
     return node(name, "selector", "RUNNING", first, second)
 
 
-def execution(skill: str, state: str, number: int, *, result: str = "", message: str = "") -> dict[str, Any]:
+def execution(
+    skill: str, state: str, number: int, *, result: str = "", message: str = "", states: dict[str, str] | None = None, **data: float
+) -> dict[str, Any]:
+    """Return an event's record; ``states`` and ``data``: of the condition that was unmet."""
     skillset, _, short = skill.partition(".")
     identity = {"skillset": skillset, "sequence": number, "kind": "EXECUTION", "skill": short, "id": short[:6]}
-    return {**identity, "state": state, "result": result, "message": message, "inputs": {}, "outputs": {}}
+    found = {"name": result, "condition": "", "reason": message.partition(", after ")[0], "states": states or {}, "data": data}
+    unmet = [found] if states or data else []
+    return {**identity, "state": state, "result": result, "message": message, "unmet": unmet, "inputs": {}, "outputs": {}}
 
 
 def transition(resource: str, before: str, after: str) -> dict[str, Any]:
@@ -43,7 +49,7 @@ Story = list[tuple[float, str, dict[str, Any]]]
 def failing_story(name: str = "navigate") -> Story:
     """Return the entries of a flight whose ZED breaks 30 s after lift-off; the LiDAR takes over 0.5 s later."""
     why = "zed_ok: zed_status is BROKEN, after zed_status OK -> BROKEN (extern)"
-    start = LIFT_OFF_S
+    start, broken = LIFT_OFF_S, {"zed_status": "BROKEN"}
     story: Story = [
         (start - 3, MISSION, {"scenario": "mapping", "outcome": "running", "reason": "", "waypoints": 5, "waypoints_reached": 0}),
         (start - 2, TREE, tree("INVALID", "INVALID", name=name)),
@@ -52,7 +58,11 @@ def failing_story(name: str = "navigate") -> Story:
         (start + 1, EVENTS, execution("perception.zed_depthmap", "RUNNING", 2)),
         (start + 1, TREE, tree("RUNNING", "INVALID", name=name)),
         (start + 30, EVENTS, transition("perception.zed_status", "OK", "BROKEN")),
-        (start + 30, EVENTS, execution("perception.zed_depthmap", "RESOURCE_INVARIANT_VIOLATED", 3, result="zed_ok", message=why)),
+        (
+            start + 30,
+            EVENTS,
+            execution("perception.zed_depthmap", "RESOURCE_INVARIANT_VIOLATED", 3, result="zed_ok", message=why, states=broken),
+        ),
         (start + 30, TREE, tree("FAILURE", "RUNNING", name=name)),
         (start + 30.5, EVENTS, execution("perception.lidar_depthmap", "REQUESTED", 4)),
         (start + 30.5, EVENTS, execution("perception.lidar_depthmap", "RUNNING", 5)),
@@ -67,7 +77,7 @@ def failing_story(name: str = "navigate") -> Story:
 
 def lost_video() -> Story:
     """Return the entries of an inspection whose ground station is killed; the autopilot's failsafe overtakes the reaction."""
-    start, why = LIFT_OFF_S, "sdk_authority: SDK_authority is UNAVAILABLE"
+    start, why, taken = LIFT_OFF_S, "sdk_authority: SDK_authority is UNAVAILABLE", {"SDK_authority": "UNAVAILABLE"}
     inspect, lost = ({"kind": "sequence", "skill": "", "message": "", "children": []} for _ in range(2))
 
     def shape(first: str, second: str, third: str) -> dict[str, Any]:
@@ -84,7 +94,14 @@ def lost_video() -> Story:
         return (start + t_s, "/data", {"skillset": "navigation", "data": "guidance_state", "value": {"mode": mode}, "stamp_s": 0.0})
 
     picture = {"skillset": "video", "data": "picture", "value": {"fps_margin": -6}, "stamp_s": 1.0}
-    low = execution("video.stream", "RESOURCE_INVARIANT_VIOLATED", 2, result="enough_frames", message="picture.fps_margin is -6 for 1 s")
+    low = execution(
+        "video.stream",
+        VIOLATED,
+        2,
+        result="enough_frames",
+        message="picture.fps_margin is -6 for 1 s",
+        **{"picture.fps_margin": -6},
+    )
     return [
         (start - 3, MISSION, {"scenario": "inspection", "outcome": "running", "reason": "", "waypoints": 10, "waypoints_reached": 0}),
         (start, EVENTS, transition("navigation.flight_status", "ON_GROUND", "IN_AIR")),
@@ -101,7 +118,7 @@ def lost_video() -> Story:
         (start + 43.06, EVENTS, execution("navigation.hover", "FAILED", 4, message="refused")),  # the reaction before is not its own
         guided(45.0, "RTL"),
         (start + 45, EVENTS, transition("navigation.SDK_authority", "AVAILABLE", "UNAVAILABLE")),
-        (start + 45, EVENTS, execution("navigation.land", "NOT_READY", 3, result="sdk_authority", message=why)),
+        (start + 45, EVENTS, execution("navigation.land", "NOT_READY", 3, result="sdk_authority", message=why, states=taken)),
         (start + 45, TREE, shape("FAILURE", "FAILURE", "RUNNING")),
         (start + 57, EVENTS, transition("navigation.flight_status", "IN_AIR", "ON_GROUND")),
         (start + 58, MISSION, {"outcome": "given_up", "reason": why, "waypoints": 10, "waypoints_reached": 2, "end_s": start + 58}),
@@ -110,14 +127,18 @@ def lost_video() -> Story:
 
 def overtaken() -> tuple[Story, dict[str, Any]]:
     """Return the entries and the summary of a lost video whose loss was noticed early; the autopilot takes the vehicle from the hover."""
-    start = LIFT_OFF_S
+    start, taken = LIFT_OFF_S, {"SDK_authority": "UNAVAILABLE"}
     lost = "keep_sdk_authority: SDK_authority is UNAVAILABLE, after SDK_authority AVAILABLE -> UNAVAILABLE (extern)"
     guided = {"skillset": "navigation", "data": "guidance_state", "stamp_s": 0.0}
     kept = [entry for entry in lost_video() if entry[2].get("state") != "FAILED" and entry[2].get("data") != "guidance_state"]
     more: Story = [
         *[(start + t_s, "/data", {**guided, "value": {"mode": mode}}) for t_s, mode in ((2.0, "GUIDED"), (44.4, "GUIDED"), (45.4, "RTL"))],
         (start + 41, EVENTS, transition("video.link", "UP", "DOWN")),
-        (start + 45, EVENTS, execution("navigation.hover", "RESOURCE_INVARIANT_VIOLATED", 4, result="keep_sdk_authority", message=lost)),
+        (
+            start + 45,
+            EVENTS,
+            execution("navigation.hover", VIOLATED, 4, result="keep_sdk_authority", message=lost, states=taken),
+        ),
     ]
     answer = {
         "sensor": "ground_station", "mode": "killed", "t_s": 40.0, "until_s": None,

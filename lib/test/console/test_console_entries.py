@@ -5,12 +5,26 @@ import gzip
 import json
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from console_records import HOSTILE, failing_story, tree, write_map, write_record
+from console_records import (
+    HOSTILE,
+    LIFT_OFF_S,
+    VIOLATED,
+    Story,
+    execution,
+    failing_story,
+    lost_video,
+    transition,
+    tree,
+    write_map,
+    write_record,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
@@ -18,11 +32,11 @@ from hypothesis.extra import numpy as stn
 from alula.common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.console.areas import FENCE, areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
-from alula.console.entries import AREAS, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
+from alula.console.entries import AREAS, CAUSES, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
 from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
 from alula.console.following import RunFollower
 from alula.console.journal import note
-from alula.console.page import MAX_PICTURES, REPORT, make_page, write_report
+from alula.console.page import MAX_PICTURES, PARTS, REPORT, make_page, write_report
 
 
 def entry(topic: str, t_s: float, value: dict[str, object]) -> Entry:
@@ -123,7 +137,7 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     writer = write_record(tmp_path, story[:3], over=False)
     (tmp_path / "run.json").write_text('{"scenario": "mapping", "world": "/a/b/yard.yaml", "run_id": "x"}', encoding="utf-8")
     first = follower.poll()
-    assert [wire[0] for wire in first] == [RUN, AREAS, "/mission", TREE, NODES, EVENTS]
+    assert [wire[0] for wire in first] == [RUN, AREAS, "/mission", TREE, NODES, EVENTS, CAUSES]
     assert (first[0][1], first[0][2]["world"], "run_id" in first[0][2]) == (None, "yard", False)  # type: ignore[index, operator]
     assert follower.poll() == []
     writer.write(EVENTS, 1, {"kind": "x"})
@@ -131,6 +145,57 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     assert [(wire[0], wire[1]) for wire in follower.poll()] == [(EVENTS, 0.0), (OPERATOR, 20.0)]
     writer.close()
     assert follower.problems == []
+
+
+def causes_in(entries: Iterable[tuple[str, float | None, object]]) -> Any:
+    return [value for topic, _, value in entries if topic == CAUSES][-1]
+
+
+@pytest.mark.parametrize("story", [failing_story(), lost_video()])
+def test_a_live_page_is_told_the_causes_that_the_report_holds(tmp_path: Path, story: Story) -> None:
+    told = [(topic, t_s, value) for t_s, topic, value in story if topic == "/fault"]
+    story = [entry for entry in story if entry[1] != "/fault"]
+    (tmp_path / "run.json").write_text(json.dumps({"faults": ["zed@30", "ground_station:killed@40"]}), encoding="utf-8")
+    writer, follower, seen = write_record(tmp_path, story[:2], over=False), RunFollower(tmp_path), []
+    for t_s, topic, value in story[2:]:
+        writer.write(topic, round(t_s * 1e9), {**value, "stamp_s": t_s} if topic == EVENTS else value)
+        seen += [entry for entry in follower.poll() if entry[0] == CAUSES]
+    writer.close()
+    steps = [len(value["failures"]) for _, _, value in seen]  # type: ignore[index]
+    assert steps == sorted(steps), "a failure is told when it happens, with what is known by then"
+    assert steps[0] == 0
+    write_report(tmp_path, told, title="x")
+    reported = causes_in((topic, t_s, value) for topic, t_s, value in record_inside((tmp_path / REPORT).read_text(encoding="utf-8")))
+    live = causes_in(seen)
+    assert live == reported
+    (behind,) = {failure["fault"] for failure in live["failures"]} - {None}
+    assert live["faults"][behind]["name"] == ("ground_station" if told else "zed")
+    assert all(failure["chain"] for failure in live["failures"])
+
+
+def test_a_summary_decides_which_fault_a_failure_follows_from(tmp_path: Path) -> None:
+    write_record(tmp_path, failing_story())
+    lidar = {"sensor": "lidar", "mode": "", "injected": False, "t_s": 29.0, "until_s": 31.0, "detected_s": 30.0, "failed": ["zed_de"]}
+    summary = {"answers": [lidar], "lift_off": {"stamp_s": LIFT_OFF_S}}
+    (tmp_path / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    causes = causes_in(RunFollower(tmp_path).poll())
+    (fault,), (failure,) = causes["faults"], causes["failures"]
+    assert (fault["text"], fault["t"], fault["until"]) == ("lidar was lost", LIFT_OFF_S + 29, LIFT_OFF_S + 31)
+    assert failure["fault"] == 0
+    assert (causes["departed_s"], causes["back_s"]) == (LIFT_OFF_S, None)
+
+
+def test_the_page_is_told_what_is_bad_news_and_why_and_looks_at_no_names(tmp_path: Path) -> None:
+    changes = [("perception.zed_status", "BROKEN"), ("perception.zed_status", "OK"), ("rover.arm", "BROKEN"), ("video.link", "DOWN")]
+    story = [(1.0, EVENTS, transition(resource, "X", state)) for resource, state in changes]
+    low = execution("video.stream", VIOLATED, 9, result="good", message="good: picture.fps_margin is -6 for 1 s")
+    write_record(tmp_path, [*story, (2.0, EVENTS, low), (3.0, "/mission", {"reason": "video.stream: FAILED x (no (real) link)"})])
+    values: list[Any] = [value for topic, _, value in RunFollower(tmp_path).poll() if topic in {EVENTS, "/mission"}]
+    assert [value.get("alarm") for value in values] == ["always", "", "", "always", None, None]
+    assert values[4]["why"] == "frames per second: 6 below the limit for 1 s"
+    assert values[5]["told"] == "video.stream: no (real) link (failed x)"
+    program = "".join(path.read_text(encoding="utf-8") for path in PARTS.glob("*.js"))
+    assert not re.search(r"BROKEN|LOST|UNAVAILABLE|_margin is|flight_status|SDK_authority", program)
 
 
 def test_a_long_record_is_read_in_pieces(tmp_path: Path) -> None:
@@ -278,7 +343,7 @@ def test_a_viewer_is_sent_what_it_lacks(tmp_path: Path) -> None:
     second = json.loads(feed.message(place) or "")
     assert (second["reset"], second["entries"]) == (False, [[OPERATOR, 99.0, {"stamp_s": 99.0, "command": "abort"}]])
     back = json.loads(feed.message(place_of({"session": feed.session, "entries": first["upTo"]})) or "")
-    assert [wire[0] for wire in back["entries"]] == [ROUTE, OPERATOR]
+    assert [wire[0] for wire in back["entries"]] == [ROUTE, CAUSES, OPERATOR]
     assert json.loads(feed.message(place_of({"session": "of another life", "entries": 5})) or "")["reset"] is True
 
 

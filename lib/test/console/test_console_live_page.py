@@ -53,8 +53,8 @@ def test_the_live_page_follows_says_when_it_is_cut_off_and_is_true_again(
         assert page.run("document.querySelector('#operator form select').value") != "mapping"
         page.run("document.querySelector('#operator form select').value = 'mapping'")
         lift_off = {"stamp_s": LIFT_OFF_S - 0.5, "source": "simulator"}
-        injected = [{"sensor": "zed", "mode": "dead", "t_s": 30.4}]
-        (folder / "summary.json").write_text(json.dumps({**SUMMARY, "injected": injected, "lift_off": lift_off}))
+        answer = {"sensor": "zed", "mode": "dead", "t_s": 30.4, "detected_s": 30.5, "failed": ["zed_de"]}
+        (folder / "summary.json").write_text(json.dumps({**SUMMARY, "answers": [answer], "lift_off": lift_off}))
         page.wait("document.querySelector('#lines').textContent.includes('The zed was made to fail (dead).')")
         chain = page.text(".chain li")
         assert chain.startswith("failure30.40 szed failed (dead, injected) | resource30.50 s")  # all times count from the same lift-off

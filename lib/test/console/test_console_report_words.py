@@ -42,7 +42,7 @@ def test_what_failed_without_being_made_to_is_the_cause_of_what_followed(browser
     (answer,) = summary["answers"]
     died = [] if sensor == "radio" else [{"name": sensor, "when_s": 40.0, "how": "signal SIGSEGV"}]
     mode, until_s = ("died", None) if died else ("", 50.0)
-    summary |= {"answers": [{**answer, "sensor": sensor, "mode": mode, "until_s": until_s}], "died": died}
+    summary |= {"answers": [{**answer, "sensor": sensor, "mode": mode, "injected": False, "until_s": until_s}], "died": died}
     page = Page(browser, make_story_report(tmp_path, [entry for entry in story if entry[1] != "/fault"], summary))
     page.wait(DRAWN)
     assert page.text("#answers tbody tr").startswith(what)

@@ -5,11 +5,7 @@ const AT_PLACE_M = 1; // so near counts as at home, or at a waypoint
 const MODES = { RTL: "flies home and lands by itself", BRAKE: "brakes and hovers by itself", LOITER: "obeys the pilot", ALT_HOLD: "obeys the pilot", STABILIZE: "obeys the pilot" };
 
 /** When the vehicle came to stand on the ground for the last time; null: it has not. */
-function landing(run) {
-  const [, track] = [...run.resources].find(([name]) => name.endsWith(".flight_status")) ?? [];
-  if (!track || last(track.v).state !== "ON_GROUND" || last(track.v).from !== "IN_AIR") return null;
-  return last(track.t);
-}
+const landing = (run) => run.back;
 
 /** The vehicle's places at lift-off and after the landing, {home, landed}; null for each that the record does not tell. */
 function places(run) {
@@ -43,16 +39,16 @@ function autopilotActs(run) {
   for (const { t, columns } of run.data.values()) {
     (columns.get("mode") ?? []).forEach((mode, index, modes) => {
       if (!index || mode === modes[index - 1] || !MODES[mode] || t[index] <= begin || t[index] >= end) return;
-      acts.push({ t: authorityLost(run, t[index - 1], t[index]) ?? t[index], mode, text: `changed to ${mode}: it ${MODES[mode]}` });
+      acts.push({ t: toldBetween(run, t[index - 1], t[index]) ?? t[index], mode, text: `changed to ${mode}: it ${MODES[mode]}` });
     });
   }
   return acts;
 }
 
-/** When, between two samples of the mode, the loss of the authority was reported, which follows from the change; null: it was not. */
-function authorityLost(run, after, until) {
-  for (const [name, { t, v }] of run.resources) {
-    const index = name.endsWith("SDK_authority") ? v.findIndex(({ state }, at) => state === "UNAVAILABLE" && t[at] > after && t[at] <= until) : -1;
+/** When, between two samples of the mode, a resource told of what follows from the change; null: none did. */
+function toldBetween(run, after, until) {
+  for (const { t, v } of run.resources.values()) {
+    const index = v.findIndex(({ alarm }, at) => alarm && t[at] > after && t[at] <= until);
     if (index >= 0) return t[index];
   }
   return null;

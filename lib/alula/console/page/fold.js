@@ -66,6 +66,7 @@ function newRun() {
     operator: [],
     moments: [], // what the list of events shows: {t, kind, text, bad}
     departure: null, // when the vehicle left the ground
+    back: null, // when it was back there for the last time
   };
 }
 
@@ -73,8 +74,7 @@ const FOLDERS = {
   "/mission": (run, t, value) => {
     const before = last(run.mission.v);
     push(run.mission, t, value);
-    if (value.lift_off_s != null) run.departure = value.lift_off_s;
-    if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.reason ? `: ${reasonInWords(value.reason)}` : ""}`);
+    if (before?.outcome !== value.outcome) moment(run, t, "mission", value.outcome === "running" ? "the mission's process is up" : `mission ${words(value.outcome)}${value.told ? `: ${value.told}` : ""}`);
   },
   "/ticks": (run, t, { unmet, conditions }) => {
     const known = Array.isArray(conditions) ? conditions.map(([needed, otherwise]) => [String(needed), String(otherwise ?? "")]) : sentences(unmet).map((sentence) => ["", sentence]);
@@ -132,6 +132,7 @@ function fold(run, [topic, t, value]) {
     run.begin = run.begin === null ? t : Math.min(run.begin, t);
     run.end = run.end === null ? t : Math.max(run.end, t);
   } else if (!folder) run.facts[topic] = value;
+  if (topic === "/causes") [run.departure, run.back] = [value.departed_s, value.back_s];
   if (t !== null || !SAMPLES.has(topic)) folder?.(run, t ?? BEFORE, value);
   return run;
 }
@@ -149,11 +150,16 @@ function foldTransition(run, t, value) {
   if (!run.resources.has(name)) run.resources.set(name, newTrack());
   const track = run.resources.get(name);
   if (!track.t.length) push(track, run.begin ?? t, { state: value.from_state, from: "", cause: "" });
-  push(track, t, { state: value.to_state, from: value.from_state, cause: value.cause });
-  if (value.resource === "flight_status" && value.from_state === "ON_GROUND" && run.departure === null) run.departure = t;
-  const bad = /BROKEN|LOST|FAILED|ERROR/.test(value.to_state);
+  push(track, t, { state: value.to_state, from: value.from_state, cause: value.cause, alarm: value.alarm });
+  const bad = isAlarm(run, value.alarm, t);
   if (value.cause === "extern" || bad) moment(run, t, "resource", `${name}: ${value.from_state} → ${value.to_state} (${value.cause})`, bad);
 }
+
+/** Whether the vehicle is away from where it began, at t. */
+const isAway = (run, t) => run.departure !== null && t >= run.departure && (run.back === null || t < run.back);
+
+/** Whether a resource's state is bad news at t: some are only while the vehicle is away. */
+const isAlarm = (run, alarm, t) => alarm === "always" || (alarm === "away" && isAway(run, t));
 
 function foldExecution(run, t, value) {
   const key = `${value.skillset}/${value.skill}/${value.id}`;
@@ -168,8 +174,7 @@ function foldExecution(run, t, value) {
   if (value.state === "RUNNING") moment(run, t, "skill", `${value.skillset}.${value.skill} runs`);
   else if (TERMINAL.has(value.state)) {
     const ending = endingOf(execution);
-    const why = inWords((value.message || "").replace(`${value.result}: `, ""));
-    moment(run, t, "skill", `${value.skillset}.${value.skill} ${ENDINGS[ending].words}${why ? `: ${why}` : ""}${value.result ? ` (${value.result})` : ""}`, ending === "violated" || ending === "failure");
+    moment(run, t, "skill", `${value.skillset}.${value.skill} ${ENDINGS[ending].words}${value.why ? `: ${value.why}` : ""}${value.result ? ` (${value.result})` : ""}`, ending === "violated" || ending === "failure");
   }
 }
 
@@ -275,18 +280,3 @@ function nodeAt(node, t) {
 const sentences = (list) => (Array.isArray(list) ? list.map(String) : []);
 
 const words = (text) => String(text ?? "").replaceAll("_", " ").toLowerCase();
-
-const MEASURES = { fps: "frames per second", quality: "picture quality (SSIM)" };
-
-/** A message with its negative margins in words: of "picture.fps_margin is -6.0" "frames per second: 6.0 below the limit". */
-function inWords(text) {
-  return text.replace(/(?:\w+\.)*(\w+)_margin is -([\d.]+)/g, (all, name, number) => {
-    const unit = MEASURES[name] ? "" : unitOf(name);
-    return `${MEASURES[name] ?? words(name.replace(/_(m|s|m_s|rad)$/, ""))}: ${number}${unit ? ` ${unit}` : ""} below the limit`;
-  });
-}
-
-/** The mission's reason with the words first: "a.b: CODE name (why)" as "a.b: why (code name)". */
-function reasonInWords(text) {
-  return inWords(text).replace(/(\w+\.\w+): ([A-Z_]+)((?: \w+)?) \(((?:[^()]|\([^()]*\))*)\)/g, (all, skill, code, name, why) => `${skill}: ${why} (${words(code)}${name})`);
-}

@@ -34,7 +34,7 @@ function show() {
 }
 
 function showStory() {
-  const news = `${run.news} ${run.over} ${faultsOf(run).length}`;
+  const news = `${run.news} ${run.over}`;
   if (showStory.news === news) return;
   showStory.news = news;
   const { text, tone, reason } = headline(run);
@@ -53,7 +53,7 @@ function showStory() {
   const cell = (label, ...content) => el("td", { "data-label": label }, ...content);
   rewrite(byId("answers").tBodies[0], rows, ({ what, why, t, until, done, cost }) => el("tr", {}, el("th", { scope: "row" }, what, why ? el("p", { class: "hint" }, why) : null), cell("when", ...(t === null ? [] : [go(t)]), ...(until == null ? [] : [" until ", go(until)])), cell("what was done", done), cell("what it cost", cost)));
   byId("answers").hidden = !rows.length;
-  const chains = failures(run).map((failure) => chainOf(run, failure));
+  const chains = failures(run).map(({ chain }) => chain);
   rewrite(byId("chains"), chains.length ? chains : [null], (chain) => (chain ? el("ol", { class: "chain" }, ...chain.map(({ step, t, text: sentence }) => el("li", {}, el("b", {}, step), go(t), el("span", {}, sentence)))) : el("p", {}, "No skill failed.")));
   rewrite(byId("problems"), run.facts["/summary"]?.problems ?? [], (sentence) => el("li", {}, sentence));
 }

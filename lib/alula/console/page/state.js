@@ -2,7 +2,6 @@
 // At the end of a run that is over the figures are those of the whole run.
 
 const RECENT = 6;
-const ALARM = /BROKEN|LOST|FAILED|ERROR|DOWN|CRITICAL/;
 
 /** What runs at t: [{name, since, inputs}], in the order of their starts. */
 function activeAt(run, t) {
@@ -63,8 +62,8 @@ function linkAt(run, t, told) {
   if (autopilot) parts.push(told("link", [autopilot], (up) => (up ? { text: "autopilot up" } : { text: "autopilot lost", tone: "bad" })));
   for (const [name, track] of run.resources) {
     if (!/\.(\w+_)?link$/.test(name)) continue;
-    const { state } = valueAt(track, t) ?? { state: "unknown" };
-    parts.push({ text: `${name.split(".")[0]} ${state.toLowerCase()}`, tone: ALARM.test(state) ? "bad" : "" });
+    const { state, alarm } = valueAt(track, t) ?? { state: "unknown" };
+    parts.push({ text: `${name.split(".")[0]} ${state.toLowerCase()}`, tone: isAlarm(run, alarm, t) ? "bad" : "" });
   }
   const tone = ["bad", "fair", "soft"].find((one) => parts.some((part) => part.tone === one));
   return { label: "link", text: parts.map(({ text }) => text).join(", ") || "not measured", tone: parts.length ? tone : "soft" };
@@ -74,33 +73,30 @@ function linkAt(run, t, told) {
 function wrongAt(run, t) {
   const found = [];
   const flew = run.departure !== null && t >= run.departure;
-  const flies = flew && (landing(run) === null || t < landing(run));
   if (!flew && !run.over) for (const [needed, otherwise] of valueAt(run.start, t) ?? []) if (otherwise) found.push({ text: `before the start: ${otherwise || needed}`, tone: "fair", since: null });
   const held = valueAt(run.held, t) ?? null;
   if (held !== null && (run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome) === "running") found.push({ text: "the mission is paused", tone: "fair", since: run.held.t[indexAt(run.held.t, t)] });
   found.push(...faultsAt(run, t), ...endedBadly(run, t));
   for (const [name, track] of run.resources) {
     const index = indexAt(track.t, t);
-    const state = index < 0 ? "" : track.v[index].state;
-    if (ALARM.test(state) || (flies && state === "UNAVAILABLE")) found.push({ text: `${name.split(".")[1]} is ${state}`, tone: "bad", since: track.t[index] });
+    if (index >= 0 && isAlarm(run, track.v[index].alarm, t)) found.push({ text: `${name.split(".")[1]} is ${track.v[index].state}`, tone: "bad", since: track.t[index] });
   }
   for (const [sensor, track] of run.health) {
     const index = indexAt(track.t, t);
     if (index >= 0 && !track.v[index].ok) found.push({ text: `${sensor}: ${track.v[index].reason || track.v[index].fault}`, tone: "bad", since: track.t[index] });
   }
-  const since = flies ? fieldAt(run, t, /position_enu_m\.z$/)?.since : null;
+  const since = isAway(run, t) ? fieldAt(run, t, /position_enu_m\.z$/)?.since : null;
   if (since) found.push({ text: "no position", tone: "bad", since });
   const crash = run.facts["/summary"]?.crash;
   if (crash && t >= (landing(run) ?? Infinity)) found.push({ text: `crashed: ${crash}`, tone: "bad", since: landing(run) });
   return found;
 }
 
-/** What was made to fail, or failed by itself, and does so still; of a sensor the resource that tells of it is enough. */
+/** What has failed and does so still; where a resource tells of it, that is enough. */
 function faultsAt(run, t) {
-  const now = new Map();
-  for (const fault of faultsOf(run)) if (fault.t <= t) now.set(fault.sensor, fault);
-  const told = [...run.resources].filter(([, track]) => ALARM.test(valueAt(track, t)?.state ?? "")).map(([name]) => name.split(".")[1]);
-  return [...now.values()].filter(({ sensor, mode }) => mode !== "ok" && !told.some((resource) => resource.startsWith(sensor))).map((fault) => ({ text: faultWords(fault), tone: "bad", since: fault.t }));
+  const lasting = faultsOf(run).filter((fault) => fault.t <= t && (fault.until === null || t < fault.until));
+  const shown = (name) => isAlarm(run, valueAt(run.resources.get(name) ?? newTrack(), t)?.alarm, t);
+  return lasting.filter(({ resource }) => !resource || !shown(resource)).map((fault) => ({ text: fault.text, tone: "bad", since: fault.t }));
 }
 
 /** Skills whose last execution ended badly, and that do not run again. */

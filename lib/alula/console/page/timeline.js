@@ -145,11 +145,11 @@ class TimelineView {
 
   bands(name, track, y) {
     const states = [...new Set(track.v.map(({ state }) => state))];
-    return track.v.flatMap(({ state, cause }, index) => {
+    return track.v.flatMap(({ state, cause, alarm: told }, index) => {
       const place = this.stretch(track.t[index], track.t[index + 1] ?? this.run.end);
       if (!place) return [];
       const [x, width] = place;
-      const alarm = /BROKEN|LOST|FAILED|ERROR/.test(state);
+      const alarm = isAlarm(this.run, told, track.t[index]);
       const text = `${name} is ${state}${cause ? ` (${cause})` : ""}`;
       const fill = alarm ? "var(--alarm)" : states.indexOf(state) % 2 ? "var(--band-b)" : "var(--band-a)";
       const parts = [svg("rect", { x, y: y + 1.5, width, height: BAND_ROW - 3, fill, "data-text": text, "data-from": track.t[index], "data-to": track.t[index + 1] ?? "" }, svg("title", {}, text))];

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from alula.common.faults import FaultRequest, spans_of
+from alula.common.faults import MENDED, FaultChange, FaultRequest, spans_of
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.runtime.core.events import EngineEvent, TransitionEvent
@@ -20,12 +20,16 @@ LATE_S = 5.0
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that failed, or a process that ended, from ``at_s`` to ``until_s``, seconds of mission clock."""
+    """Something that failed, or a process that ended, from ``at_s`` to ``until_s``, seconds of mission clock.
+
+    ``injected``: it was made to fail.
+    """
 
     name: str
     at_s: float
     until_s: float = math.inf
     effects: FaultEffects = field(default_factory=FaultEffects)
+    injected: bool = True
 
     def holds(self, t_s: float) -> bool:
         """Tell whether what happened at this time can follow from it."""
@@ -50,6 +54,26 @@ class Traced:
     def detected_s(self) -> float | None:
         """When the skill layer first told of it, seconds of mission clock; None: never."""
         return None if self.first is None else self.first.stamp_s
+
+    @property
+    def detected_by(self) -> str:
+        """The change of a resource, or the end of a skill, that told of it first; empty: nothing did."""
+        event = self.first
+        if event is None:
+            return ""
+        if isinstance(event, TransitionEvent):
+            return f"{event.skillset}.{event.resource} {event.from_state} -> {event.to_state}"
+        return f"{event.skillset}.{event.skill} {event.state.value} {event.result}".rstrip()
+
+
+def faults_told(changes: Sequence[FaultChange], effects: EffectsByFault) -> list[tuple[FaultChange, Fault]]:
+    """Return the faults that recordings tell, each with its change; one lasts until the next change of the same thing."""
+    found = []
+    for at, change in enumerate(changes):
+        if change.mode != MENDED:
+            until_s = next((later.t_s for later in changes[at + 1 :] if later.sensor == change.sensor), math.inf)
+            found.append((change, Fault(change.sensor, change.t_s, until_s, effects.of(change.sensor))))
+    return found
 
 
 def faults_asked(

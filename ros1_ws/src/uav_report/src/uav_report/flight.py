@@ -85,7 +85,7 @@ class FlightReport:
         lost_s, radio = radio_lost_s(self._video, self._phases), effects.of(RADIO)
         if lost_s is None or any(explains(fault, lost_s, radio) for fault in known):
             return []
-        return [(FaultChange(RADIO, "", lost_s), Fault(RADIO, lost_s, effects=radio))]
+        return [(FaultChange(RADIO, "", lost_s), Fault(RADIO, lost_s, effects=radio, injected=False))]
 
     def measure(self, phases: Phases, recovery: Recovery | None, timeline: Timeline | None) -> Findings:  # noqa: ARG002
         """Compare with the true world, and draw map and video."""
