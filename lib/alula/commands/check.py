@@ -1,4 +1,4 @@
-"""`alula check [FILE...]`: read models, say what is wrong with them, and prove the rest.
+"""`alula check [FILE...]`: read models and missions, say what is wrong with them, and prove the rest.
 
 A model without errors is handed to the prover; what that finds is told with the rest, on standard output. With ``--to`` the models
 are printed there instead, and findings go to standard error.
@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import partial
 from time import monotonic
 
+from alula.commands.check_missions import SUFFIX, check_missions
 from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors, render
 from alula.language.models import ModelFile, check_files, models_in
@@ -22,7 +23,10 @@ from alula.language.printer import print_file
 from alula.model.model import Skillset
 
 UNREADABLE = "ALU0"
-FILES_HELP = "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input"
+FILES_HELP = (
+    "skillsets in the paper's notation (*.skill) or the Robot Language (*.rl), folders of them, or `-`: the standard input; "
+    "missions (*.xml)"
+)
 EXIT_CODES = """
 exit code: 0 proved, or nothing but warnings; 1 a model has errors (also of syntax) or a property fails; 2 a file can't be read
 (not there, no UTF-8 text, too large), or the arguments are wrong
@@ -41,8 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except RobotError as error:
         sys.stderr.write(f"alula check: no files are named, and {error}\n")
         return 2
-    paths = dict.fromkeys(path for place in given for path in models_in(place))
-    files = check_files(list(paths), sys.stdin.buffer)
+    missions = [place for place in dict.fromkeys(given) if place.endswith(SUFFIX)]
+    paths = dict.fromkeys(path for place in given if place not in missions for path in models_in(place))
+    files = [*check_files(list(paths), sys.stdin.buffer), *check_missions(missions, options.palette)]
     if options.proofs and options.to is None:
         _prove(files, options.time, closed_world=options.closed_world)
     for file in files:
@@ -75,6 +80,13 @@ def _parser() -> argparse.ArgumentParser:
         "--json",
         action="store_true",
         help="print one JSON object: each finding's place, code, counterexample",
+    )
+    parser.add_argument(
+        "--palette",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="with a mission: a TreeNodesModel with more types of node, as Groot2's",
     )
     parser.add_argument(
         "--closed-world", action="store_true", help="assume that transitions that are neither extern nor used by an effect are never taken"

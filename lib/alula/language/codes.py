@@ -1,4 +1,4 @@
-"""What each finding's code means: files (ALU0), syntax (1), meaning (2), likely slips (3), the robot's files (4), proofs (5).
+"""What each finding's code means: files (ALU0), syntax (1), meaning (2), slips (3), the robot's files (4), proofs (5), missions (6).
 
 Codes are a contract: tests, users and tools refer to them, so that a number is never given a second meaning.
 """
@@ -11,8 +11,12 @@ CODES: Mapping[str, str] = {
     "ALU001": "a file can't be read",
     "ALU002": "a file is not UTF-8 text",
     "ALU003": "a file is too large for a model",
+    "ALU004": "a mission's file that is no XML of trees",
     "ALU005": "a side file (types, bindings) that is not as it should be",
     "ALU006": "a folder without skillsets",
+    "ALU007": "a tree, or a file of trees, that contains itself",
+    "ALU008": "a script that is too long or too deep",
+    "ALU009": "a mission with too many nodes or levels",
     "ALU100": "a character that the language doesn't know",
     "ALU101": "a string without its end",
     "ALU102": "a number out of range",
@@ -84,7 +88,30 @@ CODES: Mapping[str, str] = {
     "ALU526": "more executions of one skill at once than are looked at",
     "ALU531": "a property does not hold",
     "ALU540": "not proved in the time given",
+    "ALU601": "an unknown node or skill",
+    "ALU602": "a tree that is not built as trees are",
+    "ALU603": "a port that the node doesn't have",
+    "ALU604": "an input that is missing and has no default",
+    "ALU605": "a value or an entry of the wrong type",
+    "ALU606": "a value or an entry in the wrong unit",
+    "ALU607": "an entry that is read before anything can have written it",
+    "ALU608": "an entry that is written with different types",
+    "ALU609": "a result of a skill that no branch deals with",
+    "ALU610": "a child that is never reached",
+    "ALU611": "two children of a reactive node that take several ticks",
+    "ALU612": "a skill that runs until it is interrupted, whose success is waited for",
+    "ALU613": "two branches of a Parallel that need the same resource",
+    "ALU614": "a script that can't be read",
+    "ALU615": "a name in a script that the robot doesn't have",
+    "ALU616": "a script that not every version of BehaviorTree.CPP 4 reads alike",
+    "ALU617": "an unknown subtree",
+    "ALU618": "a result that the skill doesn't have",
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}
-"""Those of the prover, told in skillsets/PROOFS.md; the others are in skillsets/LANGUAGE.md."""
+"""Those of the prover, told in skillsets/PROOFS.md; those of models are in skillsets/LANGUAGE.md."""
+
+MISSION_CODES: Mapping[str, str] = {
+    code: meaning for code, meaning in CODES.items() if code.startswith("ALU6") or code in {"ALU004", "ALU007", "ALU008", "ALU009"}
+}
+"""Those of missions, told in docs/mission-checks.md."""

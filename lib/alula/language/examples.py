@@ -30,4 +30,5 @@ def examples(package: str) -> Mapping[str, Example]:
 
 LANGUAGE = "alula.language"
 PROOFS = "alula.prove"
-"""The packages that have examples. The proofs are named only: nothing here imports them."""
+MISSIONS = "alula.missions.check"
+"""The packages that have examples. Proofs and missions are named only: nothing here imports them."""

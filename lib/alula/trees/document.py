@@ -125,14 +125,21 @@ class Document:
         return self.before + "".join(self.root.pieces()) + self.after
 
 
+def read_source(path: Path) -> bytes:
+    """Return what a file has, of one that is too long its beginning; raises FileError."""
+    try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise FileError(Problem(Place(str(path), 1, 1), "can't be read: it is no regular file", code="ALU001"))
+        with path.open("rb") as file:
+            return file.read(LONGEST_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else "") or str(error)
+        raise FileError(Problem(Place(str(path), 1, 1), f"can't be read: {reason}", code="ALU001")) from error
+
+
 def read_document(path: Path) -> Document:
     """Read a file; raises FileError."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(LONGEST_BYTES + 1)
-    except OSError as error:
-        raise FileError(Problem(Place(str(path), 1, 1), f"can't be read: {error.strerror or error}")) from error
-    return parse_document(content, str(path))
+    return parse_document(read_source(path), str(path))
 
 
 def parse_document(content: str | bytes, path: str = "<text>") -> Document:
@@ -154,6 +161,7 @@ class _Parser:
         self._count = 0
         self._written = 0  # up to where the source is in the elements
         self._before = 0
+        self._last = -1, 1  # the place that was told last: its index, its column
         parser = self._expat = expat.ParserCreate("utf-8")
         parser.StartElementHandler = self._start
         parser.EndElementHandler = self._end
@@ -177,8 +185,12 @@ class _Parser:
 
     def _place(self, index: int) -> Place:
         line = bisect_right(self._lines, index)
-        start = self._lines[line - 1]
-        return Place(self._path, line, len(self._source[start:index].decode(errors="replace")) + 1)
+        start, column = self._lines[line - 1], 1
+        if start <= self._last[0] <= index:  # on from the place before: a file may have one line of megabytes
+            start, column = self._last
+        column += len(self._source[start:index].decode(errors="replace"))
+        self._last = index, column
+        return Place(self._path, line, column)
 
     def _error(self, index: int, message: str, cure: str = "") -> FileError:
         return FileError(Problem(self._place(max(index, 0)), message, cure))

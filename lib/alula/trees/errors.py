@@ -21,11 +21,18 @@ class Place:
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong in a file, and what to do about it; the cure may be empty."""
+    """One thing that is wrong in a file, and what to do about it; the cure may be empty.
+
+    ``code`` is the number under which docs/mission-checks.md tells of it, ``length`` that of the text that it is about, in characters;
+    a warning keeps no tree from being ticked.
+    """
 
     place: Place
     message: str
     cure: str = ""
+    code: str = "ALU602"
+    length: int = 1
+    warning: bool = False
 
     def __str__(self) -> str:
         return f"{self.place}: {self.message}" + (f"; {self.cure}" if self.cure else "")

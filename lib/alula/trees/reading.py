@@ -77,7 +77,7 @@ def read_models(path: Path) -> Palette:
     return files.declared()
 
 
-def read_text(text: str, path: str = "<text>", report: Report = refuse) -> TreeFiles:
+def read_text(text: str | bytes, path: str = "<text>", report: Report = refuse) -> TreeFiles:
     """Read the text of a file; what it includes is looked for beside ``path``. Raises as `read_files`."""
     files = TreeFiles()
     _Reader(files, report).add(parse_document(text, path), (Path(path).resolve(),))
@@ -134,7 +134,7 @@ class _Reader:
             return
         path = Path(document.path).parent / name
         if path.resolve() in chain:
-            self._report(Problem(element.place, f"{name} includes itself", "take one of the includes out"))
+            self._report(Problem(element.place, f"{name} includes itself", "take one of the includes out", code="ALU007"))
         elif path.resolve() not in self._seen:
             if not path.is_file():
                 self._report(Problem(element.place_of("path"), f"there is no file {path}", "the path counts from this file on"))

@@ -36,7 +36,7 @@ def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: R
         if known is None:
             cure = did_you_mean(name, [*palette.names()]) or "see `alula palette`"
             place = element.place_of("ID") if element.tag in CATEGORIES else element.place
-            report(Problem(place, f"unknown node '{name}'", cure))
+            report(Problem(place, f"unknown node '{name}'", cure, code="ALU601"))
         else:
             _verify_children(element, known, report)
             for attribute in element.attributes.values():
@@ -48,14 +48,16 @@ def _verify_node(element: Element, files: TreeFiles, palette: Palette, report: R
 def _verify_subtree(element: Element, files: TreeFiles, report: Report) -> None:
     name = type_name(element)
     if name not in files.trees:
-        report(Problem(element.place_of("ID"), f"there is no tree '{name}'", did_you_mean(name, files.trees)))
+        report(Problem(element.place_of("ID"), f"there is no tree '{name}'", did_you_mean(name, files.trees), code="ALU617"))
     if element.children:
         report(Problem(element.children[0].place, f"<SubTree> '{name}' has children", "they belong into the tree itself"))
     model = files.models.get(name)
     if model is not None and not _is_true(element.get("_autoremap")):
         for port in model.ports.values():
             if port.default is None and port.name not in element.attributes:
-                report(Problem(element.place, f"the subtree '{name}' needs the port '{port.name}'", f'add {port.name}="..."'))
+                report(
+                    Problem(element.place, f"the subtree '{name}' needs the port '{port.name}'", f'add {port.name}="..."', code="ALU604")
+                )
 
 
 def _is_true(text: str) -> bool:
@@ -77,29 +79,35 @@ def _verify_attribute(attribute: Attribute, known: NodeType, element: Element, r
         return
     port = known.ports.get(attribute.name)
     if port is None:
-        report(Problem(attribute.place, f"'{known.name}' has no port '{attribute.name}'", did_you_mean(attribute.name, known.ports)))
+        report(
+            Problem(
+                attribute.place, f"'{known.name}' has no port '{attribute.name}'", did_you_mean(attribute.name, known.ports), code="ALU603"
+            )
+        )
         return
     key = pointer(attribute.value, port.name)
     if key is None and port.direction is Direction.OUTPUT:
-        report(Problem(attribute.place, f"the port '{port.name}' is written", f'it names an entry: {port.name}="{{...}}"'))
+        report(Problem(attribute.place, f"the port '{port.name}' is written", f'it names an entry: {port.name}="{{...}}"', code="ALU605"))
     elif key is None:
         try:
             port.type.parse(attribute.value)
         except ValueError as error:
-            report(Problem(attribute.value_place or attribute.place, f"the port '{port.name}': {error}"))
+            report(Problem(attribute.value_place or attribute.place, f"the port '{port.name}': {error}", code="ALU605"))
 
 
 def _verify_given(element: Element, known: NodeType, report: Report) -> None:
     for port in known.ports.values():
         if port.required and port.name not in element.attributes:
-            report(Problem(element.place, f"'{known.name}' needs the port '{port.name}'", f'add {port.name}="..."'))
+            report(Problem(element.place, f"'{known.name}' needs the port '{port.name}'", f'add {port.name}="..."', code="ALU604"))
 
 
 def _verify_reactive(element: Element, report: Report) -> None:
     if type_name(element) == "ReactiveSequence":
         slow = [child for child in element.children if type_name(child) == "AsyncSequence"]
         for child in slow[1:]:
-            report(Problem(child.place, "a second AsyncSequence in a ReactiveSequence", "only one child may take several ticks"))
+            report(
+                Problem(child.place, "a second AsyncSequence in a ReactiveSequence", "only one child may take several ticks", code="ALU611")
+            )
 
 
 class _Sizes:
@@ -126,7 +134,11 @@ class _Sizes:
                 inner = type_name(element)
                 if inner in stack:
                     way = " in ".join(f"'{one}'" for one in [inner, *reversed(stack[stack.index(inner) :])])
-                    self._report(Problem(element.place, f"a tree contains itself: {way}", "a loop is what Repeat and its like are for"))
+                    self._report(
+                        Problem(
+                            element.place, f"a tree contains itself: {way}", "a loop is what Repeat and its like are for", code="ALU007"
+                        )
+                    )
                 elif inner in self._files.trees:
                     stack.append(inner)
 
@@ -142,7 +154,7 @@ class _Sizes:
             message = f"the tree '{name}' is with its subtrees {depth} levels deep, more than {DEEPEST}"
         else:
             return nodes, depth
-        self._report(Problem(tree.place, message, "use a tree less often, or in fewer of the others"))
+        self._report(Problem(tree.place, message, "use a tree less often, or in fewer of the others", code="ALU009"))
         return 0, 0
 
 

@@ -67,7 +67,8 @@ _CURES = {
 def tokenize(text: str) -> list[Token]:
     """Return the tokens of a script, an END token last; raise ScriptError at the first text that is none."""
     if len(text) > MAX_CHARACTERS:
-        raise ScriptError(f"a script of {len(text)} characters; there may be {MAX_CHARACTERS}", MAX_CHARACTERS, cure="divide it")
+        message = f"a script of {len(text)} characters; there may be {MAX_CHARACTERS}"
+        raise ScriptError(message, MAX_CHARACTERS, cure="divide it", excess=True)
     tokens: list[Token] = []
     for match in _TOKEN.finditer(text):
         group = match.lastgroup

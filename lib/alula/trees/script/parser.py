@@ -141,7 +141,7 @@ class _Parser:
     def _descend(self) -> None:
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise ScriptError(f"nested deeper than {MAX_DEPTH}", self._peek().offset, cure="divide it into statements")
+            raise ScriptError(f"nested deeper than {MAX_DEPTH}", self._peek().offset, cure="divide it into statements", excess=True)
 
     def _conditional(self) -> Node:
         condition = self._binary()

@@ -1,0 +1,127 @@
+"""The robot's skills as types of node, and what the models tell of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from functools import cached_property
+
+from alula.model.model import Parameter, ResultKind, Skill, Skillset
+from alula.model.units import UNIT_IN_SI
+from alula.trees.check.sites import Site
+from alula.trees.check.traits import F, PlainTraits, S
+from alula.trees.node import pointer
+from alula.trees.palette import Category, Direction, NodeType, Palette, Port
+from alula.trees.values import BOOL, DOUBLE, INT, STRING, PortType, shown
+
+SUCCESS_PORT, OUTCOME_PORT = "success", "outcome"
+FUNCTIONS = frozenset({"running", "progress"})
+"""What scripts may ask of skills; each takes one skill's name."""
+_TYPES = {"bool": BOOL, "float32": DOUBLE, "float64": DOUBLE, "string": STRING}
+
+
+class Skills:
+    """The skills of some skillsets."""
+
+    def __init__(self, skillsets: Iterable[Skillset]) -> None:
+        self.skillsets = {skillset.name: skillset for skillset in skillsets}
+
+    def get(self, name: str) -> Skill | None:
+        """Return a skill by its whole name, as ``navigation.goto``."""
+        skillset, _, skill = name.partition(".")
+        known = self.skillsets.get(skillset)
+        return known.skill_index.get(skill) if known else None
+
+    def of(self, site: Site) -> Skill | None:
+        """Return the skill that a leaf is."""
+        return self.get(site.kind)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The whole names of all skills."""
+        return [f"{skillset.name}.{skill.name}" for skillset in self.skillsets.values() for skill in skillset.skills]
+
+    @cached_property
+    def states(self) -> frozenset[str]:
+        """The names of all states of all resources."""
+        return frozenset(state for one in self.skillsets.values() for resource in one.resources for state in resource.states)
+
+    def successes(self, site: Site) -> frozenset[str]:
+        """Return the results with which a leaf succeeds: what the file narrows them to, else those that the model calls a success."""
+        skill = self.of(site)
+        narrowed = named_results(site)
+        if skill is None:
+            return frozenset()
+        known = frozenset(result.name for result in skill.results)
+        if narrowed is not None and narrowed <= known:
+            return narrowed
+        return frozenset(name for name in known if skill.kind_of(name) is ResultKind.SUCCESS)
+
+
+def named_results(site: Site) -> frozenset[str] | None:
+    """Return the results that the file says are a success, None where it says nothing, or names an entry."""
+    text = site.given(SUCCESS_PORT)
+    if not text or pointer(text, SUCCESS_PORT) is not None:
+        return None
+    return frozenset(text.replace(";", " ").replace(",", " ").split())
+
+
+class SkillTraits(PlainTraits):
+    """What is known of BehaviorTree.CPP's nodes and of the robot's skills."""
+
+    def __init__(self, skills: Skills, names: Collection[str] = ()) -> None:
+        super().__init__({*names, *skills.states})
+        self._skills = skills
+
+    def ends(self, site: Site) -> frozenset[str]:
+        """Any skill may fail: it may be refused, interrupted, or stopped by an invariant."""
+        if self._skills.of(site) is None:
+            return super().ends(site)
+        return frozenset({F, S} if self._skills.successes(site) else {F})
+
+    def runs(self, site: Site) -> bool | None:
+        """Every skill takes several ticks."""
+        return True if self._skills.of(site) is not None else super().runs(site)
+
+    def endless(self, site: Site) -> bool:
+        """Tell whether none of its results is a success."""
+        return self._skills.of(site) is not None and not self._skills.successes(site)
+
+
+def palette_of(skills: Skills) -> Palette:
+    """Return the skills as actions: inputs and outputs are ports with the model's types, units and defaults."""
+    return Palette(
+        _node_type(f"{skillset.name}.{skill.name}", skill) for skillset in skills.skillsets.values() for skill in skillset.skills
+    )
+
+
+def _node_type(name: str, skill: Skill) -> NodeType:
+    ports = [_port(one, Direction.INPUT) for one in skill.inputs] + [_port(one, Direction.OUTPUT) for one in skill.outputs]
+    ports.append(Port(SUCCESS_PORT, STRING, default="", doc="the results that are a success, where not all are that the model calls so"))
+    ports.append(Port(OUTCOME_PORT, STRING, Direction.OUTPUT, doc="how it ended"))
+    return NodeType(name, Category.ACTION, {port.name: port for port in ports})
+
+
+def _port(parameter: Parameter, direction: Direction) -> Port:
+    required = direction is Direction.INPUT and not parameter.default
+    unit = unit_of(parameter.comment)
+    return Port(parameter.name, port_type(parameter.type), direction, parameter.default or None, parameter.comment, unit, required)
+
+
+def unit_of(comment: str) -> str:
+    """Return the unit with which the comment behind a declaration begins: `// m/s, > 0`."""
+    word = comment.replace(",", " ").split()[:1]
+    return word[0] if word and word[0] in UNIT_IN_SI else ""
+
+
+def port_type(name: str) -> PortType:
+    """Return the type of a port for a type of the model; a message can't be written as text."""
+    if name in _TYPES:
+        return _TYPES[name]
+    if name.startswith(("int", "uint")) and name.lstrip("uint").isdigit():
+        return INT
+
+    def refuse(text: str) -> object:
+        msg = f"{shown(text)} is no {name}; a {name} comes from an entry: {{entry}}"
+        raise ValueError(msg)
+
+    return PortType(name, refuse, lambda value: value)

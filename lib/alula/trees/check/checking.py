@@ -1,0 +1,114 @@
+"""Checks files of trees: their structure first, then the whole tree as it will stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import islice
+
+from alula.trees.check import entries
+from alula.trees.check.problems import of_element
+from alula.trees.check.reach import Reach, never_reached, several_run, unreached, waits_in_vain
+from alula.trees.check.scripts import Scripts, after, before, within
+from alula.trees.check.sites import Site, expand
+from alula.trees.check.traits import Traits
+from alula.trees.errors import Problem
+from alula.trees.palette import Direction, Palette
+from alula.trees.reading import TreeFiles
+from alula.trees.structure import verify
+
+ENDLESS = frozenset({"ALU007", "ALU009"})
+"""What keeps the tree from being put together at all."""
+
+
+MOST = 100
+"""Problems of one rule that are told: who has more has enough to do."""
+
+
+class _Enough(Exception):  # noqa: N818 - ends what goes on reporting
+    """There are as many problems as are told."""
+
+
+@dataclass
+class Whole:
+    """A tree as it will stand, and what is known of it: what rules are made of."""
+
+    root: Site
+    scripts: Scripts
+    reach: Reach
+    traits: Traits
+    given: Collection[str] = field(default_factory=tuple)
+    """Entries of the main tree's blackboard that are written before it starts."""
+
+
+Rule = Callable[[Whole], Iterable[Problem]]
+
+
+def check(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[str] = (), rules: Iterable[Rule] = ()) -> list[Problem]:
+    """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone."""
+    found: list[Problem] = []
+
+    def report(problem: Problem) -> None:
+        if len(found) == MOST:
+            raise _Enough
+        found.append(problem)
+
+    with suppress(_Enough):
+        verify(files, palette, report)
+    if files.main in files.trees and not any(problem.code in ENDLESS for problem in found):
+        found += _whole(files, palette, traits, given, (*RULES, *rules))
+    places: dict[tuple[object, ...], Problem] = {}
+    for problem in found:
+        places.setdefault((problem.code, problem.place, problem.message), problem)
+    return sorted(places.values(), key=lambda one: (one.place.path != files.path, one.place.path, one.place.line, one.place.column))
+
+
+def _whole(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[str], rules: Iterable[Rule]) -> list[Problem]:
+    root = expand(files, palette, files.main)
+    if root is None:
+        return []
+    model = files.models.get(files.main)
+    ports = [port.name for port in model.ports.values() if port.direction is not Direction.OUTPUT] if model else []
+    whole = Whole(root, Scripts(), Reach(traits), traits, (*given, *ports))
+    return [problem for rule in rules for problem in islice(rule(whole), MOST)]
+
+
+def _scripts(whole: Whole) -> Iterator[Problem]:
+    for site in whole.root.walk():
+        for attribute in (*before(site), *within(site), *after(site)):
+            whole.scripts.program(attribute)
+    yield from whole.scripts.problems
+
+
+def _missing(whole: Whole) -> Iterator[Problem]:
+    """Yield inputs that a file does not give and that have no default. A node that only a model tells of may do without."""
+    for site in whole.root.walk():
+        for port in site.type.ports.values() if site.type else ():
+            if port.direction is Direction.INPUT and site.given(port.name) is None and not port.required:
+                sure = site.type is not None and site.type.make is not None
+                message = f"'{site.kind}' has no input '{port.name}', which has no default"
+                cure = f'add {port.name}="..."'
+                yield of_element("ALU604", site.element, message, cure, warning=not sure)
+
+
+def _unreached(whole: Whole) -> Iterator[Problem]:
+    waited = list(waits_in_vain(whole.root, whole.reach, whole.traits))
+    yield from (problem for problem, _ in waited)
+    explained = {site for _, site in waited}
+    for child, waits_for in unreached(whole.root, whole.reach):
+        if waits_for not in explained:
+            yield never_reached(child, waits_for, whole.reach)
+
+
+def _several_run(whole: Whole) -> Iterator[Problem]:
+    return several_run(whole.root, whole.reach)
+
+
+def _entries(whole: Whole) -> Iterator[Problem]:
+    uses = entries.Uses(whole.scripts, whole.traits)
+    yield from entries.read_too_early(whole.root, uses, whole.given)
+    yield from entries.mismatched(whole.root, uses)
+
+
+RULES: tuple[Rule, ...] = (_scripts, _missing, _unreached, _several_run, _entries)

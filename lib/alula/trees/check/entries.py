@@ -1,0 +1,238 @@
+"""Entries of the blackboard: read before anything can have written them, written or read with types or units that don't fit."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+from alula.common.suggestions import nearest
+from alula.trees.check import scripts
+from alula.trees.check.problems import in_value, of_value
+from alula.trees.check.sites import Board, Key, Site
+from alula.trees.check.traits import Traits
+from alula.trees.document import Attribute
+from alula.trees.errors import Problem
+from alula.trees.node import pointer
+from alula.trees.palette import Direction, Port
+from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
+from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, TYPES, UINT
+
+NUMBER, TEXT, UNKNOWN = "a number", "a text", ""
+"""What a script writes; a port writes what its type is called."""
+_NUMERIC = frozenset({NUMBER, INT.name, UINT.name, DOUBLE.name, BOOL.name})
+_AT_ONCE = frozenset({"Parallel", "ParallelAll", "ReactiveSequence", "ReactiveFallback", "WhileDoElse", "PipelineSequence"})
+"""Nodes whose children are ticked in an order that their answers make: what one writes, any other may find."""
+
+
+@dataclass(frozen=True)
+class Use:
+    """An entry is read or written, at a place: ``offsets`` in the value of the attribute, None for all of it."""
+
+    key: Key
+    name: str
+    write: bool
+    attribute: Attribute
+    offsets: tuple[int, int] | None = None
+    type: str = UNKNOWN
+    unit: str = ""
+
+    def problem(self, code: str, message: str, cure: str) -> Problem:
+        """Return a problem of this use."""
+        if self.offsets is None:
+            return of_value(code, self.attribute, message, cure)
+        return in_value(code, self.attribute, self.offsets, message, cure)
+
+
+class Uses:
+    """All uses of entries in a tree, in the order in which they may come first."""
+
+    def __init__(self, programs: scripts.Scripts, traits: Traits) -> None:
+        self._programs = programs
+        self._traits = traits
+        self._before: dict[Site, list[Use]] = {}
+        self._after: dict[Site, list[Use]] = {}
+
+    def of(self, site: Site) -> Iterator[Use]:
+        """Yield those of a node and all below it."""
+        yield from self.before(site)
+        for child in site.children:
+            yield from self.of(child)
+        yield from self.after(site)
+
+    def before(self, site: Site) -> list[Use]:
+        """Return those before its children are ticked, of a leaf those before it ends."""
+        if site not in self._before:
+            self._before[site] = list(self._first(site))
+        return self._before[site]
+
+    def after(self, site: Site) -> list[Use]:
+        """Return those of its scripts after it has ended."""
+        if site not in self._after:
+            self._after[site] = [use for attribute in scripts.after(site) for use in self._script(site, attribute)]
+        return self._after[site]
+
+    def _first(self, site: Site) -> Iterator[Use]:
+        for attribute in scripts.before(site):
+            yield from self._script(site, attribute)
+        if site.element.tag == "SubTree":
+            yield from _constants(site)
+            return
+        yield from self._ports(site, write=False)
+        for attribute in scripts.within(site):
+            yield from self._script(site, attribute)
+        yield from self._ports(site, write=True)
+
+    def _ports(self, site: Site, *, write: bool) -> Iterator[Use]:
+        known = site.type.ports if site.type else {}
+        for attribute in site.ports():
+            port = known.get(attribute.name)
+            if port is None:
+                continue
+            written = port.direction is not Direction.INPUT
+            if site.kind == "SetBlackboard" and port.name == "output_key":
+                if write and pointer(attribute.value, port.name) is None:
+                    yield Use(site.board.key(attribute.value), attribute.value, True, attribute, None, _set_type(site))
+                continue
+            key = pointer(attribute.value, port.name)
+            if key is None or written != write or (not write and self._traits.is_optional(site, port.name)):
+                continue
+            yield Use(site.board.key(key), key, write, attribute, None, _type_name(port), port.unit)
+
+    def _script(self, site: Site, attribute: Attribute) -> Iterator[Use]:
+        program = self._programs.program(attribute)
+        for statement in program.statements if program else ():
+            yield from self._node(site.board, attribute, statement)
+
+    def _node(self, board: Board, attribute: Attribute, node: Node) -> Iterator[Use]:
+        match node:
+            case Name():
+                if not self._traits.is_name(node.name):
+                    yield Use(board.key(node.name), node.name, False, attribute, (node.offset, node.end))
+            case Assignment(target=Name() as target):
+                if node.operator not in {":=", "="}:
+                    yield from self._node(board, attribute, target)
+                yield from self._node(board, attribute, node.value)
+                place, kind = (target.offset, target.end), _written(node.value)
+                yield Use(board.key(target.name), target.name, True, attribute, place, kind)
+            case _:
+                for child in children(node):
+                    if not (isinstance(node, Call) and isinstance(child, Name)) and not _is_state(node, child):
+                        yield from self._node(board, attribute, child)
+
+
+def _is_state(node: Node, child: Node) -> bool:
+    """Tell whether a bare name stands beside a dotted one: `navigation.flight_status == IN_AIR`."""
+    if not isinstance(node, Comparison) or not isinstance(child, Name):
+        return False
+    return any(isinstance(other, Name) and "." in other.name for other in node.operands)
+
+
+def _written(value: Node) -> str:
+    """Return what a script's expression gives, as far as it can be told."""
+    match value:
+        case Literal():
+            return TEXT if isinstance(value.value, str) else NUMBER
+        case Comparison() | Prefix():
+            return NUMBER
+        case Chain(operators=operators):
+            return TEXT if ".." in operators else UNKNOWN if "+" in operators else NUMBER
+        case Conditional():
+            then, otherwise = _written(value.then), _written(value.otherwise)
+            return then if then == otherwise else UNKNOWN
+        case _:
+            return UNKNOWN
+
+
+def _set_type(site: Site) -> str:
+    text = site.given("value") or ""
+    if pointer(text, "value") is not None:
+        return UNKNOWN
+    try:
+        float(text)
+    except ValueError:
+        return TEXT
+    return UNKNOWN  # a text, which any number's port reads
+
+
+def _type_name(port: Port) -> str:
+    return UNKNOWN if port.type is ANY else port.type.name
+
+
+def _constants(site: Site) -> Iterator[Use]:
+    """Yield what a subtree's use writes into the entries of the subtree: `<SubTree ID="leg" height="3"/>`."""
+    for child in site.children:
+        for attribute in site.ports():
+            if pointer(attribute.value, attribute.name) is None:
+                yield Use((child.board.number, attribute.name), attribute.name, True, attribute)
+
+
+def read_too_early(root: Site, uses: Uses, given: Collection[str]) -> Iterator[Problem]:
+    """Yield each reading of an entry that nothing can have written by then; ``given``: what the main tree's blackboard has at the start."""
+    written = {root.board.key(name) for name in given}
+    later = {use.key: use for use in reversed(list(uses.of(root))) if use.write}
+    names = sorted({use.name for use in later.values()} | set(given))
+
+    def visit(site: Site) -> Iterator[Problem]:
+        yield from judged(uses.before(site))
+        if site.kind in _AT_ONCE:
+            written.update(use.key for child in site.children for use in uses.of(child) if use.write)
+        for child in site.children:
+            yield from visit(child)
+        yield from judged(uses.after(site))
+
+    def judged(found: list[Use]) -> Iterator[Problem]:
+        for use in found:
+            if use.write:
+                written.add(use.key)
+            elif use.key not in written:
+                written.add(use.key)  # one finding for an entry is enough
+                yield _unwritten(use, later.get(use.key), names)
+
+    yield from visit(root)
+
+
+def _unwritten(use: Use, writer: Use | None, names: list[str]) -> Problem:
+    if writer is not None:
+        message = f"`{use.name}` is read here before anything can have written it: line {writer.attribute.place.line} does later"
+        return use.problem("ALU607", message, "write it before, or ask for it later")
+    message = f"`{use.name}` is read, and nothing before writes it"
+    alike = nearest(use.name, names)
+    cure = alike if alike.startswith("did you mean") else f'write it before: <Script code="{use.name} := ..."/>'
+    return use.problem("ALU607", message, cure)
+
+
+def mismatched(root: Site, uses: Uses) -> Iterator[Problem]:
+    """Yield entries that are written with two types, or read as another type or in another unit than they are written."""
+    writers: dict[Key, Use] = {}
+    readers: list[Use] = []
+    for use in uses.of(root):
+        if not use.write:
+            readers.append(use)
+        elif not use.type:
+            continue
+        elif not _same_type(use.type, writers.setdefault(use.key, use).type):
+            first = writers[use.key]
+            message = f"`{use.name}` is written as {use.type} here and as {first.type} in line {first.attribute.place.line}"
+            yield use.problem("ALU608", message, "an entry keeps its type: write another entry")
+    for use in readers:
+        known = writers.get(use.key)
+        if known is None:
+            continue
+        line = known.attribute.place.line
+        if not _readable(known.type, use.type):
+            message = f"`{use.name}` is read as {use.type} and is written as {known.type} in line {line}"
+            yield use.problem("ALU605", message, "read an entry of this type")
+        elif use.unit and known.unit and use.unit != known.unit:
+            message = f"`{use.name}` is read in {use.unit} and is written in {known.unit} in line {line}"
+            yield use.problem("ALU606", message, f"convert it in a script, into another entry in {use.unit}")
+
+
+def _same_type(one: str, other: str) -> bool:
+    numbers = NUMBER in {one, other} and {one, other} <= _NUMERIC
+    return one == other or numbers or {one, other} == {TEXT, STRING.name}
+
+
+def _readable(written: str, read: str) -> bool:
+    """Tell whether a value goes into a port: numbers and texts are converted as it is read, others have to be of its type."""
+    basic = {*TYPES, NUMBER, TEXT, UNKNOWN}
+    return written == read or not written or not read or (written in basic and read in basic)

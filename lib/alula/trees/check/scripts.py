@@ -1,0 +1,64 @@
+"""The scripts of a tree: read once each, what is wrong in them at its column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from alula.trees.check.problems import in_value
+from alula.trees.check.sites import Site
+from alula.trees.document import Attribute
+from alula.trees.errors import Problem
+from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.script import Program, ScriptError, parse
+
+PORTS = {"Script": "code", "ScriptCondition": "code", "Precondition": "if"}
+"""The ports of BehaviorTree.CPP's nodes that hold a script."""
+
+
+class Scripts:
+    """The scripts of a tree by their attributes."""
+
+    def __init__(self) -> None:
+        self._programs: dict[int, Program | None] = {}
+        self._texts: dict[str, Program] = {}
+        self._kept: list[Attribute] = []
+        self.problems: list[Problem] = []
+
+    def program(self, attribute: Attribute) -> Program | None:
+        """Return the script in an attribute; None where it is wrong, which is a problem from then on."""
+        if id(attribute) not in self._programs:
+            self._kept.append(attribute)  # so that no other gets its id
+            self._programs[id(attribute)] = self._read(attribute)
+        return self._programs[id(attribute)]
+
+    def _read(self, attribute: Attribute) -> Program | None:
+        try:
+            program = self._texts.get(attribute.value) or self._texts.setdefault(attribute.value, parse(attribute.value))
+        except ScriptError as error:
+            code = "ALU008" if error.excess else "ALU614"
+            self.problems.append(in_value(code, attribute, (error.offset, error.end), f"the script: {error.message}", error.cure))
+            return None
+        for note in program.notes:
+            self.problems.append(in_value("ALU616", attribute, (note.offset, note.end), note.message, note.cure, warning=True))
+        return program
+
+
+def before(site: Site) -> Iterator[Attribute]:
+    """Yield the attributes with the scripts that run before the node is ticked."""
+    yield from _present(site, PRECONDITIONS)
+
+
+def within(site: Site) -> Iterator[Attribute]:
+    """Yield those of the node itself: a text that names an entry holds none."""
+    for attribute in _present(site, (PORTS.get(site.kind, ""),)):
+        if not attribute.value.lstrip().startswith("{"):
+            yield attribute
+
+
+def after(site: Site) -> Iterator[Attribute]:
+    """Yield those that run when it has ended."""
+    yield from _present(site, POSTCONDITIONS)
+
+
+def _present(site: Site, names: tuple[str, ...]) -> Iterator[Attribute]:
+    return (site.element.attributes[name] for name in names if name in site.element.attributes)
