@@ -155,6 +155,18 @@ def test_the_checkout_has_every_command_of_the_library() -> None:
     assert "language server" in alula("editor", "--help").stdout
 
 
+OF_EACH_KIND = ["fly", "replay", "check", "generate", "mock", "bridge", "console", "panel", "skills", "events", "expect", "conform"]
+
+
+@pytest.mark.parametrize("command", OF_EACH_KIND)
+def test_completion_knows_the_options_of_a_command(command: str) -> None:
+    complete = f"COMP_WORDS=(alula {command} x --); COMP_CWORD=3; _alula; echo ${{COMPREPLY[@]}}"
+    script = f"{alula('completion').stdout}\n{complete}"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    known = set(re.findall(r"--[a-z][a-z-]*", alula(command, "--help").stdout))
+    assert set(done.stdout.split()) - {"--robot"} == known - {"--help"}
+
+
 def test_version_is_the_change_logs() -> None:
     newest = re.search(r"^## (\S+)", (ALULA_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert newest is not None

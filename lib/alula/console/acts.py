@@ -19,6 +19,7 @@ from alula.common.robots import find_robot
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
 from alula.console.link import ActError
+from alula.report.ends import OPERATOR, Ended, note_end
 
 START_S = 20.0
 LOOK_S = 0.05
@@ -138,6 +139,7 @@ def start(flight: Flight) -> Path:
 
 def everything_off(folder: Path) -> str:
     """End all processes of a run at once, without landing; return what was done."""
+    note_end(folder, Ended(OPERATOR, "everything off"))
     run_id = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["run_id"])
     ended = end_run(run_id, timeout_s=0.0)
     return f"{len(ended)} processes were ended at once"

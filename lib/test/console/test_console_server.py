@@ -26,6 +26,7 @@ from alula.console.__main__ import main
 from alula.console.acts import ActError, Flight, read_flight
 from alula.console.admission import is_loopback
 from alula.console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES
+from alula.report import ends
 
 
 def events_in(message: dict[str, Any]) -> int:
@@ -205,8 +206,11 @@ def test_a_run_that_is_over_is_not_commanded(make_run: Callable[..., Path]) -> N
 def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[tuple[str, float]] = []
     monkeypatch.setattr(acts, "end_run", lambda run_id, *, timeout_s: ended.append((run_id, timeout_s)) or [1, 2, 3])
-    assert acts.everything_off(make_run()) == "3 processes were ended at once"
+    folder = make_run()
+    assert acts.everything_off(folder) == "3 processes were ended at once"
     assert ended == [("id-run", 0.0)]
+    ends.note_end(folder, ends.Ended(ends.FRONT, "the supervisor died"))  # which is what the front sees of it
+    assert ends.read_end(folder) == ends.Ended(ends.OPERATOR, "everything off")
 
 
 @pytest.mark.parametrize(

@@ -50,15 +50,7 @@ def perceive(bag: Path, folder: Path, faults: Sequence[str], settings: Sequence[
     """
     again = folder / BAG
     options = [*each("--fail", faults), *each("--set", settings), *each("--map", names)]
-    words = [
-        str(Path(os.environ["ALULA_ROOT"]) / "setup" / "in_ros1"),
-        "python3",
-        "-m",
-        "uav_flight.sensor_replay",
-        str(bag),
-        str(again),
-        *options,
-    ]
+    words = [str(Path(os.environ["ALULA_ROOT"]) / "setup" / "in_ros1"), "python3", "-m", "uav_flight.sensor_replay"]
     done = subprocess.run([*words, str(bag), str(again), *options], capture_output=True, text=True, check=False)
     if done.returncode:
         raise ReplayError((done.stderr.strip().splitlines() or [f"perceiving ended with {done.returncode}"])[-1])
