@@ -155,7 +155,7 @@ def test_the_checkout_has_every_command_of_the_library() -> None:
     assert "language server" in alula("editor", "--help").stdout
 
 
-OF_EACH_KIND = ["fly", "replay", "check", "generate", "mock", "bridge", "console", "panel", "skills", "events", "expect", "conform"]
+OF_EACH_KIND = ["fly", "replay", "check", "tree", "generate", "mock", "bridge", "console", "panel", "skills", "events", "expect", "conform"]
 
 
 @pytest.mark.parametrize("command", OF_EACH_KIND)

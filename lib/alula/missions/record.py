@@ -19,7 +19,7 @@ from alula.runtime.plain import to_plain
 
 
 class MissionRecord:
-    """Writes ``skills.mcap`` on the way, ``mission.json`` at once and at the end, ``tree.json`` and ``tree.svg`` at the end.
+    """Writes ``skills.mcap`` on the way, ``mission.json`` at once and at the end, ``tree.svg`` at the end.
 
     A folder that can't be written to any more ends the record and not the mission; ``problems`` says so.
     """
@@ -115,7 +115,6 @@ class MissionRecord:
         view = director.view()
         title = f"Mission {self._plan.scenario}: {end.outcome.value.replace('_', ' ')}"
         try:
-            write_json(self._out / "tree.json", view.as_dict())
             write_text(self._out / "tree.svg", draw(view, title))
         except OSError as error:
             self.problems.append(f"the tree could not be written: {error.strerror or error}")
