@@ -32,9 +32,9 @@ from alula.records.models import models_of
 from alula.report.deaths import Death, describe_exit, note_death
 from alula.report.ends import FRONT, Ended, ended_by_signal, note_end
 from alula.report.live import LiveEvents
-from alula_flight.beside import page_beside
 from alula_flight.command_line import parse, with_domain
-from alula_flight.ending import CANNOT_START, GIVEN_UP, finish
+from alula_flight.console_page import console_page
+from alula_flight.outcome import CANNOT_START, GIVEN_UP, finish
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
 MISSION_TIMEOUT_S = 150.0  # wall clock; to bring the robot to rest
@@ -147,7 +147,7 @@ def main(arguments: list[str]) -> int:
     for line in part.words(spec):
         say(line)
     monitor = monitor_of(spec)
-    with page_beside(out, say) if spec.console else contextlib.nullcontext():
+    with console_page(out, say) if spec.console else contextlib.nullcontext():
         code = Front(spec, claim, say, monitor).run(out / FILE)
         say("making the report")
         return finish(spec, code, monitor)

@@ -27,9 +27,9 @@ from alula.live.spec import RunSpec
 from alula.report.deaths import Death, describe_exit, note_death
 from alula.report.ends import SIGNAL, SUPERVISOR, Ended, note_end
 from alula_flight.departure import Departure
-from alula_flight.ending import GIVEN_UP, finish
 from alula_flight.launch import launch_arguments, launch_file
 from alula_flight.mission_clock import MissionClock
+from alula_flight.outcome import GIVEN_UP, finish
 from alula_flight.process_faults import ProcessFaults, Started, process_faults_of
 from alula_flight.waits import Beginning
 

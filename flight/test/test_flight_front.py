@@ -24,9 +24,9 @@ from alula.report.live import LiveEvents, event_line
 from alula.report.run_log import FILE
 from alula.report.verdict import conformance_lines
 from alula.runtime.core.events import ExecutionEvent, TransitionEvent
-from alula_flight.beside import page_beside
 from alula_flight.command_line import parse
-from alula_flight.ending import CANNOT_START
+from alula_flight.console_page import console_page
+from alula_flight.outcome import CANNOT_START
 from alula_flight.run import main, monitor_of
 
 
@@ -197,11 +197,11 @@ def test_the_package_needs_no_ros_to_be_imported():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_the_page_beside_a_flight_ends_with_it(tmp_path):
+def test_the_page_of_a_run_ends_with_it(tmp_path):
     (tmp_path / "logs").mkdir()
     told, said = threading.Event(), []
     script = "import signal; print('http://127.0.0.1:8440/', flush=True); signal.pause()"
-    with page_beside(tmp_path, lambda line: (said.append(line), told.set()), (sys.executable, "-c", script)):
+    with console_page(tmp_path, lambda line: (said.append(line), told.set()), (sys.executable, "-c", script)):
         assert told.wait(30)
         (page,) = [process for process in psutil.Process().children() if script in process.cmdline()]
     assert not page.is_running()
@@ -211,7 +211,7 @@ def test_the_page_beside_a_flight_ends_with_it(tmp_path):
 def test_a_page_that_can_not_be_served_stops_no_flight(tmp_path):
     (tmp_path / "logs").mkdir()
     told, said = threading.Event(), []
-    with page_beside(
+    with console_page(
         tmp_path, lambda line: (said.append(line), told.set()), (sys.executable, "-c", "raise SystemExit('the port is taken')")
     ):
         assert told.wait(30)

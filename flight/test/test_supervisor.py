@@ -15,8 +15,8 @@ from alula.live.spec import RunSpec
 from alula.report.deaths import read_deaths
 from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, Ended, note_end, read_end
 from alula_flight import mission_clock, supervisor
-from alula_flight.ending import GIVEN_UP
 from alula_flight.mission_clock import MissionClock
+from alula_flight.outcome import GIVEN_UP
 from alula_flight.supervisor import Supervisor, Watch
 
 

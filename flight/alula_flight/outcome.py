@@ -1,4 +1,4 @@
-"""The end of a run: its report is made from what was recorded, and how it went is said."""
+"""The end of a run: makes its report from the recordings, prints the verdict, and gives the exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``./alula fly --console``: the operator's page beside a flight, as a process that lives as long as the flight does."""
+"""``--console``: the operator's page of a run, as a process that lives as long as the run does."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TIMEOUT_S = 5.0  # wall clock, for the server to say goodbye to its viewers
 
 
 @contextmanager
-def page_beside(out: Path, say: Callable[[str], None], command: tuple[str, ...] = ()) -> Iterator[None]:
+def console_page(out: Path, say: Callable[[str], None], command: tuple[str, ...] = ()) -> Iterator[None]:
     """Serve the page of the run in ``out`` while the context lasts, and say its address; a page that can't be served stops no flight."""
     root = Path(os.environ["ALULA_ROOT"])
     words = command or (str(root / "setup" / "in_ros2"), "python", "-m", "skill_panel.console", "--run", str(out))
