@@ -197,7 +197,7 @@ def test_a_failure_that_only_the_request_tells_of_is_told(
     page.wait(DRAWN)
     assert page.text("#reason").startswith(f"{what} at 40.00 s; navigation.hover failed")
     assert sentence in page.text("#lines")
-    assert "lidar" not in page.text("#story").replace("lidar@900", "")  # the flight was over before
+    assert "lidar" not in page.text("#account").replace("lidar@900", "")  # the flight was over before
     assert page.run(ANSWERS)[0].startswith(f"{what} | {when} | ")
 
 

@@ -26,17 +26,17 @@ function draw() {
 
 function show() {
   const t = moment_();
-  showStory();
+  showAccount();
   showState(t);
   showScrub(t);
   if (run.begin !== null) for (const view of views) view.draw(run, t);
   showMoments(t);
 }
 
-function showStory() {
+function showAccount() {
   const news = `${run.news} ${run.over}`;
-  if (showStory.news === news) return;
-  showStory.news = news;
+  if (showAccount.news === news) return;
+  showAccount.news = news;
   const { text, tone, reason } = headline(run);
   setText(byId("headline"), text);
   setText(byId("reason"), reason);
@@ -48,7 +48,7 @@ function showStory() {
   rewrite(byId("figures-row"), keyFigures(run), ([label, value]) => el("div", {}, el("dt", {}, label), el("dd", {}, value)));
   const zero = origin(run);
   const go = (t) => el("button", { type: "button", onclick: () => choose(t), "aria-label": `go to ${seconds(t - zero)}` }, seconds(t - zero, 2));
-  rewrite(byId("lines"), story(run), ({ t, text: sentence, kind }) => el("li", { class: kind }, go(t), el("span", {}, sentence)));
+  rewrite(byId("lines"), account(run), ({ t, text: sentence, kind }) => el("li", { class: kind }, go(t), el("span", {}, sentence)));
   const rows = answers(run);
   const cell = (label, ...content) => el("td", { "data-label": label }, ...content);
   rewrite(byId("answers").tBodies[0], rows, ({ what, why, t, until, done, cost }) => el("tr", {}, el("th", { scope: "row" }, what, why ? el("p", { class: "hint" }, why) : null), cell("when", ...(t === null ? [] : [go(t)]), ...(until == null ? [] : [" until ", go(until)])), cell("what was done", done), cell("what it cost", cost)));
@@ -292,7 +292,7 @@ class Link {
 function clear() {
   Object.assign(run, newRun());
   [cursor, picked] = [null, null];
-  showStory.news = "";
+  showAccount.news = "";
   for (const view of views) view.news = -1;
 }
 

@@ -81,7 +81,7 @@ const abortAfter = (run, t) => run.operator.find(({ by, command, t: at }) => by 
 const OPERATOR_ACTS = { start: "started the mission", take: "took command", off: "switched everything off" };
 
 /** What happened, a sentence a line: [{t, text, kind}]. */
-function story(run) {
+function account(run) {
   const lines = [];
   const say = (t, text, kind = "") => lines.push({ t, text, kind });
   const recovery = run.facts["/summary"]?.recovery;
