@@ -23,7 +23,7 @@ from alula.records.causes.told_ends import with_told_ends
 from alula.records.conformance import Monitor
 from alula.records.errors import AnalysisError
 from alula.records.models import models_of
-from alula.records.run import Run, lift_off_of, load_run, origin_of
+from alula.records.run import RecordedRun, lift_off_of, load_recorded_run, origin_of
 from alula.records.tree import Places, places_in
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.mock import Behaviour
@@ -145,9 +145,9 @@ def _simulated(flight: Flight, out: Path) -> Row:
         said = (done.stderr.strip() or done.stdout.strip()).splitlines()
         summary = {"outcome": "not_started", "reason": said[-1] if said else ""}
     try:
-        run, record = load_run(folder), read_record(folder)
+        run, record = load_recorded_run(folder), read_record(folder)
     except (AnalysisError, RecordError):  # no skill was ever started
-        run, record = Run(folder, ()), []
+        run, record = RecordedRun(folder, ()), []
     names = dict.fromkeys(event.skillset for event in run.events)
     ended = {one["id"] for one in summary.get("skills") or () if one.get("end_s") is not None}
     found = {name: summary.get(name) for name in ("outcome", "reason", "landed", "collisions", "min_clearance_m")}

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from alula.model.errors import UnsupportedModelError
-from alula.records.conformance import Monitor, Verdict
+from alula.records.conformance import ConformanceVerdict, Monitor
 from alula.records.errors import AnalysisError
 from alula.records.logs import Log, read_log
 from alula.records.models import models_of
@@ -37,7 +37,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def judge(log: Log, models: Sequence[Path] = ()) -> Verdict:
+def judge(log: Log, models: Sequence[Path] = ()) -> ConformanceVerdict:
     """Hold a log against models.
 
     Raises:
@@ -52,7 +52,7 @@ def judge(log: Log, models: Sequence[Path] = ()) -> Verdict:
     return monitor.verdict
 
 
-def lines(log: Log, verdict: Verdict) -> Iterator[str]:
+def lines(log: Log, verdict: ConformanceVerdict) -> Iterator[str]:
     """Yield the verdict as text."""
     if verdict.conforms:
         yield f"{log.path}: conforms: {verdict.events} events of {', '.join(log.skillsets)}"
@@ -71,7 +71,7 @@ def lines(log: Log, verdict: Verdict) -> Iterator[str]:
         yield f"  read up to the damage: {log.cut}"
 
 
-def holes(log: Log, verdict: Verdict) -> tuple[str, ...]:
+def holes(log: Log, verdict: ConformanceVerdict) -> tuple[str, ...]:
     """Return what a log misses: what lies behind its break, and the rest of the step that it ends within."""
     return (*([f"it breaks off: {log.cut}"] if log.cut else []), *(f"{owed} should follow" for owed in verdict.owed))
 

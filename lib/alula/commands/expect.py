@@ -10,7 +10,7 @@ from pathlib import Path
 from alula.common.files import write_text
 from alula.records.errors import AnalysisError
 from alula.records.expectations import Checked, check, expectations_of, junit, load_expectations
-from alula.records.run import load_run
+from alula.records.run import load_recorded_run
 
 FULFILLED, FAILED, UNREADABLE = 0, 1, 2
 
@@ -41,10 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parse(sys.argv[1:] if arguments is None else arguments)
     try:
         if given.check is None:
-            sys.stdout.write(expectations_of(load_run(given.run)))
+            sys.stdout.write(expectations_of(load_recorded_run(given.run)))
             return FULFILLED
         expectations = load_expectations(given.check)
-        checked = check(expectations, load_run(given.run))
+        checked = check(expectations, load_recorded_run(given.run))
         if given.junit is not None:
             write_text(given.junit, junit(str(given.run), checked))
     except (AnalysisError, OSError) as error:

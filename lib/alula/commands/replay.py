@@ -27,7 +27,7 @@ from alula.records.replay.deciding import Conditions, MakeAnswers, decide, read_
 from alula.records.replay.outputs import same, trace_of, verdict, write_out
 from alula.records.replay.recorded import Recorded, ReplayError, load
 from alula.records.replay.replay import Result
-from alula.records.run import load_run
+from alula.records.run import load_recorded_run
 
 SAME, OTHERWISE, CANNOT_REPLAY = 0, 1, 2
 
@@ -148,7 +148,7 @@ def replay(given: Arguments, folder: Path, depths: Depths) -> int:
     tell(recorded, result, as_json=given.json)
     if expectations is None or out is None:
         return SAME if same(recorded, result) else OTHERWISE
-    return hold(given, check(expectations, load_run(out)))
+    return hold(given, check(expectations, load_recorded_run(out)))
 
 
 def decide_again(given: Arguments, recorded: Recorded, folder: Path, out: Path | None, depths: Depths) -> Result:

@@ -24,7 +24,7 @@ def departure() -> tuple[str, str] | None:
 
 
 @dataclass(frozen=True)
-class Run:
+class RecordedRun:
     """A run's events in their order; ``mission`` is what ``mission.json`` says, empty where that is not known."""
 
     path: Path
@@ -61,14 +61,14 @@ def origin_of(events: Sequence[EngineEvent]) -> float:
     return events[0].stamp_s if events else 0.0
 
 
-def load_run(path: Path) -> Run:
+def load_recorded_run(path: Path) -> RecordedRun:
     """Read a run's folder, or any log that ``read_log`` reads.
 
     Raises:
         AnalysisError: there is none, or it can't be read.
     """
     log = read_log(path)
-    return Run(path, tuple(entry.event for entry in log.entries), _mission(path))
+    return RecordedRun(path, tuple(entry.event for entry in log.entries), _mission(path))
 
 
 def _mission(path: Path) -> Mapping[str, Any]:

@@ -22,7 +22,7 @@ from alula.report.files import Problems
 from alula.report.history import History, read_history
 from alula.report.mock_account import MockSummary, read_mock
 from alula.report.observed import Observed
-from alula.report.part import Findings, ReportPart, Run, part_of_robot
+from alula.report.part import Findings, ReportedRun, ReportPart, part_of_robot
 from alula.report.phases import Phases, find_phases
 from alula.report.recovery import Recovery, find_recovery
 from alula.report.responses import FaultResponse, Known, find_responses, known_faults
@@ -73,14 +73,14 @@ def make_report(facts: RunFacts) -> Summary:
     return summary
 
 
-def _begin(facts: RunFacts) -> Run:
+def _begin(facts: RunFacts) -> ReportedRun:
     problems, history = Problems(), History()
     with problems.survive(RECORD):
         history = read_history(facts.out_dir / RECORD, problems)
-    return Run(facts, load_scenario(facts.scenario), history, problems)
+    return ReportedRun(facts, load_scenario(facts.scenario), history, problems)
 
 
-def _account(run: Run, part: ReportPart) -> Account:
+def _account(run: ReportedRun, part: ReportPart) -> Account:
     observed, mock = Observed(), None
     if run.facts.mock:
         observed, mock = read_mock(run.folder, run.problems)
@@ -100,7 +100,7 @@ def _account(run: Run, part: ReportPart) -> Account:
     return Account(observed, mock, phases, responses, recovery, effects.alarms)
 
 
-def _timeline(run: Run, account: Account) -> Timeline | None:
+def _timeline(run: ReportedRun, account: Account) -> Timeline | None:
     timeline: Timeline | None = None
     with run.problems.survive("timeline"):
         timeline = made = make_timeline(run.history, account.phases, account.recovery, account.alarms)
@@ -109,7 +109,7 @@ def _timeline(run: Run, account: Account) -> Timeline | None:
     return timeline
 
 
-def _write_page(run: Run, part: ReportPart, account: Account, summary: Summary) -> None:
+def _write_page(run: ReportedRun, part: ReportPart, account: Account, summary: Summary) -> None:
     """Write the page, of all that is in the folder by now."""
     problems = Problems()
     with problems.survive("report.html"):
@@ -124,7 +124,7 @@ def fault_entries(observed: Observed) -> list[Wire]:
     return [(FAULT, round(fault.t_s, 3), {"sensor": fault.sensor, "mode": fault.mode}) for fault in observed.all_faults]
 
 
-def _write_summary(run: Run, summary: Summary) -> None:
+def _write_summary(run: ReportedRun, summary: Summary) -> None:
     try:
         write_json(run.folder / "summary.json", summary)
     except OSError as error:

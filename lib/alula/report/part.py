@@ -25,7 +25,7 @@ Entry = tuple[str, float | None, object]
 
 
 @dataclass(frozen=True)
-class Run:
+class ReportedRun:
     """What a report is about."""
 
     facts: RunFacts
@@ -60,7 +60,7 @@ class Findings:
 class ReportPart(Protocol):
     """A robot's part of a report; its methods are called once each, in this order. Errors become problems of the report."""
 
-    def observe(self, run: Run) -> Observed:
+    def observe(self, run: ReportedRun) -> Observed:
         """Read the robot's own recordings; not called of a run over mocks."""
         ...
 
@@ -80,7 +80,7 @@ class ReportPart(Protocol):
 class NoPart:
     """The report of a robot that adds nothing."""
 
-    def observe(self, run: Run) -> Observed:
+    def observe(self, run: ReportedRun) -> Observed:
         """Know what the supervisor did."""
         return Observed(processes=read_process_faults(run.folder))
 
@@ -97,7 +97,7 @@ class NoPart:
         return ()
 
 
-def part_of_robot(run: Run) -> ReportPart:
+def part_of_robot(run: ReportedRun) -> ReportPart:
     """Make the robot's part; what its file names has to be importable, else that is a problem of the report."""
     part: ReportPart = NoPart()
     with run.problems.survive("the robot's part of the report"):

@@ -15,7 +15,7 @@ from alula.commands.expect import main
 from alula.common.faults import parse_fault
 from alula.records.errors import AnalysisError
 from alula.records.expectations import check, expectations_of, junit, load_expectations
-from alula.records.run import Run, load_run
+from alula.records.run import RecordedRun, load_recorded_run
 from alula.runtime.core.events import event_record
 
 ROOT = Path(os.environ["ALULA_ROOT"])
@@ -26,7 +26,7 @@ FIGURES = ROOT / "tests" / "expectations"
 def runs():
     flights = load_flights("mapping")
     flown = {"nominal": flights.fly(), "failing": flights.fly([parse_fault("zed@30")])}
-    return {name: Run(Path(name), one.events, {"outcome": one.end.outcome.value}) for name, one in flown.items()}
+    return {name: RecordedRun(Path(name), one.events, {"outcome": one.end.outcome.value}) for name, one in flown.items()}
 
 
 def problems(path, run):
@@ -47,7 +47,7 @@ def test_a_mock_flight_is_as_the_paper_shows_it_and_the_other_is_not(runs, figur
 
 @pytest.mark.parametrize(("figure", "recording"), [("11", "mapping"), ("12", "mapping-zed")])
 def test_a_flight_of_the_whole_stack_is_as_the_paper_shows_it(figure, recording):
-    assert problems(FIGURES / f"figure-{figure}.yaml", load_run(ROOT / "tests" / "recordings" / recording)) == []
+    assert problems(FIGURES / f"figure-{figure}.yaml", load_recorded_run(ROOT / "tests" / "recordings" / recording)) == []
 
 
 @pytest.mark.parametrize("name", ["nominal", "failing"])
@@ -136,7 +136,7 @@ def test_the_command_writes_checks_and_refuses(runs, tmp_path, capsys):
     lines = "".join(json.dumps(event_record(event)) + "\n" for event in runs["failing"].events)
     written(tmp_path / "events.jsonl", lines)
     written(tmp_path / "mission.json", '{"outcome": "degraded"}')
-    assert load_run(tmp_path).outcome == "degraded"
+    assert load_recorded_run(tmp_path).outcome == "degraded"
     assert main([str(tmp_path)]) == 0
     path = written(tmp_path / "e.yaml", capsys.readouterr().out)
     assert main([str(tmp_path), "--check", str(path), "--junit", str(tmp_path / "j.xml")]) == 0

@@ -11,7 +11,7 @@ from typing import Any
 
 from alula.model.execution_state import ExecutionState as S
 from alula.records.errors import AnalysisError
-from alula.records.run import Run, load_run
+from alula.records.run import RecordedRun, load_recorded_run
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 
 TOGETHER_S = 0.05
@@ -69,7 +69,7 @@ class Compared:
 
 def load_side(path: Path, name: str) -> Side:
     """Read a run; raises AnalysisError."""
-    run = load_run(path)
+    run = load_recorded_run(path)
     summary = _summary(path)
     figures = {figure: _figure(summary, where) for figure, (where, _) in FIGURES.items()}
     if figures["duration"] is None:
@@ -88,7 +88,7 @@ def _first_difference(ours: Sequence[str], theirs: Sequence[str]) -> int | None:
     return next((at for at, (one, other) in pairs if one != other), None)
 
 
-def decisions_of(run: Run) -> list[Decision]:
+def decisions_of(run: RecordedRun) -> list[Decision]:
     """Return what the mission has asked of the skills: starts and interruptions, without their inputs."""
     asked: list[ExecutionEvent] = []
     seen: set[str] = set()
@@ -115,7 +115,7 @@ def _ordered(events: Sequence[ExecutionEvent]) -> list[ExecutionEvent]:
     return [event for group in groups for event in sorted(group, key=lambda one: one.skillset)]
 
 
-def _spans(run: Run) -> Iterator[tuple[str, float, float]]:
+def _spans(run: RecordedRun) -> Iterator[tuple[str, float, float]]:
     """Yield each execution that ran: skill, and from when to when, seconds since lift-off."""
     since: dict[str, float] = {}
     for event in run.events:

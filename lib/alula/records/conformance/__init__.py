@@ -1,6 +1,6 @@
 """Holds the events of skillsets against their models: each must be one that the semantics allows from the state before."""
 
 from alula.records.conformance.monitor import Finding, SkillsetMonitor
-from alula.records.conformance.runs import Monitor, Verdict
+from alula.records.conformance.runs import ConformanceVerdict, Monitor
 
-__all__ = ["Finding", "Monitor", "SkillsetMonitor", "Verdict"]
+__all__ = ["ConformanceVerdict", "Finding", "Monitor", "SkillsetMonitor"]

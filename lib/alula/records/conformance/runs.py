@@ -11,7 +11,7 @@ from alula.runtime.core.events import EngineEvent
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ConformanceVerdict:
     """Whether a log conforms.
 
     Attributes:
@@ -64,11 +64,11 @@ class Monitor:
         return self._monitors[event.skillset].take(event, instance_id)
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ConformanceVerdict:
         """What is known by now."""
         monitors = self._monitors
         findings = [monitor.finding for monitor in monitors.values() if monitor.finding is not None]
-        return Verdict(
+        return ConformanceVerdict(
             events=sum(monitor.events for monitor in monitors.values()),
             findings=tuple(sorted(findings, key=lambda finding: finding.stamp_s)),
             restarts={name: tuple(monitor.restarts) for name, monitor in monitors.items() if monitor.restarts},

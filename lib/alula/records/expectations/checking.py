@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from alula.model.execution_state import ExecutionState
-from alula.records.expectations.values import Expectations, Moment, Never, States
-from alula.records.run import Run
+from alula.records.expectations.values import Expectations, ExpectedMoment, Never, States
+from alula.records.run import RecordedRun
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 
 
@@ -23,7 +23,7 @@ class Checked:
         return f"{self.place}: {self.expected}: {self.problem or 'as expected'}"
 
 
-def check(expectations: Expectations, run: Run) -> list[Checked]:
+def check(expectations: Expectations, run: RecordedRun) -> list[Checked]:
     """Return what became of each expectation, in the order of the file."""
     return [
         *_outcome(expectations, run),
@@ -33,12 +33,12 @@ def check(expectations: Expectations, run: Run) -> list[Checked]:
     ]
 
 
-def place_of(event: EngineEvent, run: Run) -> str:
+def place_of(event: EngineEvent, run: RecordedRun) -> str:
     """Name an event of a run."""
     return f"{event.skillset} event {event.sequence} at {run.time_s(event):.3f} s"
 
 
-def _outcome(expectations: Expectations, run: Run) -> Iterator[Checked]:
+def _outcome(expectations: Expectations, run: RecordedRun) -> Iterator[Checked]:
     if expectations.outcomes:
         found = run.outcome or "not known"
         problem = "" if found in expectations.outcomes else f"{run.path}: it is {found}"
@@ -48,7 +48,7 @@ def _outcome(expectations: Expectations, run: Run) -> Iterator[Checked]:
 # --- order --------------------------------------------------------------------------------------------------------------
 
 
-def _order(expectations: Expectations, run: Run) -> Iterator[Checked]:
+def _order(expectations: Expectations, run: RecordedRun) -> Iterator[Checked]:
     """Look for each group behind the one before; a missing event does not move the search on, so that each is told by itself."""
     matched: set[int] = set()
     since = -1
@@ -60,7 +60,7 @@ def _order(expectations: Expectations, run: Run) -> Iterator[Checked]:
         yield _complete(expectations.complete_place, run, matched)
 
 
-def _find(moment: Moment, run: Run, since: int, matched: set[int]) -> int | None:
+def _find(moment: ExpectedMoment, run: RecordedRun, since: int, matched: set[int]) -> int | None:
     """Return the first event behind ``since`` that is meant and not taken, and take it."""
     for at, event in enumerate(run.events):
         if at > since and at not in matched and moment.pattern.fits(event) and _in_time(moment, run.time_s(event)):
@@ -69,17 +69,17 @@ def _find(moment: Moment, run: Run, since: int, matched: set[int]) -> int | None
     return None
 
 
-def _in_time(moment: Moment, time_s: float) -> bool:
+def _in_time(moment: ExpectedMoment, time_s: float) -> bool:
     return moment.at_s is None or abs(time_s - moment.at_s) <= moment.tolerance_s
 
 
-def _checked(moment: Moment, at: int | None, run: Run, since: int) -> Checked:
+def _checked(moment: ExpectedMoment, at: int | None, run: RecordedRun, since: int) -> Checked:
     when = "" if moment.at_s is None else f" at {moment.at_s:g} s, give or take {moment.tolerance_s:g} s"
     expected = f"{moment.pattern}{when}"
     return Checked(moment.place, expected, "" if at is not None else _missing(moment, run, since))
 
 
-def _missing(moment: Moment, run: Run, since: int) -> str:
+def _missing(moment: ExpectedMoment, run: RecordedRun, since: int) -> str:
     """Say where else the run has what was expected."""
     behind = f" after {place_of(run.events[since], run)}" if since >= 0 else ""
     meant = [(at, event) for at, event in enumerate(run.events) if moment.pattern.fits(event)]
@@ -95,7 +95,7 @@ def _missing(moment: Moment, run: Run, since: int) -> str:
     return f"{run.path}: it is {place_of(nearest, run)}, {run.time_s(nearest) - wanted_s:+.3f} s off"
 
 
-def _complete(place: str, run: Run, matched: set[int]) -> Checked:
+def _complete(place: str, run: RecordedRun, matched: set[int]) -> Checked:
     others = [event for at, event in enumerate(run.events) if at not in matched and starts_or_ends(event)]
     problem = ""
     if others:
@@ -126,7 +126,7 @@ def states_at(events: Sequence[EngineEvent], until_s: float) -> Mapping[str, Tra
     return {f"{event.skillset}.{event.resource}": event for event in changes}
 
 
-def _states(states: States, run: Run) -> Checked:
+def _states(states: States, run: RecordedRun) -> Checked:
     last = states_at(run.events, run.origin_s + states.at_s)
     first = {f"{e.skillset}.{e.resource}": e for e in reversed(run.events) if isinstance(e, TransitionEvent)}
     problems = []
@@ -143,7 +143,7 @@ def _states(states: States, run: Run) -> Checked:
     return Checked(states.place, f"{expected} at {states.at_s:g} s", f"{run.path}: {', '.join(problems)}" if problems else "")
 
 
-def _never(never: Never, run: Run) -> Checked:
+def _never(never: Never, run: RecordedRun) -> Checked:
     expected, events = f"never {never.pattern}", list(run.events)
     if never.after is not None:
         expected += f" after {never.after}"

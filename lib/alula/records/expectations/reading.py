@@ -7,7 +7,7 @@ from pathlib import Path
 
 from alula.common.located_yaml import Located, read_yaml
 from alula.records.errors import AnalysisError
-from alula.records.expectations.values import TOLERANCE_S, Expectations, Moment, Never, Pattern, States
+from alula.records.expectations.values import TOLERANCE_S, Expectations, ExpectedMoment, Never, Pattern, States
 
 KEYS = ("about", "outcome", "tolerance_s", "order", "complete", "states", "never")
 OUTCOMES = ("accomplished", "degraded", "given_up", "aborted", "not_started", "running")
@@ -50,21 +50,21 @@ def _truth(part: Located) -> bool:
     return part.value
 
 
-def _group(part: Located, tolerance_s: float) -> list[Moment]:
+def _group(part: Located, tolerance_s: float) -> list[ExpectedMoment]:
     """Return one event, or a list of events whose order does not matter."""
     return [_moment(one, tolerance_s) for one in part.elements()]
 
 
-def _moment(part: Located, tolerance_s: float) -> Moment:
+def _moment(part: Located, tolerance_s: float) -> ExpectedMoment:
     if not part.is_mapping:
-        return Moment(part.place, _pattern(part))
+        return ExpectedMoment(part.place, _pattern(part))
     said = part.record("an event", ("what", "at_s", "tolerance_s"))
     if "what" not in said:
         raise part.wrong("an event needs `what`, as in {what: takeoff RUNNING, at_s: 2.5}")
     at_s = said["at_s"].number("`at_s`", -FURTHEST_S, FURTHEST_S) if "at_s" in said else None
     if "tolerance_s" in said:
         tolerance_s = said["tolerance_s"].number("`tolerance_s`", 0.0)
-    return Moment(part.place, _pattern(said["what"]), at_s, tolerance_s)
+    return ExpectedMoment(part.place, _pattern(said["what"]), at_s, tolerance_s)
 
 
 def _never(part: Located) -> Never:

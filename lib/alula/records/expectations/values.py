@@ -36,7 +36,7 @@ class Pattern:
 
 
 @dataclass(frozen=True)
-class Moment:
+class ExpectedMoment:
     """An event that should happen, after those before it in the file. ``at_s`` counts from lift-off; None: at any time."""
 
     place: str
@@ -75,7 +75,7 @@ class Expectations:
 
     outcomes: tuple[str, ...] = ()
     outcome_place: str = ""
-    order: Sequence[Sequence[Moment]] = ()
+    order: Sequence[Sequence[ExpectedMoment]] = ()
     complete: bool = False
     complete_place: str = ""
     states: Sequence[States] = ()

@@ -8,7 +8,7 @@ from itertools import pairwise
 from alula.model.execution_state import ExecutionState
 from alula.records.expectations.checking import starts_or_ends, states_at, told
 from alula.records.expectations.values import TOLERANCE_S
-from alula.records.run import Run
+from alula.records.run import RecordedRun
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEvent
 
 TOGETHER_S = 0.05
@@ -17,7 +17,7 @@ REST_S = 4 * TOLERANCE_S
 """States are asked in the middle of times in which no resource changes for as long as this."""
 
 
-def expectations_of(run: Run) -> str:
+def expectations_of(run: RecordedRun) -> str:
     """Return a YAML text that the run fulfils."""
     lines = [
         f"# What {run.path.name} was. Times are seconds of mission clock after lift-off.",
@@ -36,7 +36,7 @@ def expectations_of(run: Run) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _groups(run: Run) -> list[list[EngineEvent]]:
+def _groups(run: RecordedRun) -> list[list[EngineEvent]]:
     """Return what comes one after another; what is near and of several skillsets is together, as a list has one order or none."""
     near: list[list[EngineEvent]] = []
     for event in filter(starts_or_ends, run.events):
@@ -48,16 +48,16 @@ def _groups(run: Run) -> list[list[EngineEvent]]:
     return [part for group, any_order in zip(near, several, strict=True) for part in ([group] if any_order else [[one] for one in group])]
 
 
-def _moment(event: EngineEvent, run: Run) -> str:
+def _moment(event: EngineEvent, run: RecordedRun) -> str:
     return f"{{what: {told(event)}, at_s: {run.time_s(event):.2f}}}"
 
 
-def _group(group: Sequence[EngineEvent], run: Run) -> str:
+def _group(group: Sequence[EngineEvent], run: RecordedRun) -> str:
     moments = [_moment(event, run) for event in group]
     return f"  - {moments[0]}" if len(moments) == 1 else f"  - [{', '.join(moments)}]"
 
 
-def _states(run: Run) -> Iterator[str]:
+def _states(run: RecordedRun) -> Iterator[str]:
     """Yield what each resource that has changed is in, in times of rest."""
     stamps = [event.stamp_s for event in run.events if isinstance(event, TransitionEvent)]
     rests = [(before + after) / 2 for before, after in pairwise(stamps) if after - before >= REST_S]
@@ -73,7 +73,7 @@ def _states(run: Run) -> Iterator[str]:
         yield from ("states:", *lines, "")
 
 
-def _unseen(run: Run) -> Iterator[str]:
+def _unseen(run: RecordedRun) -> Iterator[str]:
     """Yield the ends that no execution had."""
     seen = {event.state for event in run.events if isinstance(event, ExecutionEvent)}
     yield from (state.value for state in ExecutionState if state.terminal and state not in seen)

@@ -17,7 +17,7 @@ from alula.report.facts import RunFacts
 from alula.report.files import Problems
 from alula.report.history import History
 from alula.report.making import fault_entries
-from alula.report.part import Run
+from alula.report.part import ReportedRun
 from uav_report.flight import FlightReport
 from uav_report.page import page_entries
 from uav_report.recording import read_recording
@@ -65,7 +65,7 @@ def test_the_page_is_told_of_sensors_and_processes_that_were_made_to_fail_in_the
     faults = [{"sensor": "zed", "mode": mode, "t_s": LIFT_OFF_S + t_s} for mode, t_s in (("dark", 3.0), ("ok", 7.0))]
     write_bag(tmp_path / "functional.bag", poses=STRAIGHT, states=[{**STATE, "faults": faults}])
     run_log.note(tmp_path, run_log.FAULT, {"sensor": "encoder", "mode": "killed", "t_s": LIFT_OFF_S + 5.0})
-    run = Run(RunFacts("mapping", 0, tmp_path, (), (), None), load_scenario("mapping"), History(), Problems())
+    run = ReportedRun(RunFacts("mapping", 0, tmp_path, (), (), None), load_scenario("mapping"), History(), Problems())
     entries = fault_entries(FlightReport(run).observe(run))
     told = [(t_s - LIFT_OFF_S, value["sensor"], value["mode"]) for topic, t_s, value in entries if topic == FAULT]
     assert told == [(3.0, "zed", "dark"), (5.0, "encoder", "killed"), (7.0, "zed", "ok")]

@@ -14,7 +14,7 @@ from alula.common.runs import INPUTS_FILE
 from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.causes.faults import Fault
 from alula.report.observed import Observed, read_process_faults
-from alula.report.part import Entry, Findings, Run
+from alula.report.part import Entry, Findings, ReportedRun
 from alula.report.phases import Phases, home, status_changes
 from alula.report.recovery import Recovery
 from alula.report.timeline import Timeline
@@ -49,14 +49,14 @@ class Truth:
 class FlightReport:
     """The drone's part of a report (``alula.report.part.ReportPart``)."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: ReportedRun) -> None:
         self._run = run
         self._recording = Recording()
         self._phases = FlightPhases()
         self._video = Video()
         self._truth = Truth()
 
-    def observe(self, run: Run) -> Observed:
+    def observe(self, run: ReportedRun) -> Observed:
         """Read the bag of the functional layer."""
         with run.problems.survive("functional.bag"):
             self._recording = read_recording(run.folder, run.problems)

@@ -8,7 +8,7 @@ from alula.common.faults import FaultChange
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.faults import Fault
 from alula.report.observed import Observed
-from alula.report.part import Entry, Findings, ReportPart, Run
+from alula.report.part import Entry, Findings, ReportedRun, ReportPart
 from alula.report.phases import Phases
 from alula.report.recovery import Recovery
 from alula.report.timeline import Timeline
@@ -24,7 +24,7 @@ NOTHING_MEASURED = {
 }
 
 
-def make(run: Run) -> ReportPart:
+def make(run: ReportedRun) -> ReportPart:
     """Make the part of a report."""
     if run.facts.mock:
         return Mocked()
@@ -37,7 +37,7 @@ def make(run: Run) -> ReportPart:
 class Mocked:
     """Of a flight over mocks: there is no world to collide with or to map."""
 
-    def observe(self, run: Run) -> Observed:  # noqa: ARG002
+    def observe(self, run: ReportedRun) -> Observed:  # noqa: ARG002
         """Return no observations: there is no functional bag."""
         return Observed()
 
