@@ -38,15 +38,23 @@ def told(body: str, count: int, **script: str) -> list[str]:
     return Rig(body, **script).tick(count)
 
 
+def anew(leaf: str) -> str:
+    """Return a leaf that begins anew after its end; one that was not reset keeps its answer, as in BehaviorTree.CPP."""
+    return f'<Repeat num_cycles="1"><{leaf}/></Repeat>'
+
+
+PIPELINE = f"<PipelineSequence>{anew('a')}{anew('b')}</PipelineSequence>"
+
+
 def test_a_pipeline_ticks_what_it_has_passed_again():
-    found = told("<PipelineSequence><a/><b/><c/></PipelineSequence>", 5, a="RSRSS", b="RSRRS", c="RRRS")
+    found = told(f"<PipelineSequence>{anew('a')}{anew('b')}<c/></PipelineSequence>", 5, a="RSRSS", b="RSRRS", c="RRRS")
     assert found == ["R sa", "R ta sb", "R sa tb sc", "R ta sb tc", "R sa tb tc"]
-    assert told("<PipelineSequence><a/><b/></PipelineSequence>", 3, a="SRF", b="R") == ["R sa sb", "R sa tb", "F ta hb"]
-    assert told("<PipelineSequence><a/><b/></PipelineSequence>", 1, a="K", b="K") == ["S sa sb"]
+    assert told(PIPELINE, 3, a="SRF", b="R") == ["R sa sb", "R sa tb", "F ta hb"]
+    assert told(PIPELINE, 1, a="K", b="K") == ["S sa sb"]
 
 
 def test_a_pipeline_has_its_last_child_decide():
-    found = told("<PipelineSequence><a/><b/></PipelineSequence>", 3, a="SRR", b="RS")
+    found = told(PIPELINE, 3, a="SRR", b="RS")
     assert found == ["R sa sb", "S sa tb ha", "R sa"]
 
 
@@ -83,11 +91,11 @@ def test_round_robin_does_not_begin_again_unless_it_is_told_to():
 
 
 def test_a_nonblocking_sequence_ticks_all():
-    body = "<NonblockingSequence><a/><b/></NonblockingSequence>"
+    body = f"<NonblockingSequence>{anew('a')}{anew('b')}</NonblockingSequence>"
     assert told(body, 3, a="RSS", b="RRS") == ["R sa sb", "R ta tb", "S sa tb"]
     assert told(body, 2, a="RF", b="R") == ["R sa sb", "F ta hb"]
     with pytest.raises(TreeError, match="'b' is skipped, which a NonblockingSequence"):
-        told(body, 1, a="S", b="K")
+        told("<NonblockingSequence><a/><b/></NonblockingSequence>", 1, a="S", b="K")
 
 
 def test_a_persistent_sequence_keeps_its_place_on_the_blackboard():
