@@ -60,8 +60,8 @@ RECORDINGS_FILE = "page.jsonl"
 Wire = tuple[str, float | None, object]
 """An entry as the page gets it."""
 
-Shape = tuple[int, str, str, str]
-"""Of a node of the tree: depth, kind, name, skill."""
+Shape = tuple[int, str, str, str, str, str]
+"""Of a node of the tree: depth, kind, name, skill; of a mission that is a file also type, ports and conditions as a text, and its place."""
 
 DATA_PERIOD_S = 0.2
 """Samples of one data are thinned to this."""
@@ -136,10 +136,19 @@ class Converter:
             yield NODES, t_s, changed
 
 
+def _source(view: Mapping[str, Any]) -> str:
+    """Return what a mission's file says of a node: its type, ports and conditions; empty for a node of no file."""
+    parts = [_word(view.get("type"))]
+    for key, sign in (("ports", "="), ("conditions", ": ")):
+        texts = view.get(key)
+        parts += [f"{name}{sign}{_word(text)}" for name, text in texts.items()] if isinstance(texts, Mapping) else []
+    return "  ".join(filter(None, parts))
+
+
 def _flatten(view: Mapping[str, Any], depth: int, shape: list[Shape], nodes: list[tuple[str, str]]) -> None:
     """Add of each node, top to bottom, its shape, and (status, message)."""
     get = view.get
-    shape.append((depth, _word(get("kind")), _word(get("name")), _word(get("skill"))))
+    shape.append((depth, _word(get("kind")), _word(get("name")), _word(get("skill")), _source(view), _word(get("place"))))
     nodes.append((_word(get("status")) or "INVALID", _word(get("message"))))
     children = get("children")
     for child in children if isinstance(children, list | tuple) else ():

@@ -50,15 +50,23 @@ def test_a_tree_is_sent_once_and_then_what_changed() -> None:
     failed = list(converter.convert(entry(TREE, 3.0, tree("FAILURE", "RUNNING"))))
     assert first[0][:2] == (TREE, 1.0)
     assert first[0][2] == [
-        (0, "selector", "navigate", ""),
-        (1, "parallel", "ZED navigation", ""),
-        (2, "skill", "watch with the ZED", "perception.zed_depthmap"),
-        (1, "sequence", "LiDAR navigation", ""),
-        (2, "skill", "watch with the LiDAR", "perception.lidar_depthmap"),
+        (0, "selector", "navigate", "", "", ""),
+        (1, "parallel", "ZED navigation", "", "", ""),
+        (2, "skill", "watch with the ZED", "perception.zed_depthmap", "", ""),
+        (1, "sequence", "LiDAR navigation", "", "", ""),
+        (2, "skill", "watch with the LiDAR", "perception.lidar_depthmap", "", ""),
     ]
     assert first[1] == (NODES, 1.0, [[0, "RUNNING", ""], [1, "RUNNING", ""], [2, "RUNNING", ""]])
     assert again == []
     assert failed == [(NODES, 3.0, [[1, "FAILURE", ""], [2, "FAILURE", "zed_ok"], [3, "RUNNING", ""], [4, "RUNNING", ""]])]
+
+
+def test_a_node_of_a_file_tells_what_the_file_says_of_it() -> None:
+    source = {"type": "navigation.goto", "ports": {"target": "{waypoint}"}, "conditions": {"_skipIf": "near"}, "place": "mapping.xml:12"}
+    view = {"name": "there", "kind": "skill", "skill": "navigation.goto", "status": "RUNNING", **source}
+    told = "navigation.goto  target={waypoint}  _skipIf: near"
+    found = next(iter(Converter().convert(entry(TREE, 1.0, view))))
+    assert found[2] == [(0, "skill", "there", "navigation.goto", told, "mapping.xml:12")]
 
 
 def test_a_tree_of_another_shape_is_sent_whole() -> None:

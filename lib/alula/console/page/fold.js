@@ -52,7 +52,7 @@ function newRun() {
     mission: newTrack(),
     start: newTrack(), // [[needed, otherwise]]: what the mission needs to start, in its words; otherwise is empty where it is met
     held: newTrack(), // what a pause of the mission holds, in words; null: it is not paused
-    trees: [], // {t, nodes: [{index, depth, parent, children, kind, name, skill, track}]}
+    trees: [], // {t, nodes: [{index, depth, parent, children, kind, name, skill, source, place, track}]}
     executions: new Map(), // skillset/skill/id -> {skillset, skill, id, inputs, outputs, changes}
     resources: new Map(), // skillset.resource -> track of {state, from, cause}
     data: new Map(), // skillset.data -> {t, columns}
@@ -181,8 +181,8 @@ function foldExecution(run, t, value) {
 function foldTree(run, t, shape) {
   const nodes = [];
   const open = [];
-  for (const [depth, kind, name, skill] of shape) {
-    const node = { index: nodes.length, depth, kind, name, skill, parent: depth ? open[depth - 1] : null, children: [], track: newTrack() };
+  for (const [depth, kind, name, skill, source, place] of shape) {
+    const node = { index: nodes.length, depth, kind, name, skill, source: source ?? "", place: place ?? "", parent: depth ? open[depth - 1] : null, children: [], track: newTrack() };
     node.parent?.children.push(node);
     open[depth] = node;
     nodes.push(node);

@@ -1,12 +1,14 @@
 // The tree at a moment, a node a line, in the signs of the paper's Figure 10: skills green, internal actions grey, a parallel a purple
 // trapezium, a sequence an arrow, a selector a question mark.
 
-const SYMBOLS = { sequence: "→ ", selector: "? ", parallel: "⇉ ", decorator: "◇ " };
+const SYMBOLS = { sequence: "→ ", selector: "? ", parallel: "⇉ ", decorator: "◇ ", control: "⊚ ", subtree: "↳ " };
 const LEGEND = [
   ["sequence", SYMBOLS.sequence, "one after the other, until one fails"],
   ["selector", SYMBOLS.selector, "the next one when one fails"],
   ["parallel", SYMBOLS.parallel, "all at once"],
   ["decorator", SYMBOLS.decorator, "changes when its child runs, or what its end means"],
+  ["control", SYMBOLS.control, "chooses among its children"],
+  ["subtree", SYMBOLS.subtree, "another tree of the mission's file"],
   ["skill", "name", "skill"],
   ["action", "name", "the mission's own action"],
   ["condition", "name", "condition"],
@@ -85,8 +87,8 @@ class TreeView {
       const parts = { state: el("span", { class: "state" }), why: el("span", { class: "why" }) };
       this.parts.push(parts);
       const folder = el("button", { type: "button", class: "fold", tabindex: -1, "aria-label": `fold ${node.name}`, onclick: (event) => this.toggle(event, node) }, node.children.length ? "▾" : "");
-      const kind = ["skill", "action", "condition", "sequence", "selector", "parallel", "decorator"].includes(node.kind) ? node.kind : "action";
-      const row = el("div", { class: "row", role: "treeitem", "aria-level": node.depth + 1, title: `${node.kind} ${node.skill || node.name}`, onclick: () => this.select(node) }, folder, el("span", { class: `box ${kind}` }, label), parts.state, parts.why);
+      const kind = ["skill", "action", "condition", "sequence", "selector", "parallel", "decorator", "control", "subtree"].includes(node.kind) ? node.kind : "action";
+      const row = el("div", { class: "row", role: "treeitem", "aria-level": node.depth + 1, title: [node.kind, node.skill || node.name, node.source, node.place].filter(Boolean).join("  "), onclick: () => this.select(node) }, folder, el("span", { class: `box ${kind}` }, label), parts.state, parts.why);
       row.style.setProperty("--depth", node.depth);
       if (node.children.length) row.setAttribute("aria-expanded", "true");
       return row;
@@ -129,6 +131,7 @@ class TreeView {
     const { status, message, since } = nodeAt(node, this.t);
     const zero = origin(this.run);
     const lines = [el("p", {}, el("b", {}, node.name), ` — ${node.kind}, ${status === "INVALID" ? "not ticked" : statusTold(this.run, node, status, this.t).told}${since === null ? "" : ` since ${seconds(since - zero)}`}${message ? `: ${message}` : ""}`)];
+    if (node.place) lines.push(el("p", { class: "hint" }, `${node.source}  (${node.place})`));
     const executions = [...this.run.executions.values()].filter((one) => `${one.skillset}.${one.skill}` === node.skill && one.start <= this.t);
     for (const one of executions.slice(-8)) {
       const ended = one.end !== null && one.end <= this.t;
