@@ -58,7 +58,7 @@ class PlainTraits:
             return True
         if site.type is None or site.type.category is not Category.ACTION:
             return False
-        return None if site.type.make is None else issubclass(site.type.make, Action)
+        return issubclass(site.type.make, Action) if isinstance(site.type.make, type) else None
 
     def endless(self, site: Site) -> bool:  # noqa: ARG002
         """Know none."""
