@@ -15,8 +15,10 @@ from alula.trees.reading import TreeFiles, read_models, read_text
 from alula.trees.standard import standard_palette
 
 
-def check_mission(path: Path, source: str | bytes, skillsets: Iterable[Skillset], palettes: Sequence[Path] = ()) -> list[Problem]:
-    """Return what is wrong with a mission, each thing once; ``source`` is what its file has, or will have.
+def check_mission(
+    path: Path, source: str | bytes, skillsets: Iterable[Skillset], palettes: Sequence[Path] = (), nodes: Iterable[NodeType] = ()
+) -> list[Problem]:
+    """Return what is wrong with a mission, each thing once; ``source`` is what its file has, or will have, ``nodes`` the robot's own types.
 
     Raises:
         FileError: the file, one that it includes, or a palette can't be read or is no XML of trees.
@@ -26,7 +28,7 @@ def check_mission(path: Path, source: str | bytes, skillsets: Iterable[Skillset]
     skills = Skills(skillsets)
     rules = SkillRules(skills)
     more = [one for palette in palettes for one in read_models(palette)]
-    known = palette_for(files, skills, more)
+    known = palette_for(files, skills, more, nodes)
     own = (rules.units, rules.results, rules.resources, rules.names)
     found += check(files, known, SkillTraits(skills), rules=own)
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
@@ -36,7 +38,7 @@ def check_mission(path: Path, source: str | bytes, skillsets: Iterable[Skillset]
     return [problem for problem in found if problem.code != "ALU605" or problem.place not in spelled_out]
 
 
-def palette_for(files: TreeFiles, skills: Skills, more: Iterable[NodeType] = ()) -> Palette:
+def palette_for(files: TreeFiles, skills: Skills, more: Iterable[NodeType] = (), nodes: Iterable[NodeType] = ()) -> Palette:
     """Return the types of node that a mission may have: its own models, those of palettes, the robot's skills, BehaviorTree.CPP's own."""
-    types = {one.name: one for one in (*files.declared(), *more, *palette_of(skills), *standard_palette())}
+    types = {one.name: one for one in (*files.declared(), *more, *palette_of(skills), *standard_palette(), *nodes)}
     return Palette(types.values())

@@ -86,15 +86,17 @@ class SkillRules:
 
     def _call(self, attribute: Attribute, node: Call) -> Iterator[Problem]:
         place = (node.offset, node.offset + len(node.function))
-        if node.function not in FUNCTIONS:
+        kind = FUNCTIONS.get(node.function)
+        if kind is None:
             yield in_value("ALU615", attribute, place, f"there is no function `{node.function}`", nearest(node.function, FUNCTIONS))
             return
-        names = [one for one in node.arguments if isinstance(one, Name)]
-        if len(node.arguments) != 1 or not names:
-            yield in_value("ALU615", attribute, place, f"`{node.function}` takes the name of one skill", f"{node.function}(skillset.skill)")
-        elif self.skills.get(names[0].name) is None:
-            cure = nearest(names[0].name, self.skills.names)
-            yield in_value("ALU615", attribute, (names[0].offset, names[0].end), f"there is no skill `{names[0].name}`", cure)
+        name = _name_of(node.arguments[0]) if len(node.arguments) == 1 else None
+        if name is None and (len(node.arguments) != 1 or isinstance(node.arguments[0], Literal)):
+            yield in_value("ALU615", attribute, place, f"`{node.function}` takes one name", f"the name of one {kind}")
+        elif name is not None and name not in self.skills.names[kind]:
+            one = node.arguments[0]
+            cure = nearest(name, self.skills.names[kind])
+            yield in_value("ALU615", attribute, (one.offset, one.end), f"there is no {kind} `{name}`", cure)
 
     def _dotted(self, attribute: Attribute, node: Name) -> Iterator[Problem]:
         skillset_name, name, *_ = node.name.split(".")
@@ -125,6 +127,13 @@ class SkillRules:
         skillset, name = node.name.split(".")
         known = self.skills.skillsets.get(skillset)
         return known.resource_index[name].states if known and name in known.resource_index else ()
+
+
+def _name_of(node: Node) -> str | None:
+    """Return the name that an argument is, bare or as a text; None where it is computed."""
+    if isinstance(node, Name):
+        return node.name
+    return node.value if isinstance(node, Literal) and isinstance(node.value, str) else None
 
 
 def _wrong_unit(attribute: Attribute, written: str, expected: str) -> Problem:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 
 from alula.model.model import Parameter, ResultKind, Skill, Skillset
@@ -14,8 +14,8 @@ from alula.trees.palette import Category, Direction, NodeType, Palette, Port
 from alula.trees.values import BOOL, DOUBLE, INT, STRING, PortType, shown
 
 SUCCESS_PORT, OUTCOME_PORT = "success", "outcome"
-FUNCTIONS = frozenset({"running", "progress"})
-"""What scripts may ask of skills; each takes one skill's name."""
+FUNCTIONS = {"running": "skill", "progress": "skill", "failed_first": "skill", "failed": "end", "reason": "resource"}
+"""What scripts may ask, and what the one name that they ask it of is: an end is a result, a precondition or an invariant."""
 _TYPES = {"bool": BOOL, "float32": DOUBLE, "float64": DOUBLE, "string": STRING}
 
 
@@ -36,9 +36,17 @@ class Skills:
         return self.get(site.kind)
 
     @cached_property
-    def names(self) -> list[str]:
-        """The whole names of all skills."""
-        return [f"{skillset.name}.{skill.name}" for skillset in self.skillsets.values() for skill in skillset.skills]
+    def names(self) -> Mapping[str, frozenset[str]]:
+        """The names of each kind that functions ask of; ends without, the others with their skillset."""
+        sets = self.skillsets.values()
+        skills = [(one.name, skill) for one in sets for skill in one.skills]
+        ends = {end.name for _, skill in skills for end in skill.results}
+        ends |= {end.name for _, skill in skills for end in (*skill.preconditions, *skill.invariants)}
+        return {
+            "skill": frozenset(f"{skillset}.{skill.name}" for skillset, skill in skills),
+            "end": frozenset(ends),
+            "resource": frozenset(f"{one.name}.{resource.name}" for one in sets for resource in one.resources),
+        }
 
     @cached_property
     def states(self) -> frozenset[str]:
@@ -59,10 +67,10 @@ class Skills:
 
 def named_results(site: Site) -> frozenset[str] | None:
     """Return the results that the file says are a success, None where it says nothing, or names an entry."""
-    text = site.given(SUCCESS_PORT)
-    if not text or pointer(text, SUCCESS_PORT) is not None:
+    attribute = site.element.attributes.get(SUCCESS_PORT)
+    if attribute is None or pointer(attribute.value, SUCCESS_PORT) is not None:
         return None
-    return frozenset(text.replace(";", " ").replace(",", " ").split())
+    return frozenset(attribute.value.split(";")) - {""}
 
 
 class SkillTraits(PlainTraits):
@@ -82,6 +90,10 @@ class SkillTraits(PlainTraits):
         """Every skill takes several ticks."""
         return True if self._skills.of(site) is not None else super().runs(site)
 
+    def may_lack(self, site: Site, port: str) -> bool:
+        """Tell whether it is the one port of a skill that narrows its results."""
+        return port == SUCCESS_PORT and self._skills.of(site) is not None
+
     def endless(self, site: Site) -> bool:
         """Tell whether none of its results is a success."""
         return self._skills.of(site) is not None and not self._skills.successes(site)
@@ -96,7 +108,7 @@ def palette_of(skills: Skills) -> Palette:
 
 def _node_type(name: str, skill: Skill) -> NodeType:
     ports = [_port(one, Direction.INPUT) for one in skill.inputs] + [_port(one, Direction.OUTPUT) for one in skill.outputs]
-    ports.append(Port(SUCCESS_PORT, STRING, default="", doc="the results that are a success, where not all are that the model calls so"))
+    ports.append(Port(SUCCESS_PORT, STRING, doc="results that are a success, with semicolons between them"))
     ports.append(Port(OUTCOME_PORT, STRING, Direction.OUTPUT, doc="how it ended"))
     return NodeType(name, Category.ACTION, {port.name: port for port in ports})
 

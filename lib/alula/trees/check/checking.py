@@ -15,7 +15,7 @@ from alula.trees.check.sites import Site, expand
 from alula.trees.check.traits import Traits
 from alula.trees.errors import Problem
 from alula.trees.palette import Direction, Palette
-from alula.trees.reading import TreeFiles
+from alula.trees.reading import TreeFiles, type_name
 from alula.trees.structure import verify
 
 ENDLESS = frozenset({"ALU007", "ALU009"})
@@ -65,13 +65,24 @@ def check(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[
 
 
 def _whole(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[str], rules: Iterable[Rule]) -> list[Problem]:
-    root = expand(files, palette, files.main)
-    if root is None:
-        return []
     model = files.models.get(files.main)
-    ports = [port.name for port in model.ports.values() if port.direction is not Direction.OUTPUT] if model else []
-    whole = Whole(root, Scripts(), Reach(traits), traits, (*given, *ports))
-    return [problem for rule in rules for problem in islice(rule(whole), MOST)]
+    programs, reach, found = Scripts(), Reach(traits), list[Problem]()
+    for name in (files.main, *_others(files)):
+        root = expand(files, palette, name)
+        if root is None:
+            continue
+        whole = Whole(root, programs, reach, traits, (*given, *(model.ports if model else ())))
+        # Who starts another tree than the main one, and with which entries, is not in the files.
+        asked = [rule for rule in rules if name == files.main or rule is not _entries]
+        found += [problem for rule in asked for problem in islice(rule(whole), MOST)]
+    return found
+
+
+def _others(files: TreeFiles) -> list[str]:
+    """Return the trees besides the main one that no tree contains."""
+    tops = [top for tree in files.trees.values() for top in tree.children]
+    used = {type_name(one) for top in tops for one in top.iterate() if one.tag == "SubTree"}
+    return [name for name in files.trees if name not in used and name != files.main]
 
 
 def _scripts(whole: Whole) -> Iterator[Problem]:
@@ -85,7 +96,11 @@ def _missing(whole: Whole) -> Iterator[Problem]:
     """Yield inputs that a file does not give and that have no default. A node that only a model tells of may do without."""
     for site in whole.root.walk():
         for port in site.type.ports.values() if site.type else ():
-            if port.direction is Direction.INPUT and site.given(port.name) is None and not port.required:
+            if (
+                port.direction is Direction.INPUT
+                and site.given(port.name) is None
+                and not (port.required or whole.traits.may_lack(site, port.name))
+            ):
                 sure = site.type is not None and site.type.make is not None
                 message = f"'{site.kind}' has no input '{port.name}', which has no default"
                 cure = f'add {port.name}="..."'

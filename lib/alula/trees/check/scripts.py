@@ -11,8 +11,8 @@ from alula.trees.errors import Problem
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 from alula.trees.script import Program, ScriptError, parse
 
-PORTS = {"Script": "code", "ScriptCondition": "code", "Precondition": "if"}
-"""The ports of BehaviorTree.CPP's nodes that hold a script."""
+PORTS = {"Script": ("code",), "ScriptCondition": ("code",), "Needs": ("if", "otherwise")}
+"""The ports that hold a script; of any other node `if` does, as that of Precondition."""
 
 
 class Scripts:
@@ -50,7 +50,7 @@ def before(site: Site) -> Iterator[Attribute]:
 
 def within(site: Site) -> Iterator[Attribute]:
     """Yield those of the node itself: a text that names an entry holds none."""
-    for attribute in _present(site, (PORTS.get(site.kind, ""),)):
+    for attribute in _present(site, PORTS.get(site.kind, ("if",))):
         if not attribute.value.lstrip().startswith("{"):
             yield attribute
 
