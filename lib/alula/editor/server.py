@@ -1,7 +1,8 @@
 """`alula editor`: a language server over the standard streams, for editors.
 
 It tells the checker's findings on every change and the proofs' when a file is saved, completes, shows and renames names, finds where
-they are defined and used, lists symbols, indents, and offers the hints of findings as changes.
+they are defined and used, lists symbols, indents, and offers the hints of findings as changes. Of missions (*.xml) it tells the
+findings, completes and shows names.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pygls.uris import from_fs_path, to_fs_path
 
 from alula.editor import names
 from alula.editor.completion import Place, completions
+from alula.editor.missions import SUFFIX, Missions
 from alula.editor.occurrences import Occurrence
 from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.layout import formatted
@@ -56,6 +58,7 @@ class SkillLanguageServer(LanguageServer):
     def __init__(self) -> None:
         super().__init__("alula-skill-language", "0.2.0", text_document_sync_kind=lsp.TextDocumentSyncKind.Incremental)
         self._files: dict[str, tuple[int | None, ModelFile]] = {}
+        self.missions = Missions()
 
     def file(self, uri: str) -> ModelFile | None:
         """Return a document as the editor has it, read and checked; None when it is not open."""
@@ -65,7 +68,8 @@ class SkillLanguageServer(LanguageServer):
             return None
         known = self._files.get(uri)
         if known is None or known[0] != document.version:
-            (file,) = check_texts([ModelFile(*self._text(uri))])
+            path, text = self._text(uri)
+            file = self.missions.checked(path, text) if is_mission(uri) else check_texts([ModelFile(path, text)])[0]
             known = self._files[uri] = (document.version, file)
         return known[1]
 
@@ -85,6 +89,11 @@ class SkillLanguageServer(LanguageServer):
         return to_fs_path(uri) or Path(uri).name, source.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
 
 
+def is_mission(uri: str) -> bool:
+    """Tell whether a document is a mission: all others are models."""
+    return uri.endswith(SUFFIX)
+
+
 server = SkillLanguageServer()
 
 
@@ -99,7 +108,7 @@ class _Asked:
 
 def _asked(ls: SkillLanguageServer, document: lsp.TextDocumentIdentifier, position: lsp.Position) -> _Asked | None:
     file = ls.file(document.uri)
-    if file is None:
+    if file is None or is_mission(document.uri):
         return None
     place = _place(file, position)
     found = names.occurrence_at(file, place.line, place.column)
@@ -164,11 +173,12 @@ def _diagnostic(file: ModelFile, finding: Diagnostic) -> lsp.Diagnostic:
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-@server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "=", ">", ":"]))
+@server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "=", ">", ":", "<", ".", "(", '"']))
 def completion(ls: SkillLanguageServer, params: lsp.CompletionParams) -> lsp.CompletionList:
     """Return the names that may stand at the cursor."""
     file = ls.file(params.text_document.uri)
-    found = completions(file, _place(file, params.position)) if file is not None else []
+    complete = ls.missions.completions if is_mission(params.text_document.uri) else completions
+    found = complete(file, _place(file, params.position)) if file is not None else []
     items = [lsp.CompletionItem(label=c.label, kind=_COMPLETION_KIND[c.kind], detail=c.detail or None) for c in found]
     return lsp.CompletionList(is_incomplete=False, items=items)
 
@@ -176,12 +186,25 @@ def completion(ls: SkillLanguageServer, params: lsp.CompletionParams) -> lsp.Com
 @server.feature(lsp.TEXT_DOCUMENT_HOVER)
 def hover(ls: SkillLanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
     """Return what the name under the pointer stands for."""
+    if is_mission(params.text_document.uri):
+        return _hover_in_mission(ls, params)
     asked = _asked(ls, params.text_document, params.position)
     text = names.description(asked.file, asked.name.entity) if asked else ""
     if asked is None or not text:
         return None
     contents = lsp.MarkupContent(kind=lsp.MarkupKind.Markdown, value=f"```skill\n{text}\n```")
     return lsp.Hover(contents=contents, range=_range(asked.file, asked.name.span))
+
+
+def _hover_in_mission(ls: SkillLanguageServer, params: lsp.HoverParams) -> lsp.Hover | None:
+    file = ls.file(params.text_document.uri)
+    place = _place(file, params.position) if file else None
+    found = ls.missions.description(file, place) if file and place else None
+    if file is None or place is None or found is None:
+        return None
+    text, first, end = found
+    contents = lsp.MarkupContent(kind=lsp.MarkupKind.Markdown, value=f"```skill\n{text}\n```")
+    return lsp.Hover(contents=contents, range=_range(file, Span(file.path, place.line, first, end)))
 
 
 @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
@@ -255,7 +278,7 @@ def _symbol(file: ModelFile, symbol: names.Symbol) -> lsp.DocumentSymbol:
 def formatting(ls: SkillLanguageServer, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
     """Indent a file by its braces."""
     file = ls.file(params.text_document.uri)
-    if file is None or formatted(file.text) == file.text:
+    if file is None or is_mission(params.text_document.uri) or formatted(file.text) == file.text:
         return []
     lines = file.text.split("\n")
     return [lsp.TextEdit(lsp.Range(lsp.Position(0, 0), _position(file, len(lines), len(lines[-1]) + 1)), formatted(file.text))]

@@ -41,7 +41,8 @@ class Skills:
         sets = self.skillsets.values()
         skills = [(one.name, skill) for one in sets for skill in one.skills]
         ends = {end.name for _, skill in skills for end in skill.results}
-        ends |= {end.name for _, skill in skills for end in (*skill.preconditions, *skill.invariants)}
+        ends |= {end.name for _, skill in skills for end in skill.preconditions}
+        ends |= {end.name for _, skill in skills for end in skill.invariants}
         return {
             "skill": frozenset(f"{skillset}.{skill.name}" for skillset, skill in skills),
             "end": frozenset(ends),

@@ -1,0 +1,138 @@
+"""Missions in the editor: findings, what may be written next, and what a name stands for, by the models of the robot around the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from alula.common.robots import RobotError, find_robot
+from alula.editor.completion import Completion, Place
+from alula.language.models import ModelFile, check_files, models_in
+from alula.missions.check.findings import findings_of
+from alula.missions.check.skills import FUNCTIONS, SUCCESS_PORT, Skills, palette_of
+from alula.model.model import ResultKind, Skill
+from alula.trees.palette import NodeType, Palette
+from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
+from alula.trees.standard import standard_palette
+
+SUFFIX = ".xml"
+_TAG = re.compile(r"<([\w.]*)$")
+_VALUE = re.compile(r"""([\w:]+)\s*=\s*(?:"([^"]*)|'([^']*))$""")
+_OPEN = re.compile(r"""<([\w.]+)((?:\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*([^<>]*)$""")
+_STATE = re.compile(r"(\w+)\.(\w+)\s*(?:==|!=)\s*'?\w*$")
+_CALL = re.compile(r"(\w+)\(\s*[\w.]*$")
+_MEMBER = re.compile(r"(\w+)\.\w*$")
+_WORD = re.compile(r"[\w.]+")
+_SCRIPTS = frozenset({"code", "if", "otherwise", *PRECONDITIONS, *POSTCONDITIONS})
+
+
+class Missions:
+    """Reads missions with the models of their robots, which are read again when their files have changed."""
+
+    def __init__(self) -> None:
+        self._read: dict[tuple[tuple[str, int], ...], Skills] = {}
+
+    def checked(self, path: str, text: str) -> ModelFile:
+        """Return a mission with its findings."""
+        file = ModelFile(path, text)
+        file.findings = findings_of(path, text.encode("utf-8", "replace"), self.skills(path).skillsets.values())
+        return file
+
+    def skills(self, path: str) -> Skills:
+        """Return the skills of the robot whose folder a file lies in, none where there is no robot."""
+        try:
+            places = models_in(str(find_robot(Path(path).parent).skillsets))
+            stamps = tuple((place, Path(place).stat().st_mtime_ns) for place in places)
+        except (RobotError, OSError):
+            return Skills(())
+        if stamps not in self._read:
+            self._read = {stamps: Skills(skillset for file in check_files(places) for skillset in file.skillsets)}
+        return self._read[stamps]
+
+    def completions(self, file: ModelFile, place: Place) -> list[Completion]:
+        """Return what may stand at a place."""
+        lines = file.text.split("\n")[: place.line]
+        before = "\n".join([*lines[:-1], lines[-1][: place.column - 1]]) if lines else ""
+        return list(_candidates(before, self.skills(file.path)))
+
+    def description(self, file: ModelFile, place: Place) -> tuple[str, int, int] | None:
+        """Return what the name at a place stands for, with its first column and the one behind it; None where nothing is known."""
+        skills = self.skills(file.path)
+        for match in _WORD.finditer(file.line(place.line)):
+            if match.start() < place.column <= match.end() + 1:
+                text = _described(match.group(), skills)
+                return (text, match.start() + 1, match.end() + 1) if text else None
+        return None
+
+
+def _candidates(before: str, skills: Skills) -> Iterator[Completion]:
+    types = Palette([*palette_of(skills), *standard_palette()])
+    if _TAG.search(before):
+        yield from (Completion(one.name, "skill" if "." in one.name else "keyword", one.doc) for one in types)
+        return
+    opened = _OPEN.search(before)
+    if opened is None:
+        return
+    node, value = types.get(opened[1]), _VALUE.search(before)
+    if value is not None:
+        yield from _values(value[1], value[2] or value[3] or "", opened[1], skills)
+    elif node is not None:
+        yield from _ports(node, opened[2])
+
+
+def _ports(node: NodeType, given: str) -> Iterator[Completion]:
+    for port in node.ports.values():
+        if not re.search(rf"\b{port.name}\s*=", given):
+            yield Completion(port.name, "data", " ".join(filter(None, (port.type.name, port.unit, port.doc))))
+    yield from (Completion(name, "keyword", "a script") for name in (*PRECONDITIONS, *POSTCONDITIONS))
+
+
+def _values(attribute: str, text: str, tag: str, skills: Skills) -> Iterator[Completion]:
+    skill = skills.get(tag)
+    if attribute == SUCCESS_PORT and skill is not None:
+        yield from (Completion(one.name, "state", one.comment) for one in skill.results)
+    elif attribute == "ID":
+        yield from (Completion(name, "skill") for name in sorted(skills.names["skill"]))
+    elif attribute in _SCRIPTS:
+        yield from _in_script(text, skills)
+
+
+def _in_script(text: str, skills: Skills) -> Iterator[Completion]:
+    """Yield states behind a comparison, names of skills in a call, members behind a skillset's dot, else all that may begin."""
+    compared, called, member = _STATE.search(text), _CALL.search(text), _MEMBER.search(text)
+    if compared and compared[1] in skills.skillsets:
+        resource = skills.skillsets[compared[1]].resource_index.get(compared[2])
+        yield from (Completion(state, "state") for state in (resource.states if resource else ()))
+    elif called and called[1] in FUNCTIONS:
+        yield from (Completion(name, "skill") for name in sorted(skills.names[FUNCTIONS[called[1]]]))
+    elif member and member[1] in skills.skillsets:
+        skillset = skills.skillsets[member[1]]
+        yield from (Completion(name, "resource") for name in skillset.resource_index)
+        yield from (Completion(name, "data") for name in skillset.data_index)
+    else:
+        yield from (Completion(f"{name}(", "keyword", f"of a {kind}") for name, kind in FUNCTIONS.items())
+        yield from (Completion(name, "resource") for name in sorted(skills.names["resource"]))
+
+
+def _described(name: str, skills: Skills) -> str:
+    skill = skills.get(name)
+    if skill is not None:
+        return _skill_text(name, skill)
+    skillset, _, resource = name.partition(".")
+    known = skills.skillsets.get(skillset)
+    if known and resource in known.resource_index:
+        return f"resource {name} {{ {' '.join(known.resource_index[resource].states)} }}"
+    return ""
+
+
+def _skill_text(name: str, skill: Skill) -> str:
+    """Return a skill as its model has it: inputs, outputs, results with what they are."""
+    lines = [f"skill {name}"]
+    for word, parameters in (("input", skill.inputs), ("output", skill.outputs)):
+        lines += [f"  {word} {one.name}: {one.type}" + (f" // {one.comment}" if one.comment else "") for one in parameters]
+    for result in skill.results:
+        kind = skill.kind_of(result.name)
+        word = "result" if kind is ResultKind.PLAIN else kind.value
+        lines.append(f"  {word} {result.name}" + (f" // {result.comment}" if result.comment else ""))
+    return "\n".join(lines)

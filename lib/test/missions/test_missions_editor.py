@@ -1,0 +1,101 @@
+"""Missions in the editor: findings on every change, completion, and what a name stands for."""
+
+from __future__ import annotations
+
+import pytest
+from test_language_server import Editor
+
+from alula.editor.completion import Place
+from alula.editor.missions import Missions
+from alula.missions.check.page import ROBOT, whole
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "robot.yaml").write_text("name: drone\nskillsets: skillsets\n")
+    (tmp_path / "skillsets").mkdir()
+    (tmp_path / "skillsets" / "drone.rl").write_text(ROBOT)
+    (tmp_path / "missions").mkdir()
+    return tmp_path
+
+
+def completed(folder, line):
+    """Return what is offered at the place of a `|` in a line of a mission."""
+    missions = Missions()
+    before, _, after = line.partition("|")
+    text = whole(before + after)
+    file = missions.checked(str(folder / "missions" / "m.xml"), text)
+    place = Place(3, len(f"    {before}") + 1)
+    return {one.label: one.detail for one in missions.completions(file, place)}
+
+
+def test_tags_are_skills_and_nodes(folder):
+    offered = completed(folder, "<dro|")
+    assert {"drone.hover", "drone.turn", "drone.watch", "Sequence", "Parallel"} <= set(offered)
+
+
+def test_attributes_are_ports_that_are_not_given(folder):
+    offered = completed(folder, '<drone.hover outcome="{why}" |/>')
+    assert "s" in offered["duration"]
+    assert {"duration", "success", "_skipIf"} <= set(offered)
+    assert "outcome" not in offered
+
+
+def test_values_are_results_and_names_of_scripts(folder):
+    assert set(completed(folder, '<drone.hover duration="1" success="|"/>')) == {"DONE", "ABORTED"}
+    assert set(completed(folder, '<ScriptCondition code="1 &lt; 2 &amp;&amp; drone.flight == |"/>')) == {"ON_GROUND", "IN_AIR"}
+    assert set(completed(folder, '<ScriptCondition code="drone.|"/>')) == {"axes", "flight"}
+    assert set(completed(folder, '<ScriptCondition code="running(|"/>')) == {"drone.hover", "drone.turn", "drone.watch"}
+    assert {"running(", "drone.flight"} <= set(completed(folder, '<AlwaysSuccess _skipIf="|"/>'))
+    assert completed(folder, '<Sleep msec="|"/>') == {}
+
+
+def test_a_name_is_told_by_its_model(folder):
+    missions = Missions()
+    file = missions.checked(str(folder / "missions" / "m.xml"), whole('<drone.hover duration="1" _skipIf="drone.flight == IN_AIR"/>'))
+    text, first, end = missions.description(file, Place(3, 8))
+    assert text.splitlines() == ["skill drone.hover", "  input duration: float64 // s", "  success DONE", "  failure ABORTED"]
+    assert file.line(3)[first - 1 : end - 1] == "drone.hover"
+    column = file.line(3).index("flight")
+    assert missions.description(file, Place(3, column + 1))[0] == "resource drone.flight { ON_GROUND IN_AIR }"
+    assert missions.description(file, Place(3, file.line(3).index("duration") + 1)) is None
+
+
+def test_models_that_change_are_read_again(folder):
+    missions, path = Missions(), str(folder / "missions" / "m.xml")
+    text = whole("<ForceSuccess><drone.land/></ForceSuccess>")
+    assert [one.code for one in missions.checked(path, text).findings] == ["ALU601"]
+    model = folder / "skillsets" / "drone.rl"
+    model.write_text(ROBOT.replace("skill watch {", "skill land { success DOWN {} }\n  skill watch {"))
+    assert missions.checked(path, text).findings == []
+
+
+def test_an_editing_session(folder):
+    editor = Editor()
+    uri = (folder / "missions" / "m.xml").as_uri()
+    document = {"uri": uri, "languageId": "xml", "version": 1, "text": whole('<ForceSuccess><drone.hovr duration="2"/></ForceSuccess>')}
+    try:
+        editor.ask("initialize", {"processId": None, "rootUri": None, "capabilities": {}})
+        editor.send("initialized", {})
+        editor.send("textDocument/didOpen", {"textDocument": document})
+        (finding,) = editor.told()["diagnostics"]
+        assert finding["code"] == "ALU601"
+        assert finding["range"]["start"] == {"line": 2, "character": 18}
+        mended = {"text": document["text"].replace("hovr", "hover")}
+        changed = {"uri": uri, "version": 2}
+        editor.send("textDocument/didChange", {"textDocument": changed, "contentChanges": [mended]})
+        assert editor.told()["diagnostics"] == []
+        where = {"textDocument": {"uri": uri}, "position": {"line": 2, "character": 22}}
+        assert "skill drone.hover" in editor.ask("textDocument/hover", where)["contents"]["value"]
+        assert "drone.turn" in {item["label"] for item in editor.ask("textDocument/completion", where)["items"]}
+        for request in ("formatting", "documentSymbol"):
+            assert not editor.ask(
+                f"textDocument/{request}", {"textDocument": {"uri": uri}, "options": {"tabSize": 2, "insertSpaces": True}}
+            )
+        assert editor.ask("textDocument/definition", where) is None
+        editor.ask("shutdown", None)
+        editor.send("exit", None)
+        assert editor.process.wait(30) == 0
+    finally:
+        editor.process.kill()
+        editor.process.wait(30)
