@@ -10,7 +10,8 @@ from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.check.findings import findings_of
-from alula.missions.check.skills import FUNCTIONS, SUCCESS_PORT, Skills, palette_of
+from alula.missions.check.skills import FUNCTIONS, Skills, palette_of
+from alula.missions.skill_types import SUCCESS_PORT
 from alula.model.model import ResultKind, Skill
 from alula.trees.palette import NodeType, Palette
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
@@ -69,7 +70,7 @@ class Missions:
 def _candidates(before: str, skills: Skills) -> Iterator[Completion]:
     types = Palette([*palette_of(skills), *standard_palette()])
     if _TAG.search(before):
-        yield from (Completion(one.name, "skill" if "." in one.name else "keyword", one.doc) for one in types)
+        yield from (Completion(one.name, "skill" if skills.get(one.name) else "keyword", one.doc) for one in types)
         return
     opened = _OPEN.search(before)
     if opened is None:

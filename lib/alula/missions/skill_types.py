@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from alula.language.syntax.elements import told_unit
 from alula.model.model import Parameter, Resource, ResultKind, Skill
 from alula.model.ros_types import PRIMITIVES
 from alula.trees.palette import Category, Direction, NodeType, Port, node_type
-from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, UINT, PortType
+from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, UINT, PortType, shown
 
 SUCCESS_PORT = "success"
 OUTCOME_PORT = "outcome"
@@ -46,8 +48,16 @@ def _port(parameter: Parameter, direction: Direction) -> Port:
 
 
 def type_of(name: str) -> PortType:
-    """Return the type of a port for a type of the models; what is no primitive has its name and takes any value."""
+    """Return the type of a port for a type of the models; what is no primitive has its name and takes any value but text."""
     if name.startswith("uint"):
         return UINT
     python = PRIMITIVES.get(name)
-    return PYTHON_TYPES[python] if python else PortType(name, ANY.parse, ANY.cast)
+    return PYTHON_TYPES[python] if python else PortType(name, _no_text(name), ANY.cast)
+
+
+def _no_text(name: str) -> Callable[[str], object]:
+    def refuse(text: str) -> object:
+        msg = f"{shown(text)} is no {name}; a {name} comes from an entry: {{entry}}"
+        raise ValueError(msg)
+
+    return refuse

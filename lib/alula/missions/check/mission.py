@@ -8,6 +8,7 @@ from pathlib import Path
 from alula.missions.check.rules import SkillRules
 from alula.missions.check.skills import Skills, SkillTraits, palette_of
 from alula.model.model import Skillset
+from alula.trees import nav2
 from alula.trees.check.checking import check
 from alula.trees.errors import FileError, Problem
 from alula.trees.palette import NodeType, Palette
@@ -39,6 +40,6 @@ def check_mission(
 
 
 def palette_for(files: TreeFiles, skills: Skills, more: Iterable[NodeType] = (), nodes: Iterable[NodeType] = ()) -> Palette:
-    """Return the types of node that a mission may have: its own models, those of palettes, the robot's skills, BehaviorTree.CPP's own."""
-    types = {one.name: one for one in (*files.declared(), *more, *palette_of(skills), *standard_palette(), *nodes)}
+    """Return the types that a mission may have: its own models, those of palettes, the robot's skills, Nav2's and BehaviorTree.CPP's."""
+    types = {one.name: one for one in (*files.declared(), *more, *palette_of(skills), *nav2.palette(), *standard_palette(), *nodes)}
     return Palette(types.values())

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from alula.common.suggestions import nearest, quoted
 from alula.missions.check.resources import clash
-from alula.missions.check.skills import FUNCTIONS, OUTCOME_PORT, SUCCESS_PORT, Skills, named_results
+from alula.missions.check.skills import FUNCTIONS, Skills, named_results
+from alula.missions.skill_types import OUTCOME_PORT, SUCCESS_PORT
 from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
 from alula.trees.check.checking import Whole

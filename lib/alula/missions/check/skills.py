@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 
-from alula.model.model import Parameter, ResultKind, Skill, Skillset
-from alula.model.units import UNIT_IN_SI
+from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT, resource_type, skill_type
+from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.check.sites import Site
 from alula.trees.check.traits import F, PlainTraits, S
 from alula.trees.node import pointer
-from alula.trees.palette import Category, Direction, NodeType, Palette, Port
-from alula.trees.values import BOOL, DOUBLE, INT, STRING, PortType, shown
+from alula.trees.palette import Palette
 
-SUCCESS_PORT, OUTCOME_PORT = "success", "outcome"
 FUNCTIONS = {"running": "skill", "progress": "skill", "failed_first": "skill", "failed": "end", "reason": "resource"}
 """What scripts may ask, and what the one name that they ask it of is: an end is a result, a precondition or an invariant."""
-_TYPES = {"bool": BOOL, "float32": DOUBLE, "float64": DOUBLE, "string": STRING}
 
 
 class Skills:
@@ -71,7 +68,7 @@ def named_results(site: Site) -> frozenset[str] | None:
     attribute = site.element.attributes.get(SUCCESS_PORT)
     if attribute is None or pointer(attribute.value, SUCCESS_PORT) is not None:
         return None
-    return frozenset(attribute.value.split(";")) - {""}
+    return frozenset(attribute.value.split(SEPARATOR)) - {""}
 
 
 class SkillTraits(PlainTraits):
@@ -91,50 +88,18 @@ class SkillTraits(PlainTraits):
         """Every skill takes several ticks."""
         return True if self._skills.of(site) is not None else super().runs(site)
 
-    def may_lack(self, site: Site, port: str) -> bool:
-        """Tell whether it is the one port of a skill that narrows its results."""
-        return port == SUCCESS_PORT and self._skills.of(site) is not None
-
     def endless(self, site: Site) -> bool:
         """Tell whether none of its results is a success."""
         return self._skills.of(site) is not None and not self._skills.successes(site)
 
 
 def palette_of(skills: Skills) -> Palette:
-    """Return the skills as actions: inputs and outputs are ports with the model's types, units and defaults."""
+    """Return skills as actions, and resources as conditions."""
     return Palette(
-        _node_type(f"{skillset.name}.{skill.name}", skill) for skillset in skills.skillsets.values() for skill in skillset.skills
+        one
+        for skillset in skills.skillsets.values()
+        for one in (
+            *(skill_type(skillset.name, skill) for skill in skillset.skills),
+            *(resource_type(skillset.name, resource) for resource in skillset.resources),
+        )
     )
-
-
-def _node_type(name: str, skill: Skill) -> NodeType:
-    ports = [_port(one, Direction.INPUT) for one in skill.inputs] + [_port(one, Direction.OUTPUT) for one in skill.outputs]
-    ports.append(Port(SUCCESS_PORT, STRING, doc="results that are a success, with semicolons between them"))
-    ports.append(Port(OUTCOME_PORT, STRING, Direction.OUTPUT, doc="how it ended"))
-    return NodeType(name, Category.ACTION, {port.name: port for port in ports})
-
-
-def _port(parameter: Parameter, direction: Direction) -> Port:
-    required = direction is Direction.INPUT and not parameter.default
-    unit = unit_of(parameter.comment)
-    return Port(parameter.name, port_type(parameter.type), direction, parameter.default or None, parameter.comment, unit, required)
-
-
-def unit_of(comment: str) -> str:
-    """Return the unit with which the comment behind a declaration begins: `// m/s, > 0`."""
-    word = comment.replace(",", " ").split()[:1]
-    return word[0] if word and word[0] in UNIT_IN_SI else ""
-
-
-def port_type(name: str) -> PortType:
-    """Return the type of a port for a type of the model; a message can't be written as text."""
-    if name in _TYPES:
-        return _TYPES[name]
-    if name.startswith(("int", "uint")) and name.lstrip("uint").isdigit():
-        return INT
-
-    def refuse(text: str) -> object:
-        msg = f"{shown(text)} is no {name}; a {name} comes from an entry: {{entry}}"
-        raise ValueError(msg)
-
-    return PortType(name, refuse, lambda value: value)

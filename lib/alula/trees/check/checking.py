@@ -96,11 +96,7 @@ def _missing(whole: Whole) -> Iterator[Problem]:
     """Yield inputs that a file does not give and that have no default. A node that only a model tells of may do without."""
     for site in whole.root.walk():
         for port in site.type.ports.values() if site.type else ():
-            if (
-                port.direction is Direction.INPUT
-                and site.given(port.name) is None
-                and not (port.required or whole.traits.may_lack(site, port.name))
-            ):
+            if port.direction is Direction.INPUT and site.given(port.name) is None and not port.required:
                 sure = site.type is not None and site.type.make is not None
                 message = f"'{site.kind}' has no input '{port.name}', which has no default"
                 cure = f'add {port.name}="..."'

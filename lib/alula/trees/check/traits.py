@@ -38,9 +38,6 @@ class Traits(Protocol):
     def is_name(self, name: str) -> bool:
         """Tell whether a name in a script stands for something else than an entry."""
 
-    def may_lack(self, site: Site, port: str) -> bool:
-        """Tell whether a node does without an input that has no default."""
-
     def is_optional(self, site: Site, port: str) -> bool:
         """Tell whether the node does without the entry that a port reads."""
 
@@ -70,10 +67,6 @@ class PlainTraits:
     def is_name(self, name: str) -> bool:
         """Tell whether it is an enum's or a dotted name."""
         return name in self._names or "." in name
-
-    def may_lack(self, site: Site, port: str) -> bool:  # noqa: ARG002
-        """Know none."""
-        return False
 
     def is_optional(self, site: Site, port: str) -> bool:
         """Tell whether the port asks whether there is such an entry."""
