@@ -99,3 +99,21 @@ def test_a_clock_that_is_late_for_a_moment_moves_no_sweep() -> None:
     for k in range(9):
         sweep = arc(-180.0, 180.0, k, period_s=0.2)
         assert stamps.begun(sweep, sweep.stamp_ns + int((0.2 if k % 3 else 0.05) * NS)) is sweep
+
+
+@pytest.mark.parametrize("odd_s", [-0.02, 0.15], ids=["before its time is heard", "late"])
+def test_one_sweep_that_comes_at_an_odd_time_does_not_change_what_is_known_of_the_driver(odd_s) -> None:
+    stamps = SweepStamps()
+    for k in range(12):
+        sweep = arc(-180.0, 180.0, k, period_s=0.2)
+        begun = stamps.begun(sweep, sweep.stamp_ns + int((odd_s if k in {4, 8, 9} else 0.02) * NS))
+        assert k < 2 or abs(begun.end_ns - sweep.stamp_ns) < 1000, k
+
+
+def test_a_driver_that_stamps_the_beginning_again_is_known_by_three_sweeps_too() -> None:
+    stamps = SweepStamps()
+    moved = []
+    for k in range(9):
+        sweep = arc(-180.0, 180.0, k, period_s=0.2)
+        moved.append(stamps.begun(sweep, sweep.stamp_ns + int((0.02 if k < 4 else 0.22) * NS)) is not sweep)
+    assert moved == [False, False, True, True, True, True, False, False, False]

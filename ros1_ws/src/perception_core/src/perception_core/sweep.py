@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Real = TypeVar("Real", np.float32, np.float64)
 
 KNOT_S = 0.01
-END_STAMPS = 3  # sweeps in a row
+TELLING = 3  # sweeps in a row
 
 
 @dataclass(frozen=True)
@@ -61,18 +61,23 @@ class Sweep:
 class SweepStamps:
     """Know a driver that stamps the end of its sweeps and counts the points' times from the beginning; not thread-safe.
 
-    By its stamps each sweep would end after it has arrived. One that does is no proof: a busy machine may tell a node the time late.
+    By its stamps each sweep would end after it has arrived. One that does is no proof: a busy machine may tell a node the time late. Nor is
+    one that does not, of a driver that is known: the node may be late, too. A stamp that lies ahead of the time tells nothing of either.
     """
 
     def __init__(self) -> None:
-        self._after_arrival = 0
+        self._at_end = False
+        self._otherwise = 0  # sweeps in a row that speak against what is known
 
     def begun(self, sweep: Sweep, now_ns: int) -> Sweep:
         """Return a sweep, which has just arrived, stamped with its beginning."""
         lasts_ns = sweep.end_ns - sweep.stamp_ns
-        ends_later = sweep.stamp_ns <= now_ns < sweep.end_ns - lasts_ns // 2
-        self._after_arrival = self._after_arrival + 1 if ends_later else 0
-        return replace(sweep, stamp_ns=sweep.stamp_ns - lasts_ns) if self._after_arrival >= END_STAMPS else sweep
+        ends_later = now_ns < sweep.end_ns - lasts_ns // 2
+        if sweep.stamp_ns <= now_ns:
+            self._otherwise = self._otherwise + 1 if ends_later is not self._at_end else 0
+        if self._otherwise >= TELLING:
+            self._at_end, self._otherwise = ends_later, 0
+        return replace(sweep, stamp_ns=sweep.stamp_ns - lasts_ns) if self._at_end else sweep
 
 
 def deskew(sweep: Sweep, poses: PoseBuffer, T_base_sensor: Floats, origin_m: Floats) -> Floats32:  # noqa: N803 -- T_target_source
