@@ -163,13 +163,14 @@ class MasterMonitor:
     def _run(self) -> None:
         while True:
             try:
-                self._look()
+                self.look()
             except Exception:  # whatever garbage comes from there; the next look must come
                 logger.exception("reading the state of the ROS master failed")
             if self._stop.wait(ASK_EVERY_S):
                 return
 
-    def _look(self) -> None:
+    def look(self) -> None:
+        """Ask the master once, and tell what has changed; the thread does so again and again."""
         before = self.state
         try:
             system = self._master.call_raw("getSystemState", self._node.name)

@@ -52,6 +52,7 @@ class Specification(Structure):
         ("reliable", c_int32),
         ("latched", c_int32),
         ("converts", c_int32),
+        ("bulky", c_int32),
     ]
 
 

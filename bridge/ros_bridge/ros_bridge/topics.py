@@ -46,6 +46,7 @@ class NativeTopic(NativeRoute):
                 reliable=spec.reliability is Reliability.RELIABLE,
                 latched=spec.latched,
                 converts=not pair.same_layout,
+                bulky=context.types.bulky(pair.ros2_name),
             )
             make = self._native.ros1_to_ros2_new if self._to_ros2 else self._native.ros2_to_ros1_new
             self._handle = self._native.require(make(self._plane.context, ctypes.byref(specification)))

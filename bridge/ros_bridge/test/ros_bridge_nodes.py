@@ -3,7 +3,6 @@
 import json
 import struct
 import threading
-import time
 from collections.abc import Callable
 
 import rclpy
@@ -52,13 +51,11 @@ class Ros2Peer:
         return server
 
     def call(self, service: str, kind: type, request: object, within_s: float = 10.0):
-        """Return the response and how many seconds it took, or None when there was none in time."""
+        """Return the response, or None when there was none in time."""
         client = self.node.create_client(kind, service)
         self.ends.append((self.node.destroy_client, client))
         assert client.wait_for_service(20.0)
-        start = time.monotonic()
-        response = client.call(request, timeout_sec=within_s)
-        return response, time.monotonic() - start
+        return client.call(request, timeout_sec=within_s)
 
     def tidy(self) -> None:
         while self.ends:

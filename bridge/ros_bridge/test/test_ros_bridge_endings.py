@@ -2,25 +2,22 @@
 
 import json
 import signal
-import time
 from xmlrpc.client import ServerProxy
 
-from ros_bridge_harness import BridgeProcess, Master, Ros1Peer, wait_until
+from ros_bridge_harness import WITHIN_S, BridgeProcess, Master, Ros1Peer, wait_until
 from ros_bridge_nodes import Ros2Peer, open_up
 from std_msgs.msg import String
 
 from alula.common.network import free_port
 
 
-def test_interrupt_ends_the_bridge_within_two_seconds_with_its_figures(master, ros2_domain, tmp_path):
+def test_interrupt_ends_the_bridge_with_its_figures(master, ros2_domain, tmp_path):
     config = "topics:\n  - {name: /bt_end, direction: ros1_to_ros2, type: std_msgs/String}\n"
     for number in (signal.SIGINT, signal.SIGTERM):
         process = BridgeProcess(master, tmp_path / number.name, config)
         process.wait_running()
-        start = time.monotonic()
         process.process.send_signal(number)
-        assert process.process.wait(5.0) == 0
-        assert time.monotonic() - start < 2.0
+        assert process.process.wait(WITHIN_S) == 0
         about = {"ros2_name": "/bt_end", "direction": "ros1_to_ros2", "type": "std_msgs/String", "rate_hz": 0.0}
         figures = {"count": 0, "bytes": 0, "p50_ms": None, "p95_ms": None, "dropped": 0, "errors": 0, "dropped_why": {}}
         assert json.loads(process.stats_file.read_text()) == {"topics": {"/bt_end": about | figures}, "services": {}, "actions": {}}

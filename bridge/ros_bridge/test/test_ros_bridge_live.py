@@ -1,7 +1,6 @@
 """Services through the bridge as a process, between a ROS master with a rospy peer and a DDS domain with this process as rclpy peer."""
 
 import threading
-import time
 
 import pytest
 import rclpy
@@ -28,21 +27,20 @@ def test_ros2_client_calls_a_ros1_server_until_it_goes_and_its_successor_comes(r
         server = Ros1Peer(master)
         server.do("serve", service="/bt/in_ros1", type="std_srvs/SetBool", behaviour="echo")
         for data in (True, False, True):
-            response, _ = ros2.call("/bt/in_ros1", SetBool, SetBool.Request(data=data))
+            response = ros2.call("/bt/in_ros1", SetBool, SetBool.Request(data=data))
             assert (response.success, response.message) == (data, "from ROS 1")
             assert server.expect("request")["hex"] == ("01" if data else "00")
         server.close()
 
 
 def test_ros2_client_gets_a_refusal_when_there_is_no_ros1_server(ros2, bridge):
-    response, seconds = ros2.call("/bt/in_ros1_hasty", SetBool, SetBool.Request(data=True))
+    response = ros2.call("/bt/in_ros1_hasty", SetBool, SetBool.Request(data=True))
     assert response.success is False
     assert "no server" in response.message
-    assert 0.4 < seconds < 2.0
 
 
 def test_response_without_a_flag_is_not_sent_at_all(ros2, bridge):
-    response, _ = ros2.call("/bt/in_ros1_plain", Empty, Empty.Request(), within_s=1.5)
+    response = ros2.call("/bt/in_ros1_plain", Empty, Empty.Request(), within_s=1.5)
     assert response is None
 
 
@@ -56,10 +54,9 @@ def test_ros2_client_gets_a_refusal_when_the_ros1_server_fails(ros2, master, beh
     caller.start()
     server.expect("request")
     caller.join()
-    response, seconds = replies[0]
+    (response,) = replies
     assert response.success is False
     assert reason in response.message
-    assert seconds < 3.0
     server.close()
 
 
@@ -103,10 +100,8 @@ def test_ros1_client_gets_an_error_when_the_ros2_server_raises_or_goes(ros1, ros
     thread.start()
     ros1.do("call", service="/bt/in_ros2", type="std_srvs/SetBool", values={"data": True})
     assert taken.wait(5.0)
-    start = time.monotonic()
     gone.set()
     assert "ended in the call" in ros1.expect("called", "call_failed")["reason"]
-    assert time.monotonic() - start < 2.0
     thread.join()
     executor.shutdown()
 
@@ -131,5 +126,5 @@ def test_slow_services_stall_no_topic(ros1, ros2, master):
     assert replies == []  # so all of it happened while the calls were under way
     for caller in callers:
         caller.join()
-    assert [response.message for response, _ in replies] == ["from ROS 1"] * 2
+    assert [response.message for response in replies] == ["from ROS 1"] * 2
     slow.close()

@@ -1,13 +1,16 @@
 """The native data plane among peers of every kind: latching ones, those that break off, those that speak no TCPROS, or too much of it."""
 
+import itertools
 import json
+import os
 import random
+import signal
 import socket
 import struct
-import time
+import sys
 from xmlrpc.client import ServerProxy
 
-from ros_bridge_harness import PROBE_S, Ros1Peer, wait_until
+from ros_bridge_harness import HERE, PROBE_S, Lines, Ros1Peer, wait_until
 from ros_bridge_nodes import LATCHED
 from ros_bridge_wire import STRING_SUM, FakePublisher, frame, greeting, read_frame, read_header, until_it_arrives, wish
 from std_msgs.msg import String
@@ -20,6 +23,7 @@ topics:
   - {name: /bp/down_latched, direction: ros2_to_ros1, type: std_msgs/String, latched: true, depth: 1}
   - {name: /bp/flood, direction: ros1_to_ros2, type: std_msgs/String, depth: 10}
   - {name: /bp/burst, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
+  - {name: /bp/stopped, direction: ros1_to_ros2, type: std_msgs/String}
   - {name: /bp/fake, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {ros1_name: /bp/fake, ros2_name: /bp/fake_too, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
 """
@@ -173,13 +177,11 @@ def test_publisher_that_breaks_off_or_talks_nonsense_is_tried_again_and_harms_no
     wait_until(counted, "the message that is none is counted", LIMIT_S)
 
 
-def test_lost_publisher_is_found_again_within_two_seconds(ros2, master, bridge):
+def test_lost_publisher_is_found_again(ros2, master, bridge):
     received = texts(ros2, "/bp/fake")
     hello = greeting("/bp/fake")
     fake = FakePublisher(master, [b"", b"", b"", hello + frame("again")])
-    start = time.monotonic()
     wait_until(lambda: "again" in received, "it is tried again", LIMIT_S)
-    assert time.monotonic() - start < 10.0  # 0.1 s, 0.2 s, 0.4 s of waiting, and a loaded machine
     fake.close()
 
 
@@ -202,7 +204,37 @@ def test_burst_goes_out_as_fast_as_subscribers_keep_up_and_none_of_it_is_lost(ro
     assert [text for text, _ in burst] == sent
     stamps_ms = [(stamp_ns - burst[0][1]) / 1e6 for _, stamp_ns in burst]
     early_ms = [stamp_ms for stamp_ms in stamps_ms if stamp_ms < 90]  # one that lasts for 100 ms goes out faster
-    assert max(sum(begin <= stamp < begin + 5 for stamp in stamps_ms) for begin in early_ms) <= 5 * 5 + 5 + 1
+    assert max(sum(begin <= stamp < begin + 5 for stamp in stamps_ms) for begin in early_ms) <= 5 + 2 * 5 + 1
+
+
+def test_subscriber_whose_process_stands_still_gets_the_whole_burst_afterwards(ros2, master, bridge):
+    """While its process is stopped, more messages come than DDS's shared-memory queue holds (512): the writer has to keep the rest.
+
+    The writer's numbers tell the hop that loses: those that the second subscriber got have all left the writer.
+    """
+    sent = [f"{number:03}" for number in range(900)]
+    beside = texts(ros2, "/bp/stopped", 2000)
+    peer = Lines([sys.executable, str(HERE / "ros_bridge_counting_peer.py"), "/bp/stopped", "2000"], dict(os.environ), errors=False)
+    hello = greeting("/bp/stopped")
+    probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/stopped")
+    wait_until(lambda: beside and peer.lines, "a probe arrives at both", LIMIT_S)
+    probe.close()
+    os.kill(peer.process.pid, signal.SIGSTOP)
+    try:
+        fake = FakePublisher(master, [hello + b"".join(frame(text) for text in sent), hello], "/bp/stopped")
+        wait_until(lambda: beside[-1] == sent[-1], "all have left the bridge", LIMIT_S)
+        fake.close()
+    finally:
+        os.kill(peer.process.pid, signal.SIGCONT)
+
+    def came():
+        return [(text, number) for text, number in map(json.loads, list(peer.lines)) if text != "(probe)"]
+
+    wait_until(lambda: came() and came()[-1][0] == sent[-1], "the last one arrives", LIMIT_S)
+    numbers = [number for _, number in came()]
+    gaps = [(before, after) for before, after in itertools.pairwise(numbers) if after != before + 1]
+    assert [text for text, _ in came()] == sent, f"lost behind the writer, between its numbers {gaps}"
+    assert [text for text in beside if text != "(probe)"] == sent
 
 
 def test_flood_crosses_in_order_and_what_has_to_go_is_counted(ros2, master, bridge):

@@ -84,14 +84,11 @@ class FakeMaster(Connection):
 @pytest.fixture
 def node():
     changed = []
-    node = Ros1Node("/ros_bridge", FakeMaster(), host="127.0.0.1", topics_port=7, changed=lambda *words: changed.append(words))
-    node.told = changed
+    master = FakeMaster()
+    node = Ros1Node("/ros_bridge", master, host="127.0.0.1", topics_port=7, changed=lambda *words: changed.append(words))
+    node.told, node.master = changed, master
     yield node
     node.close()
-
-
-def master_of(node):
-    return node._master
 
 
 def test_what_two_routes_share_is_unregistered_with_the_second(node):
@@ -100,14 +97,14 @@ def test_what_two_routes_share_is_unregistered_with_the_second(node):
     assert node.told == [("/a", ["http://peer:1/"])] * 2
     node.unregister(Kind.SUBSCRIBER, "/a", "std_msgs/String")
     assert node.topics(Kind.SUBSCRIBER) == [["/a", "std_msgs/String"]]
-    assert not [asked for asked in master_of(node).asked if asked[0].startswith("unregister")]
+    assert not [asked for asked in node.master.asked if asked[0].startswith("unregister")]
     node.unregister(Kind.SUBSCRIBER, "/a", "std_msgs/String")
-    assert master_of(node).asked[-1] == ("unregisterSubscriber", "/a", node.uri)
+    assert node.master.asked[-1] == ("unregisterSubscriber", "/a", node.uri)
     assert node.topics(Kind.SUBSCRIBER) == []
 
 
 def test_what_the_master_has_not_heard_it_hears_later(node):
-    master = master_of(node)
+    master = node.master
     node.register(Kind.PUBLISHER, "/told", "std_msgs/String")
     master.away = True
     node.register(Kind.SERVICE, "/untold")
@@ -123,7 +120,7 @@ def test_what_the_master_has_not_heard_it_hears_later(node):
 def test_parameters_are_read_at_first_when_told_and_after_a_restart(node):
     changed = []
     node.subscribe_parameters(lambda: changed.append(1))
-    assert ("subscribeParam", node.uri, "/") in master_of(node).asked
+    assert ("subscribeParam", node.uri, "/") in node.master.asked
     with socket.create_connection(("127.0.0.1", int(node.uri.rpartition(":")[2].rstrip("/")))):
         pass  # a peer that says nothing does no harm
     assert Connection(node.uri).call("getPid", "/peer") > 0
@@ -164,7 +161,7 @@ def test_monitor_tells_loss_return_restart_and_change():
     known = master.system
     for system, away in ((known, False), (known, False), (known, True), (known, True), (known, False), (forgotten, False), (known, False)):
         master.system, master.away = system, away
-        monitor._look()
+        monitor.look()
     assert events == ["graph", False, True, "graph", "graph"]
     assert node.told == [True, True, True, False, True]
     assert (monitor.state.reachable, monitor.state.losses) == (True, 2)

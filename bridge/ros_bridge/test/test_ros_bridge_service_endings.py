@@ -1,7 +1,6 @@
 """Services when the master or the bridge goes."""
 
 import signal
-import time
 
 from ros_bridge_harness import BridgeProcess, wait_until
 from ros_bridge_service_peers import (
@@ -58,14 +57,12 @@ def test_end_of_the_bridge_answers_every_call_under_way_and_unregisters(world, t
         future = in_ros1.call_async(SetBool.Request())
         client.send(b"\1")
         wait_until(lambda: len(arrived) == 2 and held.taken, "both calls arrive", LIMIT_S)
-        start = time.monotonic()
         bridge.process.send_signal(signal.SIGINT)
         good, reason = client.receive()
         assert (good, b"the bridge is shutting down" in reason) == (False, True)
         wait_until(future.done, "the call from ROS 2 ends", LIMIT_S)
         assert "the bridge is shutting down" in future.result().message
         assert bridge.process.wait(LIMIT_S) == 0
-        assert time.monotonic() - start < LIMIT_S / 2
     assert world.proxy.lookupService("/t", "/bv_end/in_ros2")[0] == -1
     world.ros2.node.destroy_client(in_ros1)
     held.service.close()

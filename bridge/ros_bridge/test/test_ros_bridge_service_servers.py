@@ -49,20 +49,19 @@ ODD_SERVERS = {
 
 
 @pytest.mark.parametrize("reason", ODD_SERVERS)
-def test_odd_server_in_ros1_gives_a_refusal_with_the_reason_in_time(world, reason):
+def test_odd_server_in_ros1_gives_a_refusal_with_the_reason(world, reason):
     with Server(world, "/bv/odd_in_ros1", ODD_SERVERS[reason]) as server:
-        response, seconds = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
+        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
         assert not response.success
         assert response.message.startswith("/bv/odd_in_ros1 by the bridge: ")
         assert reason in response.message
-        assert seconds < LIMIT_S / 2
         assert server.header["service"] == "/bv/odd_in_ros1"
         assert server.header["md5sum"] == SET_BOOL_SUM
 
 
 def test_length_that_cannot_be_ends_the_call_and_no_more(world):
     with Server(world, "/bv/odd_in_ros1", say(struct.pack("<BI", 1, 0xFFFFFFFF), b"x" * 1000)):
-        response, _ = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
+        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
         assert not response.success
         assert "that can't be" in response.message
 
@@ -75,7 +74,7 @@ def test_request_is_sent_once_when_the_server_dies_in_the_call(world):
         requests.append(request_from(connection))
 
     with Server(world, "/bv/odd_in_ros1", talk):
-        response, _ = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
+        response = world.ros2.call("/bv/odd_in_ros1", SetBool, SetBool.Request(data=True), within_s=LIMIT_S)
         assert not response.success
         assert requests == [b"\1"]
 
@@ -92,12 +91,12 @@ def test_connection_is_kept_for_the_next_call_and_dropped_when_none_comes(world)
 
     with Server(world, "/bv/in_ros1", talk) as server:
         for _ in range(5):
-            response, _ = world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(), within_s=LIMIT_S)
+            response = world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(), within_s=LIMIT_S)
             assert response.accepted
         assert server.connections == 1
         assert not ended.is_set()
         assert ended.wait(LIMIT_S)
-        assert world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(), within_s=LIMIT_S)[0].accepted
+        assert world.ros2.call("/bv/in_ros1", SetSensor, SetSensor.Request(), within_s=LIMIT_S).accepted
         assert server.connections == 2
 
 

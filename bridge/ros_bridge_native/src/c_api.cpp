@@ -37,6 +37,7 @@ struct PlaneSpecification {
   int32_t reliable;
   int32_t latched;
   int32_t converts;
+  int32_t bulky;
 };
 
 struct PlaneFigures {
@@ -70,7 +71,7 @@ Specification specification_of(const PlaneSpecification & from) {
   const auto * type = static_cast<const rosidl_message_type_support_t *>(from.type_support);
   return {{from.ros1_topic, from.ros1_type, from.md5sum, from.definition}, from.ros2_topic, static_cast<rcl_node_t *>(from.node),
     type == nullptr ? nullptr : bytes_type_support(type), {from.depth, from.reliable != 0, from.latched != 0},
-    program_of(from.program, from.operations), from.token, from.converts != 0};
+    program_of(from.program, from.operations), from.token, from.converts != 0, from.bulky != 0};
 }
 
 }  // namespace

@@ -32,8 +32,17 @@ Ros1ToRos2Route::~Ros1ToRos2Route() {
   context_.python.forget(specification_.token);
 }
 
+// What DDS loses on its way to a reader, such as one that gets no processor, it sends again on request, which takes it 10 ms and more: of
+// a fast topic, `depth` messages would be gone by then. So the writer keeps as many as may wait in a burst; DDS lets go of each when all
+// readers have it. What is latched goes to late joiners, who are promised `depth`.
+Quality Ros1ToRos2Route::writer_quality() const {
+  Quality quality = specification_.quality;
+  if (!quality.latched && !specification_.bulky) quality.depth = room();
+  return quality;
+}
+
 std::unique_ptr<Ros2Publisher> Ros1ToRos2Route::make_writer() const {
-  return std::make_unique<Ros2Publisher>(specification_.node, specification_.type, specification_.ros2_topic, specification_.quality);
+  return std::make_unique<Ros2Publisher>(specification_.node, specification_.type, specification_.ros2_topic, writer_quality());
 }
 
 void Ros1ToRos2Route::connect(uint64_t token, const std::string & address, uint16_t port) {

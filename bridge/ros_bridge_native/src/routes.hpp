@@ -44,6 +44,7 @@ struct Specification {
   Program program;
   uint64_t token;  // names the route in events
   bool converts;   // Python converts between ROS 1's layout and ROS 2's, which is that of the program
+  bool bulky;      // messages may be images, clouds or maps: not more of them than `depth` are kept
 };
 
 class Route {
@@ -99,6 +100,7 @@ class Ros1ToRos2Route : public Route, public Inbox, public Job {
   void hand_to_python(size_t writer, Frame message);
   void publish(size_t writer, const uint8_t * message, size_t size, int64_t arrived_ns);
   void count_peers();
+  Quality writer_quality() const;
   std::unique_ptr<Ros2Publisher> make_writer() const;
 
   Context & context_;
