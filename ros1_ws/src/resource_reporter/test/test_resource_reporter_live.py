@@ -115,14 +115,13 @@ def test_a_refused_state_does_not_stand_in_the_way_of_the_next(skillset, reporte
     becomes(skillset, "BROKEN")
 
 
-def test_a_hanging_service_blocks_no_caller_for_long(skillset, reporter):
+def test_a_hanging_service_blocks_no_caller(skillset, reporter):
     skillset.hangs = threading.Event()
     skillset.serve()
     reporter.report("zed_status", "OK")
     wait_until(lambda: len(skillset.calls) == 1, timeout_s=5.0, what="it is called")
-    begin_s = time.monotonic()
     reporter.report("zed_status", "BROKEN")
-    assert time.monotonic() - begin_s < 0.5
+    assert len(skillset.calls) == 1, "the first call still hangs"
     wait_until(lambda: len(skillset.calls) >= 2, timeout_s=4.0, what="it is called again after two seconds")
     skillset.hangs.set()
     becomes(skillset, "BROKEN")

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -335,10 +334,8 @@ def test_generic_names_that_are_not_there_are_told(managers, ros2_domain):
 
 
 def test_managers_that_are_not_there_are_one_error_with_a_remedy(ros2_domain):
-    begun_s = time.monotonic()
     with pytest.raises(NotThereError, match=rf"/robot9/navigation, /robot9/mapping in DDS domain {ros2_domain} within 0.3 s.*panel --list"):
         Robot.connect("navigation", "mapping", namespace="/robot9", domain=ros2_domain, timeout_s=0.3)
-    assert time.monotonic() - begun_s < SOON_S
     assert not [thread for thread in threading.enumerate() if thread.name == "robot_client_spin"]
 
 

