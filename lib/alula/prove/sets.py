@@ -15,8 +15,11 @@ from alula.prove.steps import State
 MANY_NODES = 200_000
 """From here on CUDD may look for a better order of the variables; below, its looking costs more than it gains (see ``bench``)."""
 
-MOST_NODES = 1_000
-"""A larger set of all that can be reached is given up for the bound: it would go on growing (see ``bench``)."""
+MOST_NODES = 10
+"""For each variable. A larger set of all that can be reached is given up for the bound: it would go on growing (see ``bench``)."""
+
+MOST_OUTER_NODES = 100
+"""For each variable. What makes the bound's own diagram larger is left out of it, and asked where it matters alone."""
 
 
 class Sets:
@@ -35,18 +38,18 @@ class Sets:
         self.initial = self._initial()
         self.steps = self._steps()
         self.exact = True
-        self.reached = self._reach(MOST_NODES)
+        self.reached = self._reach(MOST_NODES * len(self.bdd.vars))
         if not self.exact:
             self.reached = self._outer()
 
     def _steps(self) -> list[Step]:
-        """Return the steps in the order of the variables, so that what touches the same stands together."""
-        level = self.bdd.var_levels
+        """Return the steps in the order of the last variable that they have to do with: what concerns much comes late."""
         steps: list[Step] = []
-        for update in sorted(self.model.steps, key=lambda one: max(level[name] for name in one.values)):
+        for update in self.model.steps:
             self.deadline.check()
             steps.append(self.aftermath.step(update))
-        return steps
+        level = self.bdd.var_levels
+        return sorted(steps, key=lambda step: max(level[name] for name in step.about))
 
     def complete(self) -> None:
         """Have ``reached`` be exactly what can be reached, however large that is."""
@@ -112,7 +115,7 @@ class Sets:
         for block in self.bound.blocks.values():
             self.deadline.check()
             both = outer & block.settled
-            if len(both) <= MOST_NODES:
+            if len(both) <= MOST_OUTER_NODES * len(self.bdd.vars):
                 outer = both
         return outer
 
@@ -262,7 +265,9 @@ class Sets:
 
     def only(self, states: Iterable[State]) -> Any:
         """Return the set of these situations."""
-        values = ({name: value for name, value in self._values(state).items() if name != ENDED} for state in states)
+        # Of a situation after a step alone: variables that only some searches use would leave the rest of a set behind.
+        about = self.bdd.support(self.initial)
+        values = ({name: value for name, value in self._values(state).items() if name in about} for state in states)
         return self.model.any_of(self.bdd.cube(one) for one in values)
 
     def _values(self, state: State) -> dict[str, bool]:

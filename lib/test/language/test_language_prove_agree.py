@@ -12,7 +12,8 @@ from language_prove_models import VALUES, skillsets, sparse_skillsets
 
 from alula.model import semantics
 from alula.model.conditions import holds
-from alula.model.expressions import TRUE
+from alula.model.expressions import TRUE, ResourceIs
+from alula.model.model import Invariant, Property, PropertyKind, Resource, Result, Skill, Skillset, Transition
 from alula.prove import sets as sets_module
 from alula.prove.abstract import without_data
 from alula.prove.encoding import encode
@@ -81,7 +82,7 @@ def test_a_bound_of_what_can_be_reached_finds_the_same_as_all_that_can_be(skills
     exactly = by_sets(skillset, without_data(skillset, ANY_TIME), suspects, ANY_TIME, copies=2)
     plain = without_data(skillset, ANY_TIME)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(sets_module, "MOST_NODES", 1)
+        patched.setattr(sets_module, "MOST_NODES", 0)
         sets = Sets(encode(plain, 2, ANY_TIME), ANY_TIME)
         assert by_sets(skillset, plain, suspects, ANY_TIME, copies=2) == exactly
     if not sets.exact:
@@ -97,12 +98,26 @@ def test_sparse_models_are_found_alike_one_by_one_and_as_sets(skillset):
     first = one_by_one(skillset, plain, suspects, ANY_TIME, most=3000, copies=2)
     if first is None:
         return
-    for most in (sets_module.MOST_NODES, 1):
+    for most in (sets_module.MOST_NODES, 0):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(sets_module, "MOST_NODES", most)
             second = by_sets(skillset, plain, suspects, ANY_TIME, copies=2)
         assert found(first) == found(second)
         assert lengths(first) == lengths(second)
+
+
+@pytest.mark.parametrize("most", [sets_module.MOST_NODES, 0])
+def test_a_suspicion_that_no_run_confirms_is_given_up(most, monkeypatch):
+    """A skill that is broken as it starts takes a step back to where it began: sets suspect a run, and no run is one."""
+    monkeypatch.setattr(sets_module, "MOST_NODES", most)
+    switch = Resource("r", ("A", "B"), "A", (Transition("A", "B", extern=True),))
+    broken = Skill("f", invariants=(Invariant("i", ResourceIs("r", "B")),), results=(Result("OK"),))
+    comes = Property("w", PropertyKind.EVENTUALLY, ResourceIs("r", "B"), fair=True)
+    skillset = Skillset("s", resources=(switch,), skills=(broken,), properties=(comes,))
+    deadline = Deadline.after(60.0)
+    _certain, suspects = local_checks(skillset, deadline)
+    first = one_by_one(skillset, without_data(skillset, deadline), suspects, deadline, most=MOST, copies=2)
+    assert found(by_sets(skillset, without_data(skillset, deadline), suspects, deadline, copies=2)) == found(first)
 
 
 def lengths(findings):
