@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from itertools import product
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -162,3 +166,48 @@ def test_a_sweep_too_thin_to_show_an_obstacle_is_unknown(count) -> None:
 @pytest.mark.parametrize("rings_deg", [[0.0], np.linspace(2.0, 88.0, 32)])
 def test_a_sensor_that_does_not_look_down_to_the_corridor_calls_nothing_free(rings_deg) -> None:
     assert forward(yard(elevations_deg=rings_deg)) == "the LiDAR does not look down to the way ahead: 0 returns from so low"
+
+
+ROOT = Path(__file__).resolve().parents[4]
+KITTI = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data")) / "lidar_kitti"
+
+
+def by_trying_all(points, towards_deg, settings) -> float | None:
+    """Return the distance of the nearest obstacle: try each block of two by two by two cells, the nearest first, by its points alone."""
+    turn = np.radians(towards_deg)
+    ahead, left = points[:, 0] * np.cos(turn) + points[:, 1] * np.sin(turn), points[:, 1] * np.cos(turn) - points[:, 0] * np.sin(turn)
+    up = points[:, 2]
+    own = (np.hypot(points[:, 0], points[:, 1]) <= settings.body_radius_m) & (np.abs(up) <= settings.body_half_height_m)
+    inside = (ahead >= settings.near_m) & (ahead <= settings.length_m) & (np.abs(left) <= settings.half_width_m)
+    inside &= (np.abs(up) <= settings.half_height_m) & ~own
+    ahead, left, up = ahead[inside], left[inside], up[inside]
+    cell = settings.cell_m
+    for row in range(int(settings.length_m / cell) + 1):
+        found = []
+        for column, layer in product(range(int(2 * settings.half_width_m / cell) + 1), range(int(2 * settings.half_height_m / cell) + 1)):
+            low = (settings.near_m + row * cell, -settings.half_width_m + column * cell, -settings.half_height_m + layer * cell)
+            block = np.all([(a >= b) & (a < b + 2 * cell) for a, b in zip((ahead, left, up), low, strict=True)], axis=0)
+            found.append(ahead[block])
+        most = max(found, key=len)
+        if len(most) >= settings.min_points:
+            return float(np.percentile(most, 10.0))
+    return None
+
+
+@pytest.mark.skipif(not KITTI.exists(), reason=f"no real data at {KITTI}: set ALULA_DATA")
+@pytest.mark.parametrize("scan", ["000000", "000001", "000002"])
+def test_obstacles_of_a_real_street_are_where_trying_all_finds_them(scan) -> None:
+    """54 directions in all, seen from 1.73 m above the road: none is missed, none is more than 1.2 cm off."""
+    points = np.fromfile(KITTI / f"{scan}.bin", np.float32).reshape(-1, 4)[:, :3]
+    settings = LidarSettings(length_m=30.0)
+    found: list[tuple[float | None, float | None]] = []
+    for towards_deg in range(0, 360, 20):
+        turn = np.radians(towards_deg)
+        motion = Motion(velocity_enu_m_s=(float(np.cos(turn)), float(np.sin(turn)), 0.0))
+        seen = LidarAhead(settings.ahead).look(sweep(points), T_base_lidar=np.eye(4), poses=crab(position=(0.0, 0.0, 1.73)), motion=motion)
+        found.append(
+            (None if seen.nearest is None else seen.nearest.distance_m, by_trying_all(points.astype(float), towards_deg, settings))
+        )
+    assert sum(right is not None for _, right in found) >= 6
+    for distance_m, right in found:
+        assert distance_m == (right if right is None else pytest.approx(right, abs=0.012)), found
