@@ -94,7 +94,7 @@ class Aftermath:
 
     def _breaks(self, update: Update, skill: str) -> bool:
         after = update.guard & self.bound.rest[skill] & self.bdd.let(dict(update.values), self._broken[skill])
-        return bool(after != self.bdd.false and after & self.bound.near(after) != self.bdd.false)
+        return bool(after != self.bdd.false and self.bound.narrowed(after) != self.bdd.false)
 
     def _breaks_within(self, update: Update, skill: str) -> bool:
         """Tell whether a violation can break an execution that none has broken before: its invariants were true."""

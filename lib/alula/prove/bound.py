@@ -17,6 +17,9 @@ from alula.model.model import Effect, Skill
 from alula.prove.diagrams import Encoded, Update, bits, runs_name
 from alula.prove.limits import Deadline
 
+MOST_NODES = 100
+"""For each variable. What makes a set's diagram larger is left out of it."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -34,6 +37,7 @@ class Bound:
     def __init__(self, model: Encoded, deadline: Deadline) -> None:
         self.model = model
         self.bdd = model.bdd
+        self.deadline = deadline
         self.rest = {skill.name: ~self.broken(skill.name) & self._counted(skill.name) for skill in model.skillset.skills}
         """For each skill: its invariants are true if it runs."""
         self.writes = {skill.name: sorted(_written(skill)) for skill in model.skillset.skills}
@@ -59,11 +63,23 @@ class Bound:
         """Return the situations in which a skill runs and some invariant of it is false."""
         return self.model.any_of(first_false for _, first_false in self.model.marks.get(skill, []))
 
-    def near(self, situations: Any) -> Any:
-        """Return what is known of the resources and skills that a set is about."""
+    def narrowed(self, situations: Any) -> Any:
+        """Return a set without what is known not to be, of the resources and skills that it is about."""
         resources, skills = self._parts(situations)
         resources |= {name for skill in skills for name in self.writes[skill]}
-        return self.model.all_of([*(self.blocks[name].settled for name in sorted(resources)), *(self.rest[s] for s in sorted(skills))])
+        return self.within_limits(
+            situations, [*(self.blocks[name].settled for name in sorted(resources)), *(self.rest[s] for s in sorted(skills))]
+        )
+
+    def within_limits(self, situations: Any, parts: Iterable[Any]) -> Any:
+        """Return what is in a set and in all parts, without parts that would make its diagram too large: it has more then."""
+        most = max(MOST_NODES * len(self.bdd.vars), len(situations))
+        for part in parts:
+            self.deadline.check()
+            both = situations & part
+            if len(both) <= most:
+                situations = both
+        return situations
 
     def within(self, resources: Iterable[str]) -> Any:
         """Return what these resources can be within a step."""

@@ -37,9 +37,9 @@ class Deadline:
         """Return the moment so many seconds from now."""
         return cls(time.monotonic() + given_s, given_s, tell)
 
-    def half(self) -> Deadline:
-        """Return the moment in the middle of what is left."""
-        return replace(self, at_s=self.at_s - self.left_s() / 2)
+    def half(self, doing: str) -> Deadline:
+        """Return the moment in the middle of what is left, for something else that is being done."""
+        return replace(self, at_s=self.at_s - self.left_s() / 2, doing=doing)
 
     def left_s(self) -> float:
         """Return the seconds that are left, never below zero."""

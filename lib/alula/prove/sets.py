@@ -15,11 +15,8 @@ from alula.prove.steps import State
 MANY_NODES = 200_000
 """From here on CUDD may look for a better order of the variables; below, its looking costs more than it gains (see ``bench``)."""
 
-MOST_NODES = 10
+MOST_NODES = 3
 """For each variable. A larger set of all that can be reached is given up for the bound: it would go on growing (see ``bench``)."""
-
-MOST_OUTER_NODES = 100
-"""For each variable. What makes the bound's own diagram larger is left out of it, and asked where it matters alone."""
 
 
 class Sets:
@@ -40,7 +37,7 @@ class Sets:
         self.exact = True
         self.reached = self._reach(MOST_NODES * len(self.bdd.vars))
         if not self.exact:
-            self.reached = self._outer()
+            self.reached = self.bound.within_limits(self.bdd.true, (block.settled for block in self.bound.blocks.values()))
 
     def _steps(self) -> list[Step]:
         """Return the steps in the order of the last variable that they have to do with: what concerns much comes late."""
@@ -50,6 +47,10 @@ class Sets:
             steps.append(self.aftermath.step(update))
         level = self.bdd.var_levels
         return sorted(steps, key=lambda step: max(level[name] for name in step.about))
+
+    def until(self, deadline: Deadline) -> None:
+        """Have another deadline from now on."""
+        self.deadline = self.bound.deadline = deadline
 
     def complete(self) -> None:
         """Have ``reached`` be exactly what can be reached, however large that is."""
@@ -109,16 +110,6 @@ class Sets:
             for number, step in enumerate(self.steps)
         ]
 
-    def _outer(self) -> Any:
-        """Return all that the bound allows, as far as that stays small."""
-        outer = self.bdd.true
-        for block in self.bound.blocks.values():
-            self.deadline.check()
-            both = outer & block.settled
-            if len(both) <= MOST_OUTER_NODES * len(self.bdd.vars):
-                outer = both
-        return outer
-
     def after(self, situations: Any, step: Step) -> Any:
         """Return what a step makes of situations."""
         changed = self._updated(situations, step.update)
@@ -177,7 +168,7 @@ class Sets:
                 result |= self._one_before(step, goal, within, ending)
         if ending:
             result = self.bdd.let({ENDED: False}, result)
-        return result & self.reached if self.exact else result & self.bound.near(result)
+        return result & self.reached
 
     def staying(self, situations: Any) -> Any:
         """Return those of these situations that have a step to one of these."""
@@ -199,7 +190,7 @@ class Sets:
 
     def narrowed(self, situations: Any) -> Any:
         """Return a set without what can't be reached, as far as that is known."""
-        return situations & (self.reached if self.exact else self.bound.near(situations))
+        return situations & self.reached if self.exact else self.bound.narrowed(situations)
 
     def _one_before(self, step: Step, situations: Any, within: Within | None = None, ending: str = "") -> Any:
         """Return the situations that one step takes to these."""

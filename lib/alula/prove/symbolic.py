@@ -31,12 +31,11 @@ def search(
     """
     found = _Search(skillset, abstraction, deadline, copies)
     if not found.sets.exact:
-        found.sets.deadline = deadline.half()
-        found.sets.deadline.doing = "situations as sets, within a bound of what can be reached"
+        found.sets.until(deadline.half("situations as sets, within a bound of what can be reached"))
         try:
             return found.findings(list(suspects))
         except OutOfTimeError:
-            found.sets.deadline = deadline
+            found.sets.until(deadline)
             found.sets.complete()
     return found.findings(list(suspects))
 

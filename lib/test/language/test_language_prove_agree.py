@@ -87,7 +87,7 @@ def test_a_bound_of_what_can_be_reached_finds_the_same_as_all_that_can_be(skills
         assert by_sets(skillset, plain, suspects, ANY_TIME, copies=2) == exactly
     if not sets.exact:
         for number, state in enumerate(explore(World(plain), ANY_TIME, most=MOST).states):
-            assert sets.contains(sets.reached & sets.bound.near(sets.initial), state), number
+            assert sets.contains(sets.narrowed(sets.reached), state), number
 
 
 @settings(max_examples=40, **QUIET)

@@ -43,6 +43,16 @@ def test_a_counterexample_that_is_not_so_is_told(tmp_path):
     assert found == [(len(finding.counterexample.steps), ("gear is Down in the managers, Up in the counterexample",))]
 
 
+def test_an_execution_that_ends_otherwise_or_not_at_all_is_told(tmp_path):
+    skillset, findings = counterexamples(tmp_path / "example.rl", DATA)
+    steps = next(finding.counterexample.steps for finding in findings if finding.counterexample.steps[-1].ended)
+    (end,) = steps[-1].ended
+    for ended, told in (((replace(end, state="FAILED", name=""),), "FAILED"), ((), "running")):
+        found = differences(skillset, Counterexample((*steps[:-1], replace(steps[-1], ended=ended))))
+        called = f"{end.execution.skill} (execution {end.execution.number})"
+        assert found == [(len(steps), (f"{called} is {end.state} {end.name} in the managers, {told} in the counterexample",))]
+
+
 @pytest.mark.parametrize("text", [*EXAMPLES.values(), DATA, OUTSIDE])
 def test_steps_cross_as_json(text, tmp_path):
     _, findings = counterexamples(tmp_path / "example.rl", text)
