@@ -281,3 +281,13 @@ def test_mutated_missions_are_right_or_have_findings(robot):
             assert finding.code in MISSION_CODES
         seen.update(codes(findings))
     assert len(seen) > 10
+
+
+def test_a_foreign_missions_entries_may_come_from_outside(robot, tmp_path):
+    palette = tmp_path / "nodes.xml"
+    palette.write_text('<root BTCPP_format="4"><TreeNodesModel/></root>')
+    text = whole('<Script code="a := goal"/>').encode()
+    (ours,) = findings_of("mission.xml", text, robot)
+    (foreign,) = findings_of("mission.xml", text, robot, [palette])
+    assert (ours.code, ours.severity) == ("ALU607", Severity.ERROR)
+    assert (foreign.code, foreign.severity) == ("ALU607", Severity.WARNING)

@@ -31,7 +31,7 @@ def check_mission(
     more = [one for palette in palettes for one in read_models(palette)]
     known = palette_for(files, skills, more, nodes)
     own = (rules.units, rules.results, rules.resources, rules.names)
-    found += check(files, known, SkillTraits(skills), rules=own)
+    found += check(files, known, SkillTraits(skills), own, foreign=bool(palettes))
     endless = [problem for problem in found if problem.code.startswith("ALU0")]
     if endless:
         raise FileError(endless[0])

@@ -40,13 +40,17 @@ class Whole:
     traits: Traits
     given: Collection[str] = field(default_factory=tuple)
     """Entries of the main tree's blackboard that are written before it starts."""
+    foreign: bool = False
 
 
 Rule = Callable[[Whole], Iterable[Problem]]
 
 
-def check(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[str] = (), rules: Iterable[Rule] = ()) -> list[Problem]:
-    """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone."""
+def check(files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Rule] = (), *, foreign: bool = False) -> list[Problem]:
+    """Return what is wrong with the files, each thing once, in the order of the source; ``rules`` are more than those of trees alone.
+
+    The blackboard of a ``foreign`` mission may be filled from outside with what no file tells of.
+    """
     found: list[Problem] = []
 
     def report(problem: Problem) -> None:
@@ -57,21 +61,21 @@ def check(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[
     with suppress(_Enough):
         verify(files, palette, report)
     if files.main in files.trees and not any(problem.code in ENDLESS for problem in found):
-        found += _whole(files, palette, traits, given, (*RULES, *rules))
+        found += _whole(files, palette, traits, (*RULES, *rules), foreign=foreign)
     places: dict[tuple[object, ...], Problem] = {}
     for problem in found:
         places.setdefault((problem.code, problem.place, problem.message), problem)
     return sorted(places.values(), key=lambda one: (one.place.path != files.path, one.place.path, one.place.line, one.place.column))
 
 
-def _whole(files: TreeFiles, palette: Palette, traits: Traits, given: Collection[str], rules: Iterable[Rule]) -> list[Problem]:
+def _whole(files: TreeFiles, palette: Palette, traits: Traits, rules: Iterable[Rule], *, foreign: bool) -> list[Problem]:
     model = files.models.get(files.main)
     programs, reach, found = Scripts(), Reach(traits), list[Problem]()
     for name in (files.main, *_others(files)):
         root = expand(files, palette, name)
         if root is None:
             continue
-        whole = Whole(root, programs, reach, traits, (*given, *(model.ports if model else ())))
+        whole = Whole(root, programs, reach, traits, tuple(model.ports) if model else (), foreign)
         # Who starts another tree than the main one, and with which entries, is not in the files.
         asked = [rule for rule in rules if name == files.main or rule is not _entries]
         found += [problem for rule in asked for problem in islice(rule(whole), MOST)]
@@ -93,14 +97,12 @@ def _scripts(whole: Whole) -> Iterator[Problem]:
 
 
 def _missing(whole: Whole) -> Iterator[Problem]:
-    """Yield inputs that a file does not give and that have no default. A node that only a model tells of may do without."""
+    """Yield inputs that a file does not give and that have no default; of nodes that only a model tells of, nobody knows."""
     for site in whole.root.walk():
-        for port in site.type.ports.values() if site.type else ():
+        for port in site.type.ports.values() if site.type and site.type.make else ():
             if port.direction is Direction.INPUT and site.given(port.name) is None and not port.required:
-                sure = site.type is not None and site.type.make is not None
                 message = f"'{site.kind}' has no input '{port.name}', which has no default"
-                cure = f'add {port.name}="..."'
-                yield of_element("ALU604", site.element, message, cure, warning=not sure)
+                yield of_element("ALU604", site.element, message, f'add {port.name}="..."')
 
 
 def _unreached(whole: Whole) -> Iterator[Problem]:
@@ -118,7 +120,7 @@ def _several_run(whole: Whole) -> Iterator[Problem]:
 
 def _entries(whole: Whole) -> Iterator[Problem]:
     uses = entries.Uses(whole.scripts, whole.traits)
-    yield from entries.read_too_early(whole.root, uses, whole.given)
+    yield from entries.read_too_early(whole.root, uses, whole.given, foreign=whole.foreign)
     yield from entries.mismatched(whole.root, uses)
 
 

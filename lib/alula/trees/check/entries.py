@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from alula.common.suggestions import nearest
 from alula.trees.check import scripts
@@ -166,7 +166,7 @@ def _constants(site: Site) -> Iterator[Use]:
                 yield Use((child.board.number, attribute.name), attribute.name, True, attribute)
 
 
-def read_too_early(root: Site, uses: Uses, given: Collection[str]) -> Iterator[Problem]:
+def read_too_early(root: Site, uses: Uses, given: Collection[str], *, foreign: bool) -> Iterator[Problem]:
     """Yield each reading of an entry that nothing can have written by then; ``given``: what the main tree's blackboard has at the start."""
     written = {root.board.key(name) for name in given}
     later = {use.key: use for use in reversed(list(uses.of(root))) if use.write}
@@ -186,7 +186,9 @@ def read_too_early(root: Site, uses: Uses, given: Collection[str]) -> Iterator[P
                 written.add(use.key)
             elif use.key not in written:
                 written.add(use.key)  # one finding for an entry is enough
-                yield _unwritten(use, later.get(use.key), names)
+                problem = _unwritten(use, later.get(use.key), names)
+                outside = foreign and use.key not in later and use.key[0] == root.board.number
+                yield replace(problem, warning=outside)
 
     yield from visit(root)
 
