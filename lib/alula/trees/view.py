@@ -83,9 +83,10 @@ def kind_of(node: Node) -> str:
 
 
 def skill_of(node: Node) -> str:
-    """Return the skill that a leaf runs, as navigation.goto: no other action has a dot in its type; empty where it is none."""
+    """Return the skill that a leaf runs, as navigation.goto; empty where it is none: a robot's own node is a class, as uav.NextWaypoint."""
     kind = node.wiring.type
-    return kind.name if kind.category is Category.ACTION and "." in kind.name else ""
+    _, dot, name = kind.name.rpartition(".")
+    return kind.name if kind.category is Category.ACTION and dot and name[:1].islower() else ""
 
 
 def conditions_of(node: Node) -> dict[str, str]:

@@ -169,6 +169,11 @@ def test_the_picture_says_the_same(alula, tmp_path):
     assert any("mission.xml:5" in "".join(title.itertext()) for title in picture.iter("{http://www.w3.org/2000/svg}title"))
 
 
+def test_a_robots_own_action_is_no_skill(alula):
+    (root,) = lines(alula(PLAIN.replace("<a/>", "<uav.NextWaypoint/>"), "--json"))
+    assert [(one["kind"], one["skill"]) for one in root["children"]] == [("action", ""), ("action", "")]
+
+
 def test_as_json_each_node_has_its_type_ports_conditions_and_line(alula):
     (root,) = lines(alula(FILE, "--json"))
     leaf = root["children"][0]["children"][0]
