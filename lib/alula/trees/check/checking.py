@@ -102,7 +102,7 @@ def _missing(whole: Whole) -> Iterator[Problem]:
         for port in site.type.ports.values() if site.type and site.type.make else ():
             if port.direction is Direction.INPUT and site.given(port.name) is None and not port.required:
                 message = f"'{site.kind}' has no input '{port.name}', which has no default"
-                yield of_element("ALU604", site.element, message, f'add {port.name}="..."')
+                yield of_element("ALU604", site.element, message, f'add {port.name}="..."', warning=whole.foreign)
 
 
 def _unreached(whole: Whole) -> Iterator[Problem]:
