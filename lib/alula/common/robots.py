@@ -22,7 +22,7 @@ FILE = "robot.yaml"
 VARIABLE = "ALULA_ROBOT"
 BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 """Files beside the models: what mocks do, and what faults bring about."""
-PARTS = ("inputs", "hooks", "report", "run", "depths")
+PARTS = ("inputs", "missions", "hooks", "report", "run", "depths")
 """What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
 KEYS = ("name", "about", "skillsets", "scenarios", "worlds", "departure", "taken", "python", "parts", "ros1", "ros2")

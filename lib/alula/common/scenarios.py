@@ -77,8 +77,8 @@ def load_scenario(name: str, folder: Path | None = None) -> Scenario:
         if key not in said:
             raise document.wrong(f"a scenario needs `{key}`")
     mission = said["mission"].text("`mission`")
-    if mission.count(":") != 1:
-        raise said["mission"].wrong(f"`mission` should be module:function, not {mission}")
+    if not mission.endswith(".xml") and mission.count(":") != 1:
+        raise said["mission"].wrong(f"`mission` should be a file as missions/{name}.xml, or module:function, not {mission}")
     report = _words(said, "report")
     faults = said["faults"].entries("`faults`") if "faults" in said else {}
     processes = said["processes"].entries("`processes`") if "processes" in said else {}

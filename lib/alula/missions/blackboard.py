@@ -6,7 +6,7 @@ typed, and each mission has its own: derive from it to add what the leaves of a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from alula.missions.pending import PendingInterrupts
@@ -42,6 +42,8 @@ class Blackboard:
     reason: str = ""
     reasons: dict[str, str] = field(default_factory=dict)
     """Why a resource is as it is, in the robot's own words, by ``skillset.resource``."""
+    entries: Callable[[], Mapping[str, object]] = dict
+    """What is on the blackboard of a mission that is a file, by name."""
 
     @property
     def now_s(self) -> float:
@@ -50,7 +52,7 @@ class Blackboard:
 
     def values(self) -> Mapping[str, object]:
         """Return what is on it by name, as ``json`` can write it; what derives from this adds its own."""
-        return {"failures": [failure.sentence() for failure in self.failures], "reason": self.reason}
+        return {"failures": [failure.sentence() for failure in self.failures], "reason": self.reason, **self.entries()}
 
     def note_reason(self) -> None:
         """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from alula.missions.director import START_TIMEOUT_S, Director, End
-from alula.missions.leaves import SkillLeaf
+from alula.missions.leaves import skill_leaf
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import Client, Clock
+from alula.missions.treeview import path_of
 from alula.runtime.core.events import EngineEvent
 
 TICK_PERIOD_S = 0.1
@@ -64,7 +65,7 @@ class MissionDriver:
         self._aborts: list[str] = []
         clients = {name: client(name, self.wake) for name in plan.skillsets}
         mission, self.blackboard = plan.make(clients, clock_ns, parameters)
-        self.leaves = [node for node in mission.root.iterate() if isinstance(node, SkillLeaf)]
+        self.leaves = [(leaf, path_of(node)) for node in mission.root.iterate() if (leaf := skill_leaf(node)) is not None]
         self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s)
 
     @property

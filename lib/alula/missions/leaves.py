@@ -99,6 +99,11 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         return True
 
 
+def skill_leaf(node: Behaviour) -> SkillLeaf[Blackboard] | None:
+    """Return what follows the skill of a leaf, which of a mission that is a file is a part of its node; None for another node."""
+    return node if isinstance(node, SkillLeaf) else getattr(node, "leaf", None)
+
+
 class Do(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
     """Does something to the blackboard at once, and succeeds."""
 

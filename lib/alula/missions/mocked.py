@@ -12,7 +12,6 @@ from alula.missions.driver import TICK_PERIOD_S, MissionDriver
 from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
-from alula.missions.treeview import path_of
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
@@ -64,7 +63,7 @@ class MockedMission:
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         client = lambda name, wake: MissionClient(self.world.client(name), wake, record)  # noqa: E731
         self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record, soon=self.world.clock.soon)
-        self._leaves = [(leaf, path_of(leaf)) for leaf in self._driver.leaves]
+        self._leaves = self._driver.leaves
         self.world.on_event(self._on_event)
 
     def run(self) -> End:

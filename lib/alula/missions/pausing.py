@@ -6,7 +6,7 @@ from functools import partial
 
 from py_trees.behaviour import Behaviour
 
-from alula.missions.leaves import SkillLeaf
+from alula.missions.leaves import skill_leaf
 from alula.runtime.handle import SkillHandle
 from alula.runtime.waiting import Pending
 
@@ -27,7 +27,7 @@ class Pause:
     """
 
     def __init__(self, tree: Behaviour, now_s: float) -> None:
-        leaves = [leaf for leaf in tree.iterate() if isinstance(leaf, SkillLeaf)]
+        leaves = [leaf for node in tree.iterate() if (leaf := skill_leaf(node)) is not None]
         self._holds = [_Hold(leaf.skill_name, leaf.handle, now_s) for leaf in leaves if leaf.handle is not None and not leaf.handle.done]
         self._told = ""
 

@@ -61,6 +61,10 @@ MakePlan = Callable[[Inputs], MissionPlan]
 
 def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
     """Return a scenario's plan for these inputs; raises RobotError where its mission can't be imported, and InputError."""
+    if scenario.mission.endswith(".xml"):
+        from alula.missions.filed.scenario import plan_of_mission_file  # which needs this module
+
+        return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)
     make_plan: MakePlan = find_robot().load(scenario.mission)
     return make_plan(inputs)
 

@@ -7,8 +7,10 @@ from py_trees.common import Status
 from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
-from alula.missions.leaves import Check, SkillLeaf, Stays
-from alula.trees.view import NodeView
+from alula.missions.leaves import Check, SkillLeaf, Stays, skill_leaf
+from alula.trees.node import Node
+from alula.trees.view import NodeView, source_of
+from alula.trees.view import kind_of as kind_in_a_file
 
 INTERRUPTED = "INTERRUPTED"
 KINDS: tuple[tuple[type[Behaviour], str], ...] = (
@@ -24,6 +26,8 @@ KINDS: tuple[tuple[type[Behaviour], str], ...] = (
 
 def kind_of(node: Behaviour) -> str:
     """Return what a node is, in the words of the figures."""
+    if isinstance(node, Node):
+        return kind_in_a_file(node)
     return next((kind for cls, kind in KINDS if isinstance(node, cls)), "action")
 
 
@@ -52,9 +56,16 @@ class TreeWatch:
     def __init__(self, root: Behaviour) -> None:
         self._root = root
         self._memories = {node: _Memory(node) for node in root.iterate()}
+        if isinstance(root, Node):
+            root.watchers.append(self._changed)  # its nodes are idle again before a tick ends
 
     def remember(self) -> None:
         """Take note of the tree now."""
+        if isinstance(self._root, Node):
+            for memory in self._memories.values():
+                if memory.status is Status.RUNNING and not memory.left:
+                    memory.message = memory.node.feedback_message
+            return
         # Of each node at each tick: a tenth of a mocked flight's time, so nothing is made here.
         invalid, running = Status.INVALID, Status.RUNNING
         for memory in self._memories.values():
@@ -65,6 +76,13 @@ class TreeWatch:
             elif memory.status is running and not memory.left:
                 memory.left, memory.message = True, node.feedback_message
 
+    def _changed(self, node: Node, _previous: Status, status: Status) -> None:
+        memory = self._memories.get(node)
+        if memory is not None and status is not Status.INVALID:
+            memory.status, memory.left, memory.message = status, False, node.feedback_message
+        elif memory is not None and memory.status is Status.RUNNING:
+            memory.left, memory.message = True, node.feedback_message
+
     def look(self) -> NodeView:
         """Return a view of the whole tree as it is now."""
         self.remember()
@@ -73,5 +91,8 @@ class TreeWatch:
     def _view(self, node: Behaviour) -> NodeView:
         memory = self._memories[node]
         status = INTERRUPTED if memory.left else memory.status.value
-        skill = node.skill_name if isinstance(node, SkillLeaf) else ""
-        return NodeView(node.name, memory.kind, status, memory.message, skill, tuple(self._view(child) for child in node.children))
+        leaf = skill_leaf(node)
+        skill = "" if leaf is None else leaf.skill_name
+        children = tuple(self._view(child) for child in node.children)
+        source = source_of(node) if isinstance(node, Node) else None
+        return NodeView(node.name, memory.kind, status, memory.message, skill, children, source)

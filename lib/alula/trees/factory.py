@@ -123,6 +123,20 @@ def make_tree(
         FileError: something is wrong in a file.
     """
     verify(files, palette)
+    return build_tree(files, palette, clock, main=main, enums=enums, surroundings=surroundings, blackboard=blackboard)
+
+
+def build_tree(
+    files: TreeFiles,
+    palette: Palette,
+    clock: Clock,
+    *,
+    main: str = "",
+    enums: Mapping[str, float] | None = None,
+    surroundings: Surroundings | None = None,
+    blackboard: Blackboard | None = None,
+) -> Tree:
+    """Build a tree of files that were verified, as `make_tree` does: for one that needs several of them."""
     return _Builder(files, palette, Shared(clock), enums or {}, surroundings or Nothing()).tree(main or files.main, blackboard)
 
 

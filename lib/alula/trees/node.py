@@ -174,6 +174,11 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
         if after.always is not None:
             after.always.run()
 
+    @property
+    def watchers(self) -> list[Watcher]:
+        """Those who are told of each change in the tree."""
+        return self._shared.watchers
+
     # --- py_trees ------------------------------------------------------------------------------------------------------
 
     def tick(self) -> Iterator[Behaviour]:

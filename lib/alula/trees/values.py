@@ -37,7 +37,9 @@ def shown(value: object) -> str:
     return f"'{value}'" if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _whole(name: str, least: int, largest: int) -> PortType:
+def whole(name: str, least: int, largest: int) -> PortType:
+    """Return the type of whole numbers from one to another."""
+
     def cast(value: object) -> int:
         if not isinstance(value, int | float) or not math.isfinite(value) or value != int(value) or not least <= value <= largest:
             raise _wrong(value, name)
@@ -105,8 +107,8 @@ def _same(value: object) -> object:
     return value
 
 
-INT = _whole("int", -LARGEST_INT - 1, LARGEST_INT)
-UINT = _whole("unsigned int", 0, LARGEST_UINT)
+INT = whole("int", -LARGEST_INT - 1, LARGEST_INT)
+UINT = whole("unsigned int", 0, LARGEST_UINT)
 DOUBLE = PortType("double", _parse_double, _cast_double)
 BOOL = PortType("bool", _parse_bool, truth)
 STRING = PortType("std::string", str, as_text)

@@ -14,6 +14,7 @@ from alula.common.scenarios import ScenarioError, load_scenario
 from alula.common.suggestions import nearest
 from alula.language.errors import LanguageError
 from alula.language.load import load_skillset
+from alula.missions.filed.scenario import plan_of_mission_file
 from alula.missions.plan import InputError, Inputs, MakePlan, MissionPlan, plan_of
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
@@ -37,7 +38,10 @@ def plan_for(recorded: Recorded, tree: str) -> MissionPlan:
     """Return the mission's own plan, or that of ``tree``: a Python file or a module, with ``:function`` where it is not ``plan``."""
     inputs = inputs_of_record(recorded)
     try:
-        return _tree(tree)(inputs) if tree else plan_of(load_scenario(recorded.scenario), inputs)
+        scenario = load_scenario(recorded.scenario)
+        if tree.endswith(".xml"):
+            return plan_of_mission_file(Path(tree), scenario, inputs)
+        return _tree(tree)(inputs) if tree else plan_of(scenario, inputs)
     except (ScenarioError, RobotError, InputError) as error:
         raise ReplayError(f"{recorded.path}: {error}") from error
 

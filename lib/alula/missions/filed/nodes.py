@@ -1,0 +1,190 @@
+"""Nodes of missions that BehaviorTree.CPP has not: they wait on conditions, with the mission's clock."""
+
+from __future__ import annotations
+
+from alula.missions.blackboard import Blackboard
+from alula.trees.node import Action, Condition, Decorator, Script, SyncAction, Wiring
+from alula.trees.palette import Palette, input_port
+from alula.trees.status import FAILURE, IDLE, RUNNING, SKIPPED, SUCCESS, Answer
+from alula.trees.values import DOUBLE, INT, STRING
+
+IF = input_port("if", STRING, doc="a script that says yes or no")
+SECOND_NS = 1e9
+
+
+def asked(node: Action | Condition | Decorator, port: str = "if") -> Script:
+    """Return the script of a port."""
+    return node.wiring.compile(node.wiring.ports.get(port, "true"), port)
+
+
+class WaitFor(Action):
+    """Runs until a condition holds."""
+
+    ports = (IF,)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._script = asked(self)
+
+    def on_start(self) -> Answer:
+        """Look."""
+        return self.on_running()
+
+    def on_running(self) -> Answer:
+        """Look."""
+        return SUCCESS if self._script.holds() else RUNNING
+
+
+class Stays(Action):
+    """Succeeds when a condition has held for a time without a break, fails as soon as it does not."""
+
+    ports = (IF, input_port("for", DOUBLE, doc="how long", unit="s"))
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._script = asked(self)
+        self._since_ns = 0
+
+    def on_start(self) -> Answer:
+        """Begin to count."""
+        self._since_ns = self.now_ns
+        return self.on_running()
+
+    def on_running(self) -> Answer:
+        """Look and count."""
+        if not self._script.holds():
+            return FAILURE
+        return SUCCESS if self.now_ns - self._since_ns >= seconds_ns(self, "for") else RUNNING
+
+
+class Awaits(Action):
+    """Succeeds when a condition has held for a time without a break, fails when it has not within another."""
+
+    ports = (
+        IF,
+        input_port("within", DOUBLE, doc="how long to wait", unit="s"),
+        input_port("for", DOUBLE, "0", "how long it holds", unit="s"),
+    )
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._script = asked(self)
+        self._since_ns = 0
+        self._holds_since_ns: int | None = None
+
+    def on_start(self) -> Answer:
+        """Begin to count."""
+        self._since_ns, self._holds_since_ns = self.now_ns, None
+        return self.on_running()
+
+    def on_running(self) -> Answer:
+        """Look and count."""
+        now_ns = self.now_ns
+        if not self._script.holds():
+            self._holds_since_ns = None
+        elif self._holds_since_ns is None:
+            self._holds_since_ns = now_ns
+        if self._holds_since_ns is not None and now_ns - self._holds_since_ns >= seconds_ns(self, "for"):
+            return SUCCESS
+        return RUNNING if now_ns - self._since_ns < seconds_ns(self, "within") else FAILURE
+
+
+class Until(Decorator):
+    """Runs its child again, a tick after it has succeeded, until a condition holds after a success; fails with its child."""
+
+    ports = (IF,)
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._script = asked(self)
+
+    def update(self) -> Answer:
+        """Follow the child."""
+        self.become(RUNNING)
+        answer = self.child.execute()
+        if answer is RUNNING or answer is SKIPPED:
+            return answer
+        self.reset_children()
+        return FAILURE if answer is FAILURE else SUCCESS if self._script.holds() else RUNNING
+
+
+class RetryAfter(Decorator):
+    """Gives its child another chance some time after a failure, when a condition holds then."""
+
+    ports = (
+        IF,
+        input_port("attempts", INT, "2", "how many chances it has in all"),
+        input_port("wait", DOUBLE, "0", "how long after the failure", unit="s"),
+    )
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._script = asked(self)
+        self._left = 0
+        self._again_ns = 0
+
+    def update(self) -> Answer:
+        """Wait for the next chance, or follow the child."""
+        if self.status is IDLE:
+            self._left, self._again_ns, self.feedback_message = self.number("attempts"), self.now_ns, ""
+        self.become(RUNNING)
+        if self.now_ns < self._again_ns:
+            return RUNNING
+        answer = self.child.execute()
+        if answer is not FAILURE:
+            return answer
+        self.reset_children()
+        self._left -= 1
+        if not self._left or not self._script.holds():
+            return FAILURE
+        wait_ns = seconds_ns(self, "wait")
+        self._again_ns = self.now_ns + wait_ns
+        self.feedback_message = f"tries again after {wait_ns / SECOND_NS:g} s"
+        return RUNNING
+
+
+class Needs(Condition):
+    """What a mission needs to start: its name says it, ``otherwise`` is a script of a text that says what is so instead."""
+
+    ports = (IF, input_port("otherwise", STRING, doc="a script of a text"))
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring)
+        self._script = asked(self)
+        self._otherwise = asked(self, "otherwise")
+
+    @property
+    def unmet(self) -> str:
+        """What is so instead; empty when it is as it has to be."""
+        return "" if self._script.holds() else str(self._otherwise.run())
+
+    def update(self) -> Answer:
+        """Ask."""
+        self.feedback_message = self.unmet
+        return FAILURE if self.feedback_message else SUCCESS
+
+
+class NoteReason(SyncAction):
+    """Keeps what went wrong up to here as the mission's reason."""
+
+    memory: Blackboard
+
+    def update(self) -> Answer:
+        """Keep it."""
+        self.memory.note_reason()
+        return SUCCESS
+
+
+def seconds_ns(node: Action | Decorator, port: str) -> int:
+    """Return a port that is a time in seconds."""
+    value = node.get(port)
+    return int(value * SECOND_NS) if isinstance(value, float) else 0
+
+
+def mission_nodes(memory: Blackboard) -> Palette:
+    """Return them."""
+    palette = Palette()
+    for node in (WaitFor, Stays, Awaits, Until, RetryAfter, Needs):
+        palette.register(node)
+    palette.register(type("NoteReason", (NoteReason,), {"memory": memory, "__doc__": NoteReason.__doc__}))
+    return palette

@@ -1,0 +1,20 @@
+"""What a robot adds to missions that are files: its part ``missions``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from alula.missions.blackboard import Blackboard
+from alula.missions.plan import hear_nothing
+from alula.trees.node import Node
+
+
+@dataclass(frozen=True)
+class MissionPart:
+    """Nodes of its own by their names in files; what says why a resource is as it is; the memory that knows what the reasons mean."""
+
+    nodes: tuple[tuple[str, type[Node]], ...] = ()
+    listen: Callable[[Any, Blackboard], None] = hear_nothing
+    memory: type[Blackboard] = Blackboard

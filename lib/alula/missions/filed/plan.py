@@ -1,0 +1,152 @@
+"""A mission's plan from its file.
+
+What a file says of a mission besides its main tree, by names: the tree ``ready`` holds what it needs to start (<Needs>), the tree
+``stop_here`` brings the robot to rest after an abort. Entries of the main blackboard: ``degraded`` and ``stopping``, once true, say so.
+The model of the main tree tells its parameters (input ports with a number as their default), its inputs (without), and what
+``mission.json`` tells of it (output ports, with the value at the beginning).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from alula.missions.blackboard import Blackboard
+from alula.missions.conditions import Condition, condition
+from alula.missions.filed.nodes import Needs, mission_nodes
+from alula.missions.filed.part import MissionPart
+from alula.missions.filed.skills import Crew, SkillNode, skill_types
+from alula.missions.filed.world import World, states_of
+from alula.missions.pending import PendingInterrupts
+from alula.missions.plan import InputError, Inputs, MissionPlan
+from alula.missions.skillset import Client, Clock
+from alula.model.model import Skillset
+from alula.trees.blackboard import Blackboard as TreeBoard
+from alula.trees.errors import TreeError
+from alula.trees.factory import build_tree
+from alula.trees.node import Node
+from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
+from alula.trees.reading import TreeFiles, read_files
+from alula.trees.standard import standard_palette
+from alula.trees.structure import verify
+from alula.trees.tree import Tree
+
+READY, STOP_HERE = "ready", "stop_here"
+DEGRADED, STOPPING = "degraded", "stopping"
+
+
+class FiledMission:
+    """The tree of a file, and what its end means."""
+
+    def __init__(self, make: Maker) -> None:
+        self._make = make
+        self._board = make.board
+        self._tree = make.tree("")
+        self.root: Node = self._tree.root
+        self._needs = [node for node in make.tree(READY).nodes if isinstance(node, Needs)] if READY in make.files.trees else []
+
+    @property
+    def degraded(self) -> bool:
+        """Tell whether it was accomplished in another way than the best."""
+        return bool(self._board.get(DEGRADED))
+
+    @property
+    def stopping(self) -> bool:
+        """Tell whether the tree has the robot brought to rest by now."""
+        return bool(self._board.get(STOPPING))
+
+    def conditions(self) -> list[Condition]:
+        """Return what the mission needs to start, met or not."""
+        answers = [
+            condition(f"the skillset {name} answers", holds=client.ready, otherwise=f"the skillset {name} can't be called")
+            for name, client in self._make.crew.clients.items()
+        ]
+        return answers + [Condition(node.name, node.unmet) for node in self._needs]
+
+    def stop_here(self) -> Node:
+        """Make a tree that brings the robot to rest where it is."""
+        return self._make.tree(STOP_HERE).root
+
+
+class Maker:
+    """Makes the trees of a mission, over one blackboard."""
+
+    def __init__(self, files: TreeFiles, skillsets: Sequence[Skillset], part: MissionPart, crew: Crew, clock_ns: Clock) -> None:
+        self.files = files
+        self.crew = crew
+        self.board = TreeBoard(clock_ns)
+        self._clock_ns = clock_ns
+        self._enums = states_of(skillsets)
+        self._palette = mission_palette(skillsets, part, crew)
+
+    def tree(self, name: str) -> Tree:
+        """Make one; that of the file where no name is given."""
+        world = World(self.crew.clients, self.crew.memory)
+        files, board = self.files, self.board
+        tree = build_tree(files, self._palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board)
+        for node in tree.nodes:
+            if isinstance(node, SkillNode):
+                world.leaves.setdefault(node.wiring.type.name, []).append(node)
+        return tree
+
+
+def mission_palette(skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None = None) -> Palette:
+    """Return all that a mission of a robot may be made of."""
+    memory = Blackboard(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.memory
+    palette = standard_palette() | mission_nodes(memory) | skill_types(skillsets, crew)
+    for name, node in part.nodes:
+        palette.register(node, name)
+    return palette
+
+
+def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: Inputs, part: MissionPart) -> MissionPlan:
+    """Return the plan of a mission's file; raises InputError."""
+    try:
+        files = read_files(path)
+        verify(files, mission_palette(skillsets, part))
+    except TreeError as error:
+        raise InputError(str(error)) from error
+    model = files.models.get(files.main) or node_type(files.main, Category.SUBTREE)
+    parameters, own = _parameters(model), _inputs(model, inputs, path)
+    board: list[TreeBoard] = []
+
+    def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[FiledMission, Blackboard]:
+        memory = part.memory(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns))
+        maker = Maker(files, skillsets, part, Crew(clients, memory), clock_ns)
+        for port in model.ports.values():
+            if port.direction is not Direction.INPUT:
+                maker.board.set(port.name, _number(port))
+        for key, value in {**parameters, **values, **own}.items():
+            maker.board.set(key, value)
+        board[:] = [maker.board]
+        memory.entries = lambda: _shown(maker.board, {*parameters, *own})
+        return FiledMission(maker), memory
+
+    def facts() -> Mapping[str, object]:
+        told = [port.name for port in model.ports.values() if port.direction is not Direction.INPUT]
+        return {name: board[0].get(name) if board else _number(model.ports[name]) for name in told}
+
+    return MissionPlan(name, tuple(one.name for one in skillsets), make, parameters, own, facts, part.listen)
+
+
+def _parameters(model: NodeType) -> dict[str, float]:
+    return {port.name: _number(port) for port in model.ports.values() if port.direction is Direction.INPUT and port.default is not None}
+
+
+def _number(port: Port) -> float:
+    try:
+        return float(port.default or 0)
+    except ValueError:
+        raise InputError(f"the default of the mission's port '{port.name}' is '{port.default}', no number") from None
+
+
+def _inputs(model: NodeType, inputs: Inputs, path: Path) -> dict[str, object]:
+    needed = [port.name for port in model.ports.values() if port.direction is Direction.INPUT and port.default is None]
+    missing = [name for name in needed if name not in inputs]
+    if missing:
+        raise InputError(f"{path}: the mission needs `{missing[0]}` of its world")
+    return {name: inputs[name] for name in needed}
+
+
+def _shown(board: TreeBoard, given: set[str]) -> Mapping[str, object]:
+    return {name: value for name, value in board.values().items() if name not in given}

@@ -1,0 +1,31 @@
+"""The plan of a mission's file with the robot's models and nodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from alula.common.robots import find_robot
+from alula.common.scenarios import Scenario
+from alula.language.errors import LanguageError
+from alula.language.load import load_robot
+from alula.missions.filed.part import MissionPart
+from alula.missions.filed.plan import plan_of_file
+from alula.missions.plan import InputError, Inputs, MissionPlan
+
+
+def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs) -> MissionPlan:
+    """Return the plan of a file as a scenario's mission.
+
+    Raises:
+        RobotError, InputError: the robot has no such skillsets or nodes, or the file can't be used.
+    """
+    robot = find_robot()
+    try:
+        models = {skillset.name: skillset for skillset in load_robot(robot.skillsets).skillsets}
+    except (LanguageError, OSError) as error:
+        raise InputError(str(error)) from error
+    missing = [name for name in scenario.skillsets if name not in models]
+    if missing:
+        raise InputError(f"the robot has no skillset '{missing[0]}'")
+    part = robot.part("missions") or MissionPart()
+    return plan_of_file(path, scenario.name, [models[name] for name in scenario.skillsets], inputs, part)

@@ -1,0 +1,90 @@
+"""Nodes of the drone's own in files of missions: the waypoints of a route, and the heading across a leg."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from alula.missions.blackboard import Blackboard
+from alula.missions.filed.part import MissionPart
+from alula.trees.errors import TickError
+from alula.trees.node import Condition, SyncAction
+from alula.trees.palette import input_port, output_port
+from alula.trees.status import FAILURE, SUCCESS, Answer
+from alula.trees.values import ANY, DOUBLE, INT
+from uav_missions import reasons
+from uav_missions.reasons import AUTHORITY_INVARIANT, holder_of_the_vehicle
+from uav_missions.route import Route, route_of, wrap_rad
+
+
+class NextWaypoint(SyncAction):
+    """Writes the waypoint that is next on the route (paper, Figure 10), and the heading across the leg to it; fails when there is none.
+
+    It writes the same one until it was reached, whichever branch flies there: a leg that one branch was interrupted on is finished by the
+    other.
+    """
+
+    ports = (
+        input_port("route", ANY, doc="a list of [x, y, z] (map, ENU, metres)", unit="m"),
+        input_port("reached", INT, doc="how many of them were reached"),
+        output_port("count", INT, doc="how many there are"),
+        output_port("waypoint", ANY, doc="{x, y, z}", unit="m"),
+        output_port(
+            "sideways", DOUBLE, doc="heading with the leg to the right: the LiDAR's scan plane holds the direction of travel", unit="rad"
+        ),
+    )
+
+    def update(self) -> Answer:
+        """Write."""
+        route = self._route()
+        self.put("count", len(route.waypoints))
+        if route.current is None:
+            self.feedback_message = "no more waypoints"
+            return FAILURE
+        x, y, z = route.current
+        self.put("waypoint", {"x": x, "y": y, "z": z})
+        self.put("sideways", wrap_rad(route.leg_heading_rad() + math.pi / 2))
+        self.feedback_message = f"{route.reached + 1} of {len(route.waypoints)}: ({x:g}, {y:g}, {z:g})"
+        return SUCCESS
+
+    def _route(self) -> Route:
+        waypoints, reached = self.get("route"), self.number("reached")
+        if not isinstance(waypoints, list):
+            raise TickError(f"{self.place()}: the route is no list")
+        route = route_of({"route": waypoints})
+        route.reached = reached
+        return route
+
+
+class PointsTo(Condition):
+    """Succeeds when a heading that was taken is another one, within a tolerance; fails also when none was taken yet."""
+
+    ports = (
+        input_port("taken", DOUBLE, doc="the heading that was taken", unit="rad"),
+        input_port("heading", DOUBLE, doc="the heading that is asked for", unit="rad"),
+        input_port("tolerance", DOUBLE, "0.06", "how far they may be apart", unit="rad"),
+    )
+
+    def update(self) -> Answer:
+        """Compare them."""
+        entry = self.entry("taken")
+        if entry is None or entry.value is None:
+            return FAILURE
+        taken, heading, tolerance = (self.get(port) for port in ("taken", "heading", "tolerance"))
+        if not isinstance(taken, float) or not isinstance(heading, float) or not isinstance(tolerance, float):
+            return FAILURE
+        return SUCCESS if abs(wrap_rad(taken - heading)) < tolerance else FAILURE
+
+
+@dataclass(kw_only=True)
+class DroneMemory(Blackboard):
+    """The mission's memory; knows who has a vehicle whose authority was lost."""
+
+    def explained(self) -> str:
+        """Return the reason; where the authority was lost, with its holder."""
+        lost = any(failure.result == AUTHORITY_INVARIANT for failure in self.failures)
+        reason = holder_of_the_vehicle(self) if lost else ""
+        return f"{self.reason} ({reason})" if reason else self.reason
+
+
+PART = MissionPart((("uav.NextWaypoint", NextWaypoint), ("uav.PointsTo", PointsTo)), reasons.listen, DroneMemory)
