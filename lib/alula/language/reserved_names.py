@@ -17,7 +17,7 @@ ROBOT = frozenset({"node", "clients", "ready", "wait_ready", "close", "connect"}
 
 
 class Attributes:
-    """The attributes of one generated class: each name as it is, or with ``_`` behind it where that is taken or a word of Python."""
+    """The attributes of one generated class: each name as it is, or with ``_`` behind it where that is taken or a keyword of Python."""
 
     def __init__(self, reserved: frozenset[str]) -> None:
         self._taken = {*reserved, *keyword.kwlist}

@@ -150,7 +150,7 @@ SEMANTICS = [
     ("ALU215", "skill f { output { ^execution: string } result { R } }", "needs the name `execution`", ""),
     ("ALU215", "skill f { input { ^skill: string } result { R } }", "needs the name `skill`", ""),
     ("ALU216", "skill f { input { ^Height: float64 } result { R } }", "`Height` can't be the name of a ROS field", "a-z"),
-    ("ALU216", "skill f { input { ^class: float64 } result { R } }", "`class` can't be", "no word of Python"),
+    ("ALU216", "skill f { input { ^class: float64 } result { R } }", "`class` can't be", "no keyword of Python"),
     ("ALU216", "skill f { input { ^a__b: float64 } result { R } }", "`a__b` can't be", ""),
     ("ALU216", "skill ^_f { result { R } }", "can't be the name of a ROS action", "begins with a letter"),
     ("ALU216", "skill ^none { result { R } }", "can't be the name of a ROS action", "is not None"),
