@@ -13,7 +13,8 @@ pytest.importorskip("zmq")
 pytest.importorskip("btview")
 
 from alula.trees.answers import WORDS, Answers, StepClock, scripted_tree
-from alula.trees.groot.server import Address, Server
+from alula.trees.groot.address import Address
+from alula.trees.groot.server import Server
 from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette

@@ -16,8 +16,9 @@ from trees_viewer import Viewer
 
 from alula.common.network import free_port
 from alula.trees.answers import WORDS, Answers, StepClock, scripted_tree
+from alula.trees.groot.address import Address
 from alula.trees.groot.btlog import read_log
-from alula.trees.groot.server import Address, Server
+from alula.trees.groot.server import Server
 from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette

@@ -16,8 +16,9 @@ import msgpack
 import zmq
 from trees_viewer import Viewer
 
+from alula.trees.groot.address import Address, ServerError
 from alula.trees.groot.protocol import Request, Status
-from alula.trees.groot.server import NO_HOOKS, Address, Server, ServerError
+from alula.trees.groot.server import NO_HOOKS, Server
 from alula.trees.groot.states import KEPT_TRANSITIONS, NodeStates, Shown
 
 IDLE, RUNNING, SUCCESS = b"\x00", b"\x01", b"\x02"

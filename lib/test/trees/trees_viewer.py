@@ -6,7 +6,7 @@ import struct
 
 import zmq
 
-from alula.trees.groot.server import Address
+from alula.trees.groot.address import Address
 
 TIMEOUT_MS = 20_000
 

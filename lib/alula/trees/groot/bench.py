@@ -23,8 +23,9 @@ import zmq
 
 from alula.common.files import write_json
 from alula.trees.answers import WORDS, Answers, StepClock, scripted_tree
+from alula.trees.groot.address import Address
 from alula.trees.groot.protocol import PROTOCOL, Request
-from alula.trees.groot.server import Address, Server
+from alula.trees.groot.server import Server
 from alula.trees.groot.watching import Watch
 from alula.trees.reading import read_text
 from alula.trees.standard import standard_palette

@@ -12,18 +12,16 @@ from __future__ import annotations
 import os
 import uuid
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from threading import Thread
 
 import zmq
 
 from alula.common.network import free_port
-from alula.trees.groot.protocol import DEFAULT_PORT, REFUSAL, Header, ProtocolError, Request
+from alula.trees.groot.address import Address, taken
+from alula.trees.groot.protocol import REFUSAL, Header, ProtocolError, Request
 from alula.trees.groot.states import Shown
 from alula.trees.groot.values import pack_values
 
-LOOPBACK = "127.0.0.1"
-LAST_PORT = 65535
 KEPT_MESSAGES = 50
 """For each viewer, in each direction."""
 LONGEST_REQUEST_BYTES = 1 << 16
@@ -32,28 +30,6 @@ NO_HOOK = "Node ID not found"
 TWO_PARTS = "must be 2 parts message"
 
 Handler = Callable[["Server", str], list[bytes]]
-
-
-class ServerError(Exception):
-    """The tree can't be served; the message names the address and the remedy."""
-
-
-@dataclass(frozen=True)
-class Address:
-    """Where viewers find the server; port 0: any that is free."""
-
-    host: str = LOOPBACK
-    port: int = DEFAULT_PORT
-
-    @classmethod
-    def read(cls, text: str) -> Address:
-        """Read ``[HOST:]PORT``, nothing is the default; raises ServerError."""
-        host, _, port = text.rpartition(":")
-        if not text:
-            return cls()
-        if not port.isdecimal() or not 0 <= int(port) < LAST_PORT:
-            raise ServerError(f"'{text}' is no [HOST:]PORT: the port is a number from 1 to {LAST_PORT - 1}, as 1667")
-        return cls(host or LOOPBACK, int(port))
 
 
 class Server:
@@ -102,8 +78,7 @@ class Server:
             self._publisher.bind(f"tcp://{address.host}:{address.port + 1}")
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
-            where = f"{address.host}, ports {address.port} and {address.port + 1}"
-            raise ServerError(f"the tree can't be shown on {where}: {os.strerror(error.errno or 0)}; choose others") from error
+            raise taken(address, os.strerror(error.errno or 0)) from error
         return address
 
     def _serve(self) -> None:
