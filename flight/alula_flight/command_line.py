@@ -6,7 +6,7 @@ import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from alula.commands.run_options import check_seed, run_folder, run_parser, world_file
+from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, world_file
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import free_port
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
@@ -38,6 +38,7 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         master_port=free_port(),
         console=given.console,
         monitor=given.monitor,
+        groot=groot_address(given.groot, scenario),
         own=own,
     )
 

@@ -28,4 +28,5 @@ def launch_arguments(spec: RunSpec, part: RunPart) -> list[str]:
     faults = [fault for fault in spec.faults if parse_fault(fault).what not in processes]
     of_every_robot = {"scenario": spec.scenario, "out": spec.out_dir, "seed": spec.seed, "faults": ",".join(faults)}
     world = {"world": spec.world} if spec.world else {}
-    return [f"{name}:={value}" for name, value in {**of_every_robot, **world, **part.launch_arguments(spec)}.items()]
+    groot = {"groot": spec.groot} if spec.groot else {}
+    return [f"{name}:={value}" for name, value in {**of_every_robot, **world, **groot, **part.launch_arguments(spec)}.items()]

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import psutil
 
+from alula.commands.run_options import shown_at
 from alula.common.network import DomainClaim, NoFreeDomainError, NoFreePortError, claim_domain
 from alula.common.processes import RUN_ID_VARIABLE, end_run, node_name, processes_of_run
 from alula.common.robots import RobotError
@@ -144,7 +145,7 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write(f"alula run: can't make the folder {out}: {error.strerror}; choose another with --out\n")
         return CANNOT_START
     say = announce(spec)
-    for line in part.words(spec):
+    for line in ([shown_at(spec.groot)] if spec.groot else []) + list(part.words(spec)):
         say(line)
     monitor = monitor_of(spec)
     with console_page(out, say) if spec.console else contextlib.nullcontext():

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from alula.campaign.mock_flights import load_flights
-from alula.commands.run_options import check_seed, run_folder, run_parser, world_file
+from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, shown_at, world_file
 from alula.common.faults import MOCKED, FaultError, FaultRequest, changes_of, parse_fault, spans_of
 from alula.common.files import write_json
 from alula.common.robots import RobotError
@@ -36,6 +36,7 @@ from alula.report.facts import RunFacts
 from alula.report.live import LiveEvents
 from alula.report.making import make_report
 from alula.report.verdict import verdict_lines
+from alula.trees.groot.address import ServerError
 
 CANNOT_START = EXIT_CODES[Outcome.NOT_STARTED]
 
@@ -62,7 +63,7 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
     flights = load_flights(given.scenario, given.behaviour, world=given.world)
     faults = [parse_fault(text) for text in given.fail]
     flights.check(faults)
-    world, plan = world_file(flights.scenario, given.world), flights.plan()
+    world, plan, groot = world_file(flights.scenario, given.world), flights.plan(), groot_address(given.groot, flights.scenario)
     out.mkdir(parents=True, exist_ok=True)
     spec = RunSpec(
         scenario=given.scenario,
@@ -72,10 +73,11 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
         faults=tuple(map(str, faults)),
         world=world,
         monitor=given.monitor,
+        groot=groot,
         own={"mock": True},
     )
     spec.save(out / FILE)
-    return MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, seed=seed, out=out), spec
+    return MockedMission(flights.skillsets, flights.behaviour, plan, faults=faults, seed=seed, out=out, groot=groot), spec
 
 
 def run(given: argparse.Namespace) -> int:
@@ -83,6 +85,8 @@ def run(given: argparse.Namespace) -> int:
     mission, spec = prepare(given)
     out = Path(spec.out_dir)
     _say(f"running '{spec.scenario}' over mocks, seed {spec.seed}{''.join(f', failing {one}' for one in spec.faults)}; results in {out}")
+    if spec.groot:
+        _say(shown_at(spec.groot))
     _abort_on_signals(mission, out)
     end = mission.run()
     monitor = Monitor(models_of(dict.fromkeys(event.skillset for event in mission.events))) if given.monitor else None
@@ -134,7 +138,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run; return the exit code."""
     try:
         return run(parse(sys.argv[1:] if words is None else words))
-    except (AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError, OSError) as error:
+    except (AnalysisError, FaultError, RequestError, RobotError, ScenarioError, InputError, ServerError, OSError) as error:
         sys.stderr.write(f"alula run: {error}\n")
         return CANNOT_START
 

@@ -10,6 +10,7 @@ from alula.common.robots import find_robot, wrong_world
 from alula.common.runs import runs_folder
 from alula.common.scenarios import Scenario, scenario_names
 from alula.live.spec import RequestError
+from alula.trees.groot.address import Address, ServerError
 
 FAULT = "WHAT[:HOW][@SECONDS[-SECONDS]]"
 MAX_SEED = 2**31 - 1
@@ -24,6 +25,7 @@ def run_parser(about: str) -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=0, help="seed of all random choices (default 0)")
     parser.add_argument("--out", type=Path, help="folder for the results (default: runs/TIME-SCENARIO of the robot)")
     parser.add_argument("--monitor", action="store_true", help="check every event against the models")
+    parser.add_argument("--groot", nargs="?", const="", metavar="[HOST:]PORT", help="show the tree to Groot2 and its like (127.0.0.1:1667)")
     parser.add_argument("--mock", action="store_true", help="run over mocks in virtual time: without simulator and ROS, in about a second")
     return parser
 
@@ -45,6 +47,24 @@ def world_file(scenario: Scenario, wanted: str) -> str:
     if not path.is_file():
         raise RequestError(f"--world: {wrong_world(robot, name)}")
     return str(path.absolute())
+
+
+def groot_address(wanted: str | None, scenario: Scenario) -> str:
+    """Return where viewers find the mission's tree, as HOST:PORT; empty where none are wanted. Raises RequestError."""
+    if wanted is None:
+        return ""
+    if not scenario.mission.endswith(".xml"):
+        raise RequestError(f"--groot: the mission is Python ({scenario.mission}), and viewers are shown trees of files: missions/NAME.xml")
+    try:
+        address = Address.read(wanted).looked_up()
+    except ServerError as error:
+        raise RequestError(f"--groot: {error}") from None
+    return str(address)
+
+
+def shown_at(groot: str) -> str:
+    """Say where viewers find the tree."""
+    return f"Groot2 and its like find the tree at {groot}"
 
 
 def run_folder(wanted: Path | None, scenario: str) -> Path:

@@ -32,6 +32,7 @@ class RunSpec:
         domain: DDS domain; 0 until it is claimed.
         console: the operator's page is served beside it.
         monitor: every event is held against the models.
+        groot: ``HOST:PORT`` where viewers find the mission's tree; empty: nowhere.
         own: what the robot's part has made of its own options, by name; in the file these values stand beside the others.
     """
 
@@ -45,6 +46,7 @@ class RunSpec:
     domain: int = 0
     console: bool = False
     monitor: bool = False
+    groot: str = ""
     own: Mapping[str, Any] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:

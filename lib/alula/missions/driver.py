@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from alula.missions.director import START_TIMEOUT_S, Director, End
+from alula.missions.filed.watched import watched
 from alula.missions.leaves import skill_leaf
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.plan import MissionPlan
@@ -39,6 +40,10 @@ class MissionDriver:
         soon: has a tick done once, after all that happens at this moment; without it the host looks at ``due``.
         say: takes what is worth a line in a log.
         start_timeout_s: how long the mission waits for what it needs.
+        groot: ``HOST:PORT`` where viewers find the tree of a mission that is a file; empty: nowhere.
+
+    Raises:
+        InputError, ServerError: the tree can't be shown to viewers.
     """
 
     def __init__(
@@ -52,6 +57,7 @@ class MissionDriver:
         soon: Callable[[Job], object] = later,
         say: Callable[[str], None] = say_nothing,
         start_timeout_s: float = START_TIMEOUT_S,
+        groot: str = "",
     ) -> None:
         self.due = False
         self.woken_by_events = True
@@ -66,6 +72,7 @@ class MissionDriver:
         clients = {name: client(name, self.wake) for name in plan.skillsets}
         mission, self.blackboard = plan.make(clients, clock_ns, parameters)
         self.leaves = [(leaf, path_of(node)) for node in mission.root.iterate() if (leaf := skill_leaf(node)) is not None]
+        self._watched = watched(mission, clock_ns, record, groot)
         self.director = Director(mission, self.blackboard, start_timeout_s=start_timeout_s)
 
     @property
@@ -104,6 +111,8 @@ class MissionDriver:
         self._note_step()
 
     def _note_step(self) -> None:
+        if self._watched is not None:
+            self._watched.commit()
         held = self.director.news_of_pause()
         if self.record is not None:
             if held:
@@ -165,6 +174,8 @@ class MissionDriver:
         return self.record is None or not self.record.unended
 
     def finish(self, end: End) -> None:
-        """Write what is left to write."""
+        """Write what is left to write, and show the tree no more."""
+        problem = "" if self._watched is None else self._watched.close()
         if self.record is not None:
+            self.record.problems += [problem] if problem else []
             self.record.finish(end, self.director, self._clock_ns() / 1e9)

@@ -35,6 +35,7 @@ class MockedMission:
         out: the run's folder; None leaves nothing behind.
         tick_period_s: of the tree, besides the ticks after events; 10 Hz as over ROS 2.
         latency_s: of each message between mission and managers.
+        groot: where viewers find the tree, as `MissionDriver` has it; it raises, too, what that does.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class MockedMission:
         out: Path | None = None,
         tick_period_s: float = TICK_PERIOD_S,
         latency_s: float = LATENCY_S,
+        groot: str = "",
     ) -> None:
         self.world: LocalWorld
         self.robot: MockRobot
@@ -62,7 +64,7 @@ class MockedMission:
         clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
         record = self._record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
         client = lambda name, wake: MissionClient(self.world.client(name), wake, record)  # noqa: E731
-        self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record, soon=self.world.clock.soon)
+        self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record, soon=self.world.clock.soon, groot=groot)
         self._leaves = self._driver.leaves
         self.world.on_event(self._on_event)
 

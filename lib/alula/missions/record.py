@@ -16,10 +16,14 @@ from alula.missions.skillset import Clock
 from alula.runtime.core.events import EngineEvent, ExecutionEvent, event_record
 from alula.runtime.handle import SkillHandle
 from alula.runtime.plain import to_plain
+from alula.trees.groot.watching import Watch
+
+TREE_LOG = "mission.btlog"
+"""Of a mission that is a file."""
 
 
 class MissionRecord:
-    """Writes ``skills.mcap`` on the way, ``mission.json`` at once and at the end, ``tree.svg`` at the end.
+    """Writes ``skills.mcap`` and ``mission.btlog`` on the way, ``mission.json`` at once and at the end, ``tree.svg`` at the end.
 
     A folder that can't be written to any more ends the record and not the mission; ``problems`` says so.
     """
@@ -72,6 +76,13 @@ class MissionRecord:
         stamp_ns = self._clock_ns() if stamp_ns is None else stamp_ns
         content = {"skillset": skillset, "data": data, "value": to_plain(value), "stamp_s": stamp_ns / 1e9}
         self._writer.write(DATA, stamp_ns, content)
+
+    def log_tree(self, watch: Watch) -> None:
+        """Have the statuses of the tree's nodes logged, for Groot2 to replay."""
+        try:
+            watch.log(self._out / TREE_LOG)
+        except OSError as error:
+            self.problems.append(f"{TREE_LOG} could not be written: {error.strerror or error}")
 
     def abort(self, reason: str) -> None:
         """Write that the mission is told from outside to stop; to be called before it does."""

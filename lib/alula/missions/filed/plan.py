@@ -41,8 +41,8 @@ class FiledMission:
     def __init__(self, make: Maker) -> None:
         self._make = make
         self._board = make.board
-        self._tree = make.tree("")
-        self.root: Node = self._tree.root
+        self.tree = make.tree("")
+        self.root: Node = self.tree.root
         self._needs = [node for node in make.tree(READY).nodes if isinstance(node, Needs)] if READY in make.files.trees else []
 
     @property

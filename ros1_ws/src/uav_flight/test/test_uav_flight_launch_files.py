@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from pathlib import Path
 
@@ -46,6 +47,16 @@ def test_what_the_command_line_asks_for_reaches_the_nodes(scenario: str, tmp_pat
     assert "/zed/left/image_raw" in record.args
 
 
+@pytest.mark.parametrize("scenario", scenario_names())
+def test_where_viewers_find_the_tree_reaches_the_mission_as_text(scenario: str, tmp_path: Path) -> None:
+    for words, host in ([], ""), (["--groot", "0"], "127.0.0.1:"), (["--groot", "0.0.0.0:0"], "0.0.0.0:"):
+        spec = with_domain(parse([scenario, *words, "--out", str(tmp_path / "run")]), 77)
+        (mission,) = [node for node in launched(scenario, tmp_path, *launch_arguments(spec)).nodes if node.name == "mission"]
+        assert f"groot:='{spec.groot}'" in shlex.split(mission.args)
+        assert spec.groot.startswith(host)
+        assert bool(spec.groot) is bool(words)
+
+
 def test_the_radios_faults_and_ports_reach_the_nodes(tmp_path: Path) -> None:
     spec = with_domain(parse(["inspection", "--fail", "radio@40", "--fail", "control@50", "--out", str(tmp_path / "run")]), 77)
     params = {name: param.value for name, param in launched("inspection", tmp_path, *launch_arguments(spec)).params.items()}
@@ -62,7 +73,7 @@ def test_every_argument_of_a_run_is_declared_and_has_one_default(tmp_path: Path)
     general = LAUNCH.parents[1] / "skillset_ros1/launch/decision.launch"
     texts = [path.read_text(encoding="utf-8") for path in (*LAUNCH.glob("*.launch"), general)]
     declared = {name for text in texts for name in re.findall(r'<arg name="(\w+)" (?:default="[^"]*" )?doc="[^"]+"/>', text)}
-    spec = parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", "--out", str(tmp_path / "run")])
+    spec = parse(["inspection", "--autopilot", "tcp:127.0.0.1:15760", "--groot", "0", "--out", str(tmp_path / "run")])
     assert {word.partition(":=")[0] for word in launch_arguments(spec)} <= declared
     defaults = Counter(name for text in texts for name in set(re.findall(r'<arg name="(\w+)" default=', text)))
     # Each scenario has a world of its own, and the radio has a seed, too.

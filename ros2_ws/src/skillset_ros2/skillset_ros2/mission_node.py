@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -26,10 +27,11 @@ from alula.common.signals import on_end_signal
 from alula.missions.director import EXIT_CODES, START_TIMEOUT_S, End, Outcome
 from alula.missions.driver import TICK_PERIOD_S, MissionDriver
 from alula.missions.pausing import PauseRefusedError
-from alula.missions.plan import MissionPlan
+from alula.missions.plan import InputError, MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
 from alula.runtime.codecs import event_of
+from alula.trees.groot.address import ServerError
 from skillset_ros2 import NodeExecutor, SkillsetClient
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
@@ -56,6 +58,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             record=self._record,
             say=self.get_logger().warning,
             start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S),
+            groot=self._groot(),
         )
         plan.listen(self, self.driver.blackboard)
         self._view_json = ""
@@ -104,6 +107,10 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _parameter(self, name: str, default: float) -> Any:
         return self.declare_parameter(name, default).value
+
+    def _groot(self) -> str:
+        """Return where viewers find the tree; a port alone is a number to ROS 2."""
+        return str(self.declare_parameter("groot", "", ParameterDescriptor(dynamic_typing=True)).value)
 
     def _publish_tree(self) -> None:
         view_json = json.dumps(self.driver.director.view().as_dict())
@@ -167,7 +174,12 @@ def run_mission(plan: MissionPlan, out: Path, arguments: Sequence[str] | None = 
     on_end_signal(signals.append)
     # rclpy's own handlers would end the communication that is needed to stop the robot.
     rclpy.init(args=words, signal_handler_options=SignalHandlerOptions.NO)
-    node = MissionNode(out, plan)
+    try:
+        node = MissionNode(out, plan)
+    except (InputError, ServerError) as error:
+        sys.stderr.write(f"mission: {error}\n")
+        rclpy.try_shutdown()
+        return EXIT_CODES[Outcome.NOT_STARTED]
     end = tick_to_the_end(node, signals)
     node.finish(end)
     node.get_logger().info(f"{end.outcome.value}{': ' + end.reason if end.reason else ''}")
