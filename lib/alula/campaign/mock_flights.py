@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from alula.common.faults import FaultError, FaultRequest
@@ -44,8 +45,9 @@ class MockFlights:
     behaviour: Behaviour
     inputs: Inputs
 
+    @cached_property
     def plan(self) -> MissionPlan:
-        """Make the mission; raises RobotError and InputError."""
+        """The mission, read once for all flights; raises RobotError and InputError."""
         return plan_of(self.scenario, self.inputs)
 
     def check(self, faults: Sequence[FaultRequest]) -> None:
@@ -62,7 +64,7 @@ class MockFlights:
 
     def fly(self, faults: Sequence[FaultRequest] = (), seed: int = 0) -> Flown:
         """Fly the mission once over mocks, in virtual time; the same faults and seed give the same flight."""
-        mission = MockedMission(self.skillsets, self.behaviour, self.plan(), faults=faults, seed=seed)
+        mission = MockedMission(self.skillsets, self.behaviour, self.plan, faults=faults, seed=seed)
         end = mission.run()
         places = Places(mission.places, tip_of(mission.director.view().as_dict()))
         return Flown(mission.events, end, mission.notes, mission.open_executions, dict(mission.robot.faults), places)

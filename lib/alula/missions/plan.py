@@ -35,7 +35,7 @@ class MissionPlan:
     Attributes:
         scenario: its name, in the run's files.
         skillsets: what it calls.
-        make: makes the tree.
+        make: makes the tree, a new one for each run: a plan may be run many times.
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         inputs: what it was made of.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.

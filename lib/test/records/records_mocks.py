@@ -13,7 +13,7 @@ def fly_recorded(out: Path, *faults: str, kill: tuple[str, float] | None = None)
     """Map the yard over mocks; ``out`` is the run's folder, which is there; ``kill``: the managers of which skillset die when."""
     flights = load_flights("mapping")
     requests = Flight(0, "mapping", 0, faults).requests
-    mission = MockedMission(flights.skillsets, flights.behaviour, flights.plan(), faults=requests, out=out)
+    mission = MockedMission(flights.skillsets, flights.behaviour, flights.plan, faults=requests, out=out)
     if kill is not None:
         mission.world.clock.after(kill[1], lambda: mission.world.kill(kill[0]))
     mission.run()
