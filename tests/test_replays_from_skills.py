@@ -17,12 +17,13 @@ from alula.commands import run as over_mocks
 from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.faults import parse_fault
 from alula.common.record import DATA, DECISIONS, FILE, MISSION, Entry, RecordWriter, read_record
+from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
+from alula.missions.plan import plan_of
 from alula.records.models import robot_skillsets
 from alula.runtime.mock import MockSkill, load_behaviour
 from alula_flight.replay import main
-from uav_missions import mapping
 from uav_missions.route import inputs_of
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
@@ -92,7 +93,7 @@ def mapping_over_mocks(out: Path) -> MockedMission:
     skillsets = robot_skillsets(("navigation", "perception", "mapping"))
     behaviour = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets())
     out.mkdir()
-    return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), mapping.plan(inputs), out=out)
+    return MockedMission(skillsets, behaviour.of(frozenset(s.name for s in skillsets)), plan_of(load_scenario("mapping"), inputs), out=out)
 
 
 def pause_between(mission: MockedMission, *, pause_s: float, resume_s: float) -> None:

@@ -15,7 +15,6 @@ import alula.commands.replay
 from alula.commands.replay import CANNOT_REPLAY, OTHERWISE, SAME
 from alula.common.record import DECISIONS, FILE, MISSION, read_record
 from alula_flight.replay import main
-from uav_missions import mapping
 
 ALULA_ROOT = Path(os.environ["ALULA_ROOT"])
 RECORDINGS = ALULA_ROOT / "tests" / "recordings"
@@ -87,27 +86,23 @@ def test_a_failure_that_was_not_flown_is_decided_as_the_one_that_was(depth, tmp_
     assert (difference["now"]["kind"], difference["now"]["skill"]) == ("interrupt", "goto_straight")
 
 
-WRONG_ORDER = """
-from uav_missions import mapping
+BRANCHES = [f'<SubTree ID="{name.lower()}_navigation" name="with the {name}" _autoremap="true"/>' for name in ("ZED", "LiDAR")]
 
 
-class LidarFirst(mapping.MappingMission):
-    def _map_the_area(self):
-        self._zed_navigation, self._lidar_navigation = self._lidar_navigation, self._zed_navigation
-        return super()._map_the_area()
-
-
-mapping.MappingMission = LidarFirst
-plan = mapping.plan
-"""
+def with_the_lidar_first(folder: Path) -> Path:
+    """Write the mapping mission with its branches in the wrong order, and return the file."""
+    missions = ALULA_ROOT / "missions"
+    shutil.copy(missions / "flying.xml", folder)
+    parts = re.split("({})".format("|".join(map(re.escape, BRANCHES))), (missions / "mapping.xml").read_text(encoding="utf-8"))
+    before, first, between, second, after = parts
+    (folder / "mapping.xml").write_text(before + second + between + first + after, encoding="utf-8")
+    return folder / "mapping.xml"
 
 
 @pytest.mark.parametrize(("depth", "name"), [("skills", "mapping"), ("functional", "mapping"), ("sensors", "mapping-sensors")])
-def test_a_tree_with_its_branches_in_the_wrong_order_is_told(depth, name, tmp_path, capsys, monkeypatch):
+def test_a_tree_with_its_branches_in_the_wrong_order_is_told(depth, name, tmp_path, capsys):
     pytest.importorskip("uav_msgs")
-    monkeypatch.setattr(mapping, "MappingMission", mapping.MappingMission)  # put back afterwards
-    (tmp_path / "tree.py").write_text(WRONG_ORDER)
-    assert main([str(RECORDINGS / name), "--from", depth, "--tree", str(tmp_path / "tree.py")]) == OTHERWISE
+    assert main([str(RECORDINGS / name), "--from", depth, "--tree", str(with_the_lidar_first(tmp_path))]) == OTHERWISE
     said = capsys.readouterr().err
     assert "decisions differ at 2." in said
     assert "then: start perception.zed_depthmap at 2." in said

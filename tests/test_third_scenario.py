@@ -14,7 +14,7 @@ import pytest
 ALULA_ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ALULA_ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
 LIMIT_S = 250.0
-OWN = ("setup", "scenarios", "ros2_ws", "ros1_ws")
+OWN = ("setup", "scenarios", "missions", "ros1_ws")
 """What is no link: what is added to, and the folder above it; and the scripts that find the checkout by where they are."""
 
 
@@ -42,11 +42,11 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (root / entry.name).symlink_to(entry)
     shutil.copytree(ALULA_ROOT / "setup", root / "setup")
     shutil.copytree(ALULA_ROOT / "scenarios", root / "scenarios")
-    for world, package in (("ros2_ws", "uav_missions"), ("ros1_ws", "uav_bringup")):
-        link_all(ALULA_ROOT / world, root / world, but="src")
-        link_all(ALULA_ROOT / world / "src", root / world / "src", but=package)
-        shutil.copytree(ALULA_ROOT / world / "src" / package, root / world / "src" / package)
-    (root / "ros2_ws/src/uav_missions/uav_missions/patrol.py").write_text(block(2), encoding="utf-8")
+    shutil.copytree(ALULA_ROOT / "missions", root / "missions")
+    link_all(ALULA_ROOT / "ros1_ws", root / "ros1_ws", but="src")
+    link_all(ALULA_ROOT / "ros1_ws/src", root / "ros1_ws/src", but="uav_bringup")
+    shutil.copytree(ALULA_ROOT / "ros1_ws/src/uav_bringup", root / "ros1_ws/src/uav_bringup")
+    (root / "missions/patrol.xml").write_text(block(2), encoding="utf-8")
     launch = root / "ros1_ws/src/uav_bringup/launch"
     text = (launch / "mapping.launch").read_text(encoding="utf-8")
     for name in ("scenario", "skillsets"):

@@ -4,13 +4,12 @@ import json
 import xml.etree.ElementTree as ET
 
 import pytest
-from uav_missions_fakes import World, clients, make_blackboard
+from uav_missions_fakes import FakeClient, World, make_mission
 
 from alula.missions.director import EXIT_CODES, Director, Outcome
 from alula.missions.drawing import draw
 from alula.missions.pausing import PauseRefusedError
 from alula.model.execution_state import ExecutionState
-from uav_missions.mapping import MappingMission, conditions
 
 READY = {
     "SDK_authority": "AVAILABLE",
@@ -22,9 +21,7 @@ READY = {
 
 
 def make(world: World) -> Director:
-    blackboard = make_blackboard(world)
-    skillsets = clients(world)
-    return Director(MappingMission(skillsets, blackboard), blackboard, start_timeout_s=60.0)
+    return Director(*make_mission(world), start_timeout_s=60.0)
 
 
 def run(director: Director, world: World, until=lambda: False, limit_s: float = 200.0) -> None:
@@ -62,9 +59,9 @@ def test_each_condition_of_the_start_counts(resource, state):
 
 
 def unmet(world: World, **reasons: str) -> list[str]:
-    blackboard = make_blackboard(world)
-    blackboard.reasons.update({name.replace("__", "."): reason for name, reason in reasons.items()})
-    return [one.unmet for one in conditions(clients(world), blackboard) if one.unmet]
+    mission, memory = make_mission(world)
+    memory.reasons.update({name.replace("__", "."): reason for name, reason in reasons.items()})
+    return [one.unmet for one in mission.conditions() if one.unmet]
 
 
 def test_a_missing_driver_is_named():
@@ -76,9 +73,8 @@ def test_a_missing_driver_is_named():
 
 def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():
     world = World(resources=dict(READY))
-    skillsets = clients(world)
-    skillsets.mapping.ready = False
-    every = conditions(skillsets, make_blackboard(world))
+    mission, _ = make_mission(world, mapping=FakeClient("mapping", world, ready=False))
+    every = mission.conditions()
     assert [one.unmet for one in every if one.unmet] == ["the skillset mapping can't be called"]
     assert [one.needed for one in every] == [
         *(f"the skillset {name} answers" for name in ("navigation", "perception", "mapping")),
@@ -180,11 +176,11 @@ def test_the_drawing_shows_every_node_in_the_signs_of_the_paper():
     root = ET.fromstring(svg)  # noqa: S314 - our own
     space = "{http://www.w3.org/2000/svg}"
     texts = [element.text for element in root.iter(f"{space}text")]
-    assert sum(text == "? navigate" for text in texts) == 1
+    assert sum(text == "? navigate (Fallback)" for text in texts) == 1
     assert "take off (takeoff)" in texts
     nodes = list(view.walk())
     shapes = [element for element in root.iter() if element.tag in {f"{space}rect", f"{space}polygon"}]
-    legend_and_background = 8
+    legend_and_background = len({view.kind for view in nodes}) + 1
     assert len(shapes) == len(nodes) + legend_and_background
     trapeziums = [element for element in shapes if element.tag == f"{space}polygon"]
     assert len(trapeziums) == sum(view.kind == "parallel" for view in nodes) + 1

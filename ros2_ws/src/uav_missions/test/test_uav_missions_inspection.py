@@ -14,18 +14,16 @@ from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
 from alula.missions.plan import plan_of
-from alula.model.model import ResultKind
 from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent
-from alula.runtime.mock import Behaviour, load_behaviour
-from uav_missions.inspection import plan
-from uav_missions.mapping import plan as mapping_plan
+from alula.runtime.mock import load_behaviour
 from uav_missions.route import inputs_of, route_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
-SCENARIO = load_scenario("inspection", ALULA_ROOT / "scenarios")
+SCENARIO = load_scenario("inspection")
 WORLD = ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/building.yaml"
 INPUTS = inputs_of(WORLD)
+PLAN = plan_of(SCENARIO, INPUTS)
 ROUTE = route_of(INPUTS).waypoints
 SKILLSETS = robot_skillsets(SCENARIO.skillsets)
 BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets()).of(frozenset(SCENARIO.skillsets))
@@ -33,7 +31,7 @@ BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skill
 
 def fly(*faults: str, seed: int = 0, tick_period_s: float = 0.1) -> MockedMission:
     requests: list[FaultRequest] = [parse_fault(fault) for fault in faults]
-    mission = MockedMission(SKILLSETS, BEHAVIOUR, plan(INPUTS), faults=requests, seed=seed, tick_period_s=tick_period_s)
+    mission = MockedMission(SKILLSETS, BEHAVIOUR, PLAN, faults=requests, seed=seed, tick_period_s=tick_period_s)
     mission.end = mission.run()
     return mission
 
@@ -49,20 +47,8 @@ def on_ground(mission: MockedMission) -> bool:
     return mission.state("navigation", "flight_status") == "ON_GROUND"
 
 
-@pytest.mark.parametrize("plan_of_mission", [plan, mapping_plan])
-def test_leaves_take_for_success_what_the_models_call_so(plan_of_mission):
-    mission = MockedMission(robot_skillsets(), Behaviour(), plan_of_mission(INPUTS))
-    models = {skillset.name: skillset for skillset in robot_skillsets()}
-    assert len(mission._leaves) > 5
-    for leaf, _ in mission._leaves:
-        skill = models[leaf.client.skillset].skill(leaf.skill)
-        successes = {one.name for one in skill.results if skill.kind_of(one.name) is ResultKind.SUCCESS}
-        assert (leaf.skill_name, leaf._success) == (leaf.skill_name, successes)
-
-
-def test_the_scenario_names_this_mission():
-    assert plan_of(SCENARIO, INPUTS).scenario == "inspection"
-    assert plan_of(SCENARIO, INPUTS).skillsets == SCENARIO.skillsets
+def test_the_plan_has_the_scenarios_name_and_skillsets():
+    assert (PLAN.scenario, PLAN.skillsets) == ("inspection", SCENARIO.skillsets)
 
 
 def test_a_nominal_flight_goes_all_around_with_the_nose_to_the_walls():
@@ -156,7 +142,7 @@ def test_without_a_ground_station_the_drone_does_not_take_off():
 def test_an_encoder_that_was_never_heard_of_is_named_and_not_the_radio_alone():
     link = ("video", "link")
     silent = replace(BEHAVIOUR, timeline=tuple(event for event in BEHAVIOUR.timeline if link not in event.states))
-    end = MockedMission(SKILLSETS, silent, plan(INPUTS)).run()
+    end = MockedMission(SKILLSETS, silent, PLAN).run()
     assert end.outcome is Outcome.NOT_STARTED
     assert "neither the video encoder nor the ground station" in end.reason
 

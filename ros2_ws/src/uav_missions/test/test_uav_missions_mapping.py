@@ -6,10 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from py_trees.common import Status
-from uav_missions_fakes import SQUARE, State, World, clients, make_blackboard
-
-from alula.missions.leaves import SkillLeaf
-from uav_missions.mapping import MappingMission
+from uav_missions_fakes import SQUARE, State, World, make_mission
 
 
 class Flight:
@@ -17,8 +14,7 @@ class Flight:
 
     def __init__(self, world: World, waypoints=SQUARE) -> None:
         self.world = world
-        self.blackboard = make_blackboard(world, waypoints)
-        self.mission = MappingMission(clients(world), self.blackboard)
+        self.mission, self.blackboard = make_mission(world, waypoints)
 
     def tick(self) -> Status:
         self.mission.root.tick_once()
@@ -369,25 +365,6 @@ def test_stopping_the_tree_and_landing_is_what_an_abort_does():
     assert flight.world.starts()[-2:] == ["hover", "land"]
     assert not flight.world.conflicts
     assert not flight.world.running()
-
-
-def test_a_leaf_that_is_left_asks_once_for_the_end_of_its_execution():
-    world = World(interrupt_takes_s=1.0)
-    leaf = SkillLeaf("watch", clients(world).perception, "zed_depthmap", {}, blackboard=make_blackboard(world))
-    leaf.tick_once()
-    world.pass_time()
-    leaf.stop(Status.INVALID)
-    leaf.stop(Status.INVALID)
-    assert world.log.count(("interrupt", "zed_depthmap")) == 1
-
-
-def test_inputs_may_be_read_from_the_blackboard_at_the_start():
-    world = World()
-    blackboard = make_blackboard(world)
-    leaf = SkillLeaf("go", clients(world).navigation, "goto", lambda board: {"target": board.waypoint}, blackboard=blackboard)
-    blackboard.waypoint = (1.0, 2.0, 3.0)
-    leaf.tick_once()
-    assert world.handles[0].inputs == {"target": (1.0, 2.0, 3.0)}
 
 
 RESULTS = ["ARRIVED", "AT_ALTITUDE", "ALIGNED", "BLOCKED", "ABORTED", "LOST", "FAILED", "DONE", "LANDED", None]

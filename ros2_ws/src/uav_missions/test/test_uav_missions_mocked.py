@@ -16,17 +16,19 @@ import pytest
 from alula.commands import run as over_mocks
 from alula.common.faults import FaultRequest
 from alula.common.record import BLACKBOARD, DECISIONS, EVENTS, MISSION, REPORTS, TREE, read_record
+from alula.common.scenarios import load_scenario
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
+from alula.missions.plan import plan_of
 from alula.records.models import robot_skillsets
 from alula.runtime.core import ExecutionEvent
 from alula.runtime.mock import load_behaviour
-from uav_missions.mapping import plan as mapping_plan
 from uav_missions.route import inputs_of, route_of
 
 ALULA_ROOT = Path(__file__).resolve().parents[4]
 INPUTS = inputs_of(ALULA_ROOT / "ros1_ws/src/uav_simulator/worlds/yard.yaml")
 ROUTE = route_of(INPUTS).waypoints
+PLAN = plan_of(load_scenario("mapping"), INPUTS)
 SKILLSETS = robot_skillsets(("navigation", "perception", "mapping"))
 BEHAVIOUR = load_behaviour([ALULA_ROOT / "skillsets/uav/mock.yaml"], robot_skillsets()).of(frozenset(s.name for s in SKILLSETS))
 
@@ -54,7 +56,7 @@ SIDE_BY_SIDE = {"zed_depthmap", "lidar_mapping"}  # two skillsets are asked in o
 
 
 def make(*faults: FaultRequest, **options) -> MockedMission:
-    return MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(INPUTS), faults=faults, **options)
+    return MockedMission(SKILLSETS, BEHAVIOUR, PLAN, faults=faults, **options)
 
 
 def landed(mission: MockedMission) -> bool:
@@ -145,7 +147,7 @@ def test_a_campaign_always_comes_to_an_end_and_down():
     for seed in range(100):
         chance = random.Random(seed)  # noqa: S311 - no secret
         faults = [FaultRequest(name, begin_s=chance.uniform(0.0, 110.0)) for name in chance.sample(["zed", "lidar"], chance.randint(0, 2))]
-        mission = MockedMission(SKILLSETS, troubles, mapping_plan(INPUTS), faults=faults, seed=seed, tick_period_s=1.0)
+        mission = MockedMission(SKILLSETS, troubles, PLAN, faults=faults, seed=seed, tick_period_s=1.0)
         outcomes[mission.run().outcome] += 1
         assert landed(mission), seed
         assert mission.open_executions == [], seed
@@ -204,7 +206,7 @@ def test_a_flight_without_eyes_ends_1_and_leaves_its_record(tmp_path):
 
 def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
     (tmp_path / "skills.mcap").symlink_to("/dev/full")
-    assert MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(INPUTS), out=tmp_path).run().outcome is Outcome.ACCOMPLISHED
+    assert MockedMission(SKILLSETS, BEHAVIOUR, PLAN, out=tmp_path).run().outcome is Outcome.ACCOMPLISHED
     mission = json.loads((tmp_path / "mission.json").read_text())
     assert mission["outcome"] == "accomplished"
     assert mission["problems"] == ["skills.mcap ends early: No space left on device"]
@@ -213,7 +215,7 @@ def test_a_full_disk_ends_the_record_and_not_the_flight(tmp_path):
 def test_a_folder_that_goes_away_in_flight_does_not_end_it(tmp_path):
     out = tmp_path / "run"
     out.mkdir()
-    mission = MockedMission(SKILLSETS, BEHAVIOUR, mapping_plan(INPUTS), out=out)
+    mission = MockedMission(SKILLSETS, BEHAVIOUR, PLAN, out=out)
     mission.world.clock.after(20.0, lambda: shutil.rmtree(out))
     assert mission.run().outcome is Outcome.ACCOMPLISHED
     assert not out.exists()

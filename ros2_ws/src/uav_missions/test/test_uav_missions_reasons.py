@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
-from uav_missions_fakes import World, make_blackboard
+from uav_missions_fakes import World, make_memory
 
 from alula.missions.blackboard import Failure
 from alula.model.execution_state import ExecutionState
@@ -27,7 +27,7 @@ def state(**changes: object) -> SimpleNamespace:
     ],
 )
 def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, words):
-    blackboard = make_blackboard(World())
+    blackboard = make_memory(World())
     authority = AuthorityReasons(blackboard)
     authority.note(told)
     authority.note(state(authority=True))
@@ -37,7 +37,7 @@ def test_a_lost_authority_is_told_with_its_cause_also_when_it_comes_back(told, w
 
 
 def test_the_cause_of_a_lost_authority_stays_told_after_a_landing():
-    blackboard = make_blackboard(World())
+    blackboard = make_memory(World())
     authority = AuthorityReasons(blackboard)
     blackboard.failures.append(LOST)
     blackboard.note_reason()
@@ -48,7 +48,7 @@ def test_the_cause_of_a_lost_authority_stays_told_after_a_landing():
 
 
 def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
-    blackboard = make_blackboard(World())
+    blackboard = make_memory(World())
     authority = AuthorityReasons(blackboard)
     authority.note(state(landed_state=1, ready=False, mode="STABILIZE"))
     authority.note(state(landed_state=1, authority=True, mode="GUIDED"))
@@ -60,7 +60,7 @@ def test_an_autopilot_that_restarts_leaves_the_guidance_in_command():
 
 @pytest.mark.parametrize("silent", [False, True])
 def test_an_autopilot_that_restarts_in_the_air_is_not_told_as_one_that_stands(silent):
-    blackboard = make_blackboard(World())
+    blackboard = make_memory(World())
     authority = AuthorityReasons(blackboard)
     authority.note(state(landed_state=1, authority=True, mode="GUIDED"))
     authority.note(state(authority=True, mode="GUIDED"))
@@ -74,7 +74,7 @@ def test_an_autopilot_that_restarts_in_the_air_is_not_told_as_one_that_stands(si
 
 @pytest.mark.parametrize("pilot", [False, True])
 def test_after_a_landing_a_vehicle_that_stands_is_told_as_one(pilot):
-    blackboard = make_blackboard(World())
+    blackboard = make_memory(World())
     authority = AuthorityReasons(blackboard)
     authority.note(state(authority=True, mode="GUIDED"))
     authority.note(state(landed_state=1, authority=not pilot, mode="LAND"))
@@ -85,7 +85,7 @@ def test_after_a_landing_a_vehicle_that_stands_is_told_as_one(pilot):
 
 
 def test_other_failures_are_told_without_it():
-    blackboard = make_blackboard(World())
+    blackboard = make_memory(World())
     AuthorityReasons(blackboard).note(state())
     note_health(blackboard, "perception.zed_status", SimpleNamespace(reason="no images"))
     blackboard.failures.append(Failure("watch", "perception.zed_depthmap", ExecutionState.TERMINATED, "LOST", ""))

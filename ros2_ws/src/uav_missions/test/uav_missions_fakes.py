@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from alula.common.scenarios import load_scenario
+from alula.missions.director import Mission
 from alula.missions.pending import PendingInterrupts
+from alula.missions.plan import MissionPlan, plan_of
 from alula.model.execution_state import ExecutionState as State
 from alula.runtime.handle import SkillHandle
 from alula.runtime.waiting import Pending
-from uav_missions.blackboard import RouteBlackboard
-from uav_missions.mapping import Clients
-from uav_missions.route import Route
+from uav_missions.nodes import DroneMemory
 
 SQUARE = [(0.0, 0.0, 3.0), (10.0, 0.0, 3.0), (10.0, 8.0, 3.0)]
 
@@ -172,9 +174,20 @@ class FakeClient:
         return self.world.start(skill, inputs)
 
 
-def clients(world: World) -> Clients:
-    return Clients(FakeClient("navigation", world), FakeClient("perception", world), FakeClient("mapping", world))
+def clients(world: World) -> dict[str, FakeClient]:
+    return {name: FakeClient(name, world) for name in ("navigation", "perception", "mapping")}
 
 
-def make_blackboard(world: World, waypoints=SQUARE) -> RouteBlackboard:
-    return RouteBlackboard(clock_ns=world.clock_ns, route=Route(waypoints), pending=PendingInterrupts(world.clock_ns))
+@functools.cache
+def mapping_plan(waypoints: tuple[tuple[float, float, float], ...]) -> MissionPlan:
+    return plan_of(load_scenario("mapping"), {"route": [list(waypoint) for waypoint in waypoints]})
+
+
+def make_mission(world: World, waypoints=SQUARE, **skillsets: FakeClient) -> tuple[Mission, DroneMemory]:
+    """Return the mapping mission of its file, and its memory."""
+    plan = mapping_plan(tuple(waypoints))
+    return plan.make(clients(world) | skillsets, world.clock_ns, plan.parameters)
+
+
+def make_memory(world: World) -> DroneMemory:
+    return DroneMemory(clock_ns=world.clock_ns, pending=PendingInterrupts(world.clock_ns))
