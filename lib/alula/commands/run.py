@@ -63,7 +63,8 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
     flights = load_flights(given.scenario, given.behaviour, world=given.world)
     faults = [parse_fault(text) for text in given.fail]
     flights.check(faults)
-    world, plan, groot = world_file(flights.scenario, given.world), flights.plan, groot_address(given.groot, flights.scenario)
+    groot = groot_address(given.groot, flights.scenario)
+    world, plan = world_file(flights.scenario, given.world), flights.plan
     out.mkdir(parents=True, exist_ok=True)
     spec = RunSpec(
         scenario=given.scenario,
