@@ -45,10 +45,10 @@ class Trees:
         self._trees: list[tuple[float, list[Node]]] = []
 
     def add(self, t_s: float, shape: Sequence[Sequence[object]]) -> None:
-        """Take a tree of another shape: of each node, top to bottom, depth, kind, name and skill."""
+        """Take a tree of another shape: of each node, top to bottom, depth, kind, name and skill first."""
         nodes: list[Node] = []
         above: dict[int, Node] = {}
-        for depth, kind, name, skill in shape:
+        for depth, kind, name, skill, *_ in shape:
             level = int(str(depth))
             node = Node(str(kind), str(name), str(skill), above.get(level - 1))
             if node.parent is not None:
