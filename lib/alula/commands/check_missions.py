@@ -6,46 +6,47 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import RobotError, find_robot
-from alula.language.errors import Diagnostic, Severity, has_errors
-from alula.language.models import ModelFile, check_files, models_in
+from alula.language.errors import Diagnostic, Severity
+from alula.language.models import ModelFile
 from alula.missions.check.findings import findings_of
+from alula.missions.filed.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.trees.document import read_source
 from alula.trees.errors import FileError
 
 SUFFIX = ".xml"
+COMMAND = "alula check"
 
 
 def check_missions(paths: Sequence[str], palettes: Sequence[str]) -> list[ModelFile]:
     """Return each mission with its findings; what can't be read is told on standard error, too, in one line."""
-    skillsets = _skillsets() if paths else ()
-    return [_checked(path, skillsets, [Path(palette) for palette in palettes]) for path in paths]
+    if not paths:
+        return []
+    skillsets, part = _robot()
+    return [_checked(path, skillsets, [Path(palette) for palette in palettes], part) for path in paths]
 
 
-def _skillsets() -> tuple[Skillset, ...]:
-    """Return the models of the robot, none where there is no robot: a foreign tree has its palette."""
+def _robot() -> tuple[tuple[Skillset, ...], MissionPart]:
+    """Return what is known of the robot, nothing where there is none: a foreign tree has its palette."""
     try:
-        folder = find_robot().skillsets
+        robot = find_robot()
     except RobotError as error:
-        sys.stderr.write(f"alula check: no skills are known: {error}\n")
-        return ()
-    files = check_files(models_in(str(folder)))
-    for file in files:
-        if has_errors(file.findings):
-            sys.stderr.write(f"alula check: {file.path} has errors; `alula check {file.path}` shows them\n")
-    return tuple(skillset for file in files for skillset in file.skillsets)
+        sys.stderr.write(f"{COMMAND}: no skills are known: {error}\n")
+        return (), NO_PART
+    return models_of(robot, COMMAND), part_of(robot, COMMAND)
 
 
-def _checked(path: str, skillsets: Sequence[Skillset], palettes: Sequence[Path]) -> ModelFile:
+def _checked(path: str, skillsets: Sequence[Skillset], palettes: Sequence[Path], part: MissionPart) -> ModelFile:
     file = ModelFile(path)
     try:
-        file.findings = findings_of(path, read_source(Path(path)), skillsets, palettes)
+        file.findings = findings_of(path, read_source(Path(path)), skillsets, palettes, part)
     except FileError as error:
         file.findings = [Diagnostic("ALU001", error.problem.message, Span(path, 0, 0, 0))]
     for finding in file.findings:
         if finding.code.startswith("ALU0") and finding.severity is Severity.ERROR:
             cure = f"; {finding.hint}" if finding.hint else ""
-            sys.stderr.write(f"alula check: {finding.span if finding.span.line else path}: {finding.message}{cure}\n")
+            sys.stderr.write(f"{COMMAND}: {finding.span if finding.span.line else path}: {finding.message}{cure}\n")
     return file

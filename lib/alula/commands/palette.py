@@ -8,19 +8,26 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
 
+from alula.commands.mission_robot import part_of
+from alula.common.robots import RobotError, find_robot
 from alula.language.errors import LanguageError, has_errors
 from alula.language.models import ModelFile, check_files, models_in
-from alula.missions.skill_types import resource_type, skill_type
+from alula.missions.filed.palette import mission_palette
+from alula.missions.filed.part import NO_PART, MissionPart
 from alula.trees.groot.tree_xml import model_xml
 from alula.trees.palette import NodeType
+from alula.trees.standard import standard_palette
 
+COMMAND = "alula palette"
 WRONG = 2
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Write the palette to the standard output; return the exit code."""
-    parser = argparse.ArgumentParser(prog="alula palette", description="Write a robot's skills as a TreeNodesModel for Groot2.")
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Write a robot's skills as a TreeNodesModel for Groot2.")
     parser.add_argument("folder", metavar="FOLDER", help="the robot's models, as skillsets/uav")
     given = parser.parse_args(words)
     try:
@@ -33,15 +40,31 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def robot_types(folder: str) -> Iterator[NodeType]:
-    """Yield the types of node of a folder of models; raises LanguageError."""
+    """Yield the types of node that missions over a folder of models have, but for BehaviorTree.CPP's; raises LanguageError."""
     files = check_files(models_in(folder))
     for file in files:
         if has_errors(file.findings):
             raise LanguageError(file.findings)
-    for file in files:
-        for skillset in file.skillsets:
-            yield from (skill_type(skillset.name, skill, told_above(file, skill.span.line)) for skill in skillset.skills)
-            yield from (resource_type(skillset.name, resource) for resource in skillset.resources)
+    skillsets = [skillset for file in files for skillset in file.skillsets]
+    told = {
+        f"{skillset.name}.{skill.name}": told_above(file, skill.span.line)
+        for file in files
+        for skillset in file.skillsets
+        for skill in skillset.skills
+    }
+    known = standard_palette().names()  # Groot2 has these itself
+    for one in mission_palette(skillsets, _part(folder)):
+        if one.name not in known:
+            yield replace(one, doc=told.get(one.name, one.doc))
+
+
+def _part(folder: str) -> MissionPart:
+    """Return what the robot adds whose models a folder holds; nothing for models without a robot."""
+    try:
+        robot = find_robot(Path(folder))
+    except RobotError:
+        return NO_PART
+    return part_of(robot, COMMAND)
 
 
 def told_above(file: ModelFile, line: int) -> str:

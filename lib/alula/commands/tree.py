@@ -11,16 +11,19 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from alula.commands.mission_robot import models_of, part_of
 from alula.common.files import write_text
+from alula.common.robots import RobotError, find_robot
+from alula.missions.check.mission import palette_for
 from alula.missions.drawing import draw, drawn_as_text
-from alula.trees import nav2
+from alula.missions.filed.part import NO_PART
 from alula.trees.answers import Answers, AnswersError, StepClock, read_answers, scripted_tree, ticks
 from alula.trees.errors import TreeError
 from alula.trees.palette import Palette
-from alula.trees.reading import TreeFiles, read_files, read_models
-from alula.trees.standard import standard_palette
+from alula.trees.reading import TreeFiles, read_files
 from alula.trees.view import view_of
 
+COMMAND = "alula tree"
 WRONG = 2
 DEFAULT_TICKS = 10
 
@@ -31,12 +34,12 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         return run(given)
     except (AnswersError, TreeError, OSError) as error:
-        sys.stderr.write(f"alula tree: {error}\n")
+        sys.stderr.write(f"{COMMAND}: {error}\n")
         return WRONG
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="alula tree", description="Draw a mission; with answers tick it without any robot.")
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Draw a mission; with answers tick it without any robot.")
     parser.add_argument("file", type=Path, metavar="FILE", help="a mission: BehaviorTree.CPP 4's XML")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="write the drawing there, too")
     parser.add_argument(
@@ -68,11 +71,12 @@ def run(given: argparse.Namespace) -> int:
 
 
 def palette(files: TreeFiles, more: Sequence[Path]) -> Palette:
-    """Return the types of node that there are: of the file, of palettes, BehaviorTree.CPP's and Nav2's own; raises TreeError."""
-    known = Palette([*files.declared(), *(one for path in more for one in read_models(path))])
-    for own in (standard_palette(), nav2.palette()):
-        known |= own
-    return known
+    """Return the types of node that there are: a mission's of the robot around, of the file, of palettes; raises TreeError."""
+    try:
+        robot = find_robot()
+    except RobotError:
+        return palette_for(files, (), more, NO_PART)  # a tree of others needs none
+    return palette_for(files, models_of(robot, COMMAND), more, part_of(robot, COMMAND))
 
 
 if __name__ == "__main__":

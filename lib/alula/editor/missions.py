@@ -10,12 +10,14 @@ from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.check.findings import findings_of
-from alula.missions.check.skills import FUNCTIONS, Skills, palette_of
+from alula.missions.check.skills import Skills
+from alula.missions.filed.palette import mission_palette
+from alula.missions.filed.part import NO_PART, MissionPart
+from alula.missions.filed.world import FUNCTIONS
 from alula.missions.skill_types import SUCCESS_PORT
 from alula.model.model import ResultKind, Skill
-from alula.trees.palette import NodeType, Palette
+from alula.trees.palette import NodeType
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
-from alula.trees.standard import standard_palette
 
 SUFFIX = ".xml"
 _TAG = re.compile(r"<([\w.]*)$")
@@ -37,7 +39,8 @@ class Missions:
     def checked(self, path: str, text: str) -> ModelFile:
         """Return a mission with its findings."""
         file = ModelFile(path, text)
-        file.findings = findings_of(path, text.encode("utf-8", "replace"), self.skills(path).skillsets.values())
+        skillsets = tuple(self.skills(path).skillsets.values())
+        file.findings = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=part_around(path))
         return file
 
     def skills(self, path: str) -> Skills:
@@ -55,7 +58,7 @@ class Missions:
         """Return what may stand at a place."""
         lines = file.text.split("\n")[: place.line]
         before = "\n".join([*lines[:-1], lines[-1][: place.column - 1]]) if lines else ""
-        return list(_candidates(before, self.skills(file.path)))
+        return list(_candidates(before, self.skills(file.path), part_around(file.path)))
 
     def description(self, file: ModelFile, place: Place) -> tuple[str, int, int] | None:
         """Return what the name at a place stands for, with its first column and the one behind it; None where nothing is known."""
@@ -67,8 +70,16 @@ class Missions:
         return None
 
 
-def _candidates(before: str, skills: Skills) -> Iterator[Completion]:
-    types = Palette([*palette_of(skills), *standard_palette()])
+def part_around(path: str) -> MissionPart:
+    """Return what the robot whose folder a file lies in adds to missions; nothing where there is no robot, or it can't be imported."""
+    try:
+        return find_robot(Path(path).parent).part("missions") or NO_PART
+    except RobotError:
+        return NO_PART
+
+
+def _candidates(before: str, skills: Skills, part: MissionPart) -> Iterator[Completion]:
+    types = mission_palette(tuple(skills.skillsets.values()), part)
     if _TAG.search(before):
         yield from (Completion(one.name, "skill" if skills.get(one.name) else "keyword", one.doc) for one in types)
         return
@@ -106,13 +117,13 @@ def _in_script(text: str, skills: Skills) -> Iterator[Completion]:
         resource = skills.skillsets[compared[1]].resource_index.get(compared[2])
         yield from (Completion(state, "state") for state in (resource.states if resource else ()))
     elif called and called[1] in FUNCTIONS:
-        yield from (Completion(name, "skill") for name in sorted(skills.names[FUNCTIONS[called[1]]]))
+        yield from (Completion(name, "skill") for name in sorted(skills.names[FUNCTIONS[called[1]].kind]))
     elif member and member[1] in skills.skillsets:
         skillset = skills.skillsets[member[1]]
         yield from (Completion(name, "resource") for name in skillset.resource_index)
         yield from (Completion(name, "data") for name in skillset.data_index)
     else:
-        yield from (Completion(f"{name}(", "keyword", f"of a {kind}") for name, kind in FUNCTIONS.items())
+        yield from (Completion(f"{name}(", "keyword", f"of a {one.kind}") for name, one in FUNCTIONS.items())
         yield from (Completion(name, "resource") for name in sorted(skills.names["resource"]))
 
 

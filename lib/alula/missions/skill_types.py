@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 from alula.language.syntax.elements import told_unit
 from alula.model.model import Parameter, Resource, ResultKind, Skill
-from alula.model.ros_types import PRIMITIVES
 from alula.trees.palette import Category, Direction, NodeType, Port, node_type
-from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, UINT, PortType, shown
+from alula.trees.values import ANY, BOOL, DOUBLE, INT, SIZED, STRING, UINT, PortType, shown
 
 SUCCESS_PORT = "success"
 OUTCOME_PORT = "outcome"
 STATE_PORT = "state"
 SEPARATOR = ";"
 """Between the results that a port names."""
-PYTHON_TYPES = {"bool": BOOL, "int": INT, "float": DOUBLE, "str": STRING}
+PORT_TYPES = {"bool": BOOL, "int32": INT, "uint32": UINT, "float32": DOUBLE, "float64": DOUBLE, "string": STRING, **SIZED}
+"""Types of ports for primitive types of the models."""
 
 
 def skill_type(skillset: str, skill: Skill, doc: str = "") -> NodeType:
@@ -49,10 +49,7 @@ def _port(parameter: Parameter, direction: Direction) -> Port:
 
 def type_of(name: str) -> PortType:
     """Return the type of a port for a type of the models; what is no primitive has its name and takes any value but text."""
-    if name.startswith("uint"):
-        return UINT
-    python = PRIMITIVES.get(name)
-    return PYTHON_TYPES[python] if python else PortType(name, _no_text(name), ANY.cast)
+    return PORT_TYPES.get(name) or PortType(name, _no_text(name), ANY.cast)
 
 
 def _no_text(name: str) -> Callable[[str], object]:

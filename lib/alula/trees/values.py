@@ -114,7 +114,13 @@ BOOL = PortType("bool", _parse_bool, truth)
 STRING = PortType("std::string", str, as_text)
 STATUS = PortType("BT::NodeStatus", _parse_status, _cast_status)
 ANY = PortType("BT::AnyTypeAllowed", _same, _same)
-TYPES = {one.name: one for one in (INT, UINT, DOUBLE, BOOL, STRING, STATUS, ANY)}
+SIZED = {
+    **{f"int{bits}": whole(f"int{bits}", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 64)},
+    **{f"uint{bits}": whole(f"uint{bits}", 0, 2**bits - 1) for bits in (8, 16, 64)},
+}
+"""Whole numbers of other sizes than C's ``int``."""
+NUMBERS = (INT, UINT, DOUBLE, BOOL, *SIZED.values())
+TYPES = {one.name: one for one in (*NUMBERS, STRING, STATUS, ANY)}
 
 
 def list_of(item: PortType) -> PortType:

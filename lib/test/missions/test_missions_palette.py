@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -34,6 +35,13 @@ skillset arm {
 }
 """
 
+NODES = """
+from alula.missions.filed.part import MissionPart
+from alula.trees.nodes.leaves import AlwaysSuccess
+
+PART = MissionPart((("arm.Choose", AlwaysSuccess),))
+"""
+
 
 @pytest.fixture
 def written(tmp_path, capsys):
@@ -44,8 +52,9 @@ def written(tmp_path, capsys):
 
 def test_skills_are_actions_and_resources_conditions(written):
     model = ET.fromstring(written).find("TreeNodesModel")  # noqa: S314 - our own
-    assert [(one.tag, one.get("ID")) for one in model] == [("Action", "arm.grip"), ("Condition", "arm.hand")]
-    ports = [(port.tag, port.get("name"), port.get("type"), port.get("default"), port.text) for port in model[0] if port.get("name")]
+    assert [(one.tag, one.get("ID")) for one in model if "." in one.get("ID")] == [("Action", "arm.grip"), ("Condition", "arm.hand")]
+    grip, hand = model.find("*[@ID='arm.grip']"), model.find("*[@ID='arm.hand']")
+    ports = [(port.tag, port.get("name"), port.get("type"), port.get("default"), port.text) for port in grip if port.get("name")]
     assert ports == [
         ("input_port", "at", "Pose", None, "where the thing is"),
         ("input_port", "force", "double", None, "N, > 0"),
@@ -54,15 +63,30 @@ def test_skills_are_actions_and_resources_conditions(written):
         ("input_port", "success", "std::string", "HELD", "results that mean success, of HELD, DROPPED"),
         ("output_port", "outcome", "std::string", None, "why it ended: its result, or how it failed"),
     ]
-    assert model[0].find("MetadataFields/Metadata").get("description") == "Close the hand about a thing, as gently as can be."
-    assert [(port.get("name"), port.text) for port in model[1] if port.get("name")] == [("state", "one of OPEN, CLOSED")]
+    assert grip.find("MetadataFields/Metadata").get("description") == "Close the hand about a thing, as gently as can be."
+    assert [(port.get("name"), port.text) for port in hand if port.get("name")] == [("state", "one of OPEN, CLOSED")]
 
 
 def test_it_reads_back_as_a_palette(written, tmp_path):
     (tmp_path / "nodes.xml").write_text(written)
     types = read_models(tmp_path / "nodes.xml")
-    assert types.names() == ["arm.grip", "arm.hand"]
+    assert {"arm.grip", "arm.hand"} <= set(types.names())
     assert types.get("arm.grip").ports["success"].default == "HELD"
+
+
+def test_nodes_of_alula_and_of_the_robot_are_in_it_and_those_that_groot_has_are_not(tmp_path, capsys, monkeypatch):
+    (tmp_path / "robot.yaml").write_text("name: robot\nskillsets: models\npython: [code]\nparts: {missions: 'arm_nodes:PART'}\n")
+    (tmp_path / "models").mkdir()
+    (tmp_path / "models" / "arm.skill").write_text(MODEL)
+    (tmp_path / "code").mkdir()
+    (tmp_path / "code" / "arm_nodes.py").write_text(NODES)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    assert palette.main([str(tmp_path / "models")]) == 0
+    model = ET.fromstring(capsys.readouterr().out).find("TreeNodesModel")  # noqa: S314 - our own
+    kinds = {one.get("ID"): one.tag for one in model}
+    assert kinds["arm.Choose"] == "Action"
+    assert (kinds["Until"], kinds["WaitFor"]) == ("Decorator", "Action")
+    assert not {"Sequence", "Script"} & set(kinds)
 
 
 def test_models_that_are_wrong_are_told(tmp_path, capsys):

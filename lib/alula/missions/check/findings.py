@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
 from alula.language.models import ModelFile
 from alula.missions.check.mission import check_mission
+from alula.missions.filed.part import NO_PART, MissionPart
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.trees.errors import FileError, Place, Problem
@@ -18,10 +19,12 @@ _WORD = re.compile(r"""<?[^\s=<>"'/]+""")
 """What a place without a length stands for: a tag, an attribute's name, a value."""
 
 
-def findings_of(path: str, source: bytes, skillsets: Iterable[Skillset], palettes: Sequence[Path] = ()) -> list[Diagnostic]:
+def findings_of(
+    path: str, source: bytes, skillsets: Sequence[Skillset], palettes: Sequence[Path] = (), part: MissionPart = NO_PART
+) -> list[Diagnostic]:
     """Return what is wrong with a mission; what keeps it from being read at all is the only finding then (ALU0..)."""
     try:
-        problems = check_mission(Path(path), source, skillsets, palettes)
+        problems = check_mission(Path(path), source, skillsets, palettes, part)
     except FileError as error:
         problem = error.problem
         code = problem.code if problem.code.startswith("ALU0") else "ALU004"

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from alula.common.suggestions import nearest, quoted
 from alula.missions.check.resources import clash
-from alula.missions.check.skills import FUNCTIONS, Skills, named_results
+from alula.missions.check.skills import Skills, named_results
+from alula.missions.filed.world import FUNCTIONS
 from alula.missions.skill_types import OUTCOME_PORT, SUCCESS_PORT
 from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
@@ -87,10 +88,11 @@ class SkillRules:
 
     def _call(self, attribute: Attribute, node: Call) -> Iterator[Problem]:
         place = (node.offset, node.offset + len(node.function))
-        kind = FUNCTIONS.get(node.function)
-        if kind is None:
+        function = FUNCTIONS.get(node.function)
+        if function is None:
             yield in_value("ALU615", attribute, place, f"there is no function `{node.function}`", nearest(node.function, FUNCTIONS))
             return
+        kind = function.kind
         name = _name_of(node.arguments[0]) if len(node.arguments) == 1 else None
         if name is None and (len(node.arguments) != 1 or isinstance(node.arguments[0], Literal)):
             yield in_value("ALU615", attribute, place, f"`{node.function}` takes one name", f"the name of one {kind}")
@@ -163,7 +165,7 @@ def _deals(parent: Site, child: Site) -> bool:
     return parent.kind not in IN_TURN and parent.kind not in _PASSING
 
 
-_PASSING = frozenset({"SubTree", "Repeat", "Delay", "Timeout", "RunOnce", "Precondition", "SkipUnlessUpdated", "WaitValueUpdate"})
+_PASSING = frozenset({"SubTree", "Repeat", "Until", "Delay", "Timeout", "RunOnce", "Precondition", "SkipUnlessUpdated", "WaitValueUpdate"})
 """Nodes that fail when their child fails; of a node of another one's, nobody knows."""
 
 

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 
-from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT, resource_type, skill_type
+from alula.missions.skill_types import SEPARATOR, SUCCESS_PORT
 from alula.model.model import ResultKind, Skill, Skillset
 from alula.trees.check.sites import Site
 from alula.trees.check.traits import F, PlainTraits, S
 from alula.trees.node import pointer
-from alula.trees.palette import Palette
-
-FUNCTIONS = {"running": "skill", "progress": "skill", "failed_first": "skill", "failed": "end", "reason": "resource"}
-"""What scripts may ask, and what the one name that they ask it of is: an end is a result, a precondition or an invariant."""
 
 
 class Skills:
@@ -91,15 +87,3 @@ class SkillTraits(PlainTraits):
     def endless(self, site: Site) -> bool:
         """Tell whether none of its results is a success."""
         return self._skills.of(site) is not None and not self._skills.successes(site)
-
-
-def palette_of(skills: Skills) -> Palette:
-    """Return skills as actions, and resources as conditions."""
-    return Palette(
-        one
-        for skillset in skills.skillsets.values()
-        for one in (
-            *(skill_type(skillset.name, skill) for skill in skillset.skills),
-            *(resource_type(skillset.name, resource) for resource in skillset.resources),
-        )
-    )

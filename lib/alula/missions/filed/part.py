@@ -18,3 +18,7 @@ class MissionPart:
     nodes: tuple[tuple[str, type[Node]], ...] = ()
     listen: Callable[[Any, Blackboard], None] = hear_nothing
     memory: type[Blackboard] = Blackboard
+
+
+NO_PART = MissionPart()
+"""That of a robot that adds nothing."""

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.conditions import Condition, condition
-from alula.missions.filed.nodes import Needs, mission_nodes
+from alula.missions.filed.nodes import Needs
+from alula.missions.filed.palette import mission_palette
 from alula.missions.filed.part import MissionPart
-from alula.missions.filed.skills import Crew, SkillNode, skill_types
+from alula.missions.filed.skills import Crew, SkillNode
 from alula.missions.filed.world import World, states_of
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import InputError, Inputs, MissionPlan
@@ -25,9 +26,8 @@ from alula.trees.blackboard import Blackboard as TreeBoard
 from alula.trees.errors import TreeError
 from alula.trees.factory import build_tree
 from alula.trees.node import Node
-from alula.trees.palette import Category, Direction, NodeType, Palette, Port, node_type
+from alula.trees.palette import Category, Direction, NodeType, Port, node_type
 from alula.trees.reading import TreeFiles, read_files
-from alula.trees.standard import standard_palette
 from alula.trees.structure import verify
 from alula.trees.tree import Tree
 
@@ -88,15 +88,6 @@ class Maker:
             if isinstance(node, SkillNode):
                 world.leaves.setdefault(node.wiring.type.name, []).append(node)
         return tree
-
-
-def mission_palette(skillsets: Sequence[Skillset], part: MissionPart, crew: Crew | None = None) -> Palette:
-    """Return all that a mission of a robot may be made of."""
-    memory = Blackboard(clock_ns=int, pending=PendingInterrupts(int)) if crew is None else crew.memory
-    palette = standard_palette() | mission_nodes(memory) | skill_types(skillsets, crew)
-    for name, node in part.nodes:
-        palette.register(node, name)
-    return palette
 
 
 def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: Inputs, part: MissionPart) -> MissionPlan:

@@ -8,7 +8,7 @@ from alula.common.robots import find_robot
 from alula.common.scenarios import Scenario
 from alula.language.errors import LanguageError
 from alula.language.load import load_robot
-from alula.missions.filed.part import MissionPart
+from alula.missions.filed.part import NO_PART
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.plan import InputError, Inputs, MissionPlan
 
@@ -27,5 +27,5 @@ def plan_of_mission_file(path: Path, scenario: Scenario, inputs: Inputs) -> Miss
     missing = [name for name in scenario.skillsets if name not in models]
     if missing:
         raise InputError(f"the robot has no skillset '{missing[0]}'")
-    part = robot.part("missions") or MissionPart()
+    part = robot.part("missions") or NO_PART
     return plan_of_file(path, scenario.name, [models[name] for name in scenario.skillsets], inputs, part)

@@ -1,30 +1,19 @@
-"""Leaves that are skills: a type of node for each, with the ports that its model gives it."""
+"""What skills and resources are in a running mission: nodes that call a robot's clients."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.leaves import SkillLeaf
+from alula.missions.skill_types import OUTCOME_PORT, SEPARATOR, STATE_PORT, SUCCESS_PORT, resource_type, skill_type
 from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
-from alula.model.model import Parameter, ResultKind, Skill, Skillset
-from alula.trees.node import Action, Wiring
-from alula.trees.palette import CHILDREN, Category, Direction, NodeType, Palette, Port, input_port, output_port
-from alula.trees.status import IDLE, Answer
-from alula.trees.values import BOOL, DOUBLE, STRING, PortType, whole
-
-NUMBERS: Mapping[str, PortType] = {
-    "float64": DOUBLE,
-    "float32": DOUBLE,
-    "bool": BOOL,
-    "string": STRING,
-    **{f"int{bits}": whole(f"int{bits}", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
-    **{f"uint{bits}": whole(f"uint{bits}", 0, 2**bits - 1) for bits in (8, 16, 32, 64)},
-}
-SUCCESS_PORT = "success"
-OUTCOME_PORT = "outcome"
+from alula.model.model import Resource, Skill, Skillset
+from alula.trees.node import Action, Condition, Wiring
+from alula.trees.palette import NodeType, Palette
+from alula.trees.status import FAILURE, IDLE, SUCCESS, Answer
 
 
 @dataclass(frozen=True)
@@ -50,7 +39,7 @@ class SkillNode(Action):
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         client = self.crew.clients[self.skillset]
-        success = str(self.get(SUCCESS_PORT)).split(";") if self.given(SUCCESS_PORT) else successes(self.model)
+        success = str(self.get(SUCCESS_PORT)).split(SEPARATOR)
         self.leaf: SkillLeaf[Blackboard] = SkillLeaf(
             self.name, client, self.model.name, self._inputs, blackboard=self.crew.memory, success=frozenset(success) - {""}
         )
@@ -67,6 +56,8 @@ class SkillNode(Action):
         handle = self.leaf.handle
         if handle is not None and handle.done:
             self.put(OUTCOME_PORT, handle.result or handle.state.value)
+            for name, value in handle.outputs.items():
+                self.put(name, value)
         return answer
 
     def on_halted(self) -> None:
@@ -89,41 +80,31 @@ class SkillNode(Action):
         return {one.name: self.get(one.name) for one in self.model.inputs if self.given(one.name)}
 
 
-def successes(skill: Skill) -> list[str]:
-    """Return the results that the model calls a success."""
-    return [result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.SUCCESS]
+class ResourceNode(Condition):
+    """Succeeds when a resource is in a state."""
+
+    crew: Crew
+    model: Resource
+    skillset: str
+
+    def update(self) -> Answer:
+        """Ask."""
+        state = self.crew.clients[self.skillset].resources.get(self.model.name)
+        return SUCCESS if state == self.get(STATE_PORT) else FAILURE
 
 
-def skill_types(skillsets: Iterable[Skillset], crew: Crew | None = None) -> Palette:
-    """Return a type of node for each skill; without a crew they can be checked and drawn, and not be ticked."""
-    return Palette(_type(skillset.name, skill, crew) for skillset in skillsets for skill in skillset.skills)
+def robot_nodes(skillsets: Sequence[Skillset], crew: Crew | None = None) -> Palette:
+    """Return skills as actions, and resources as conditions; without a crew they can be checked and drawn, and not be ticked."""
+    palette = Palette()
+    for one in skillsets:
+        for skill in one.skills:
+            palette.add(_ticked(skill_type(one.name, skill), SkillNode, skill, one.name, crew))
+        for resource in one.resources:
+            palette.add(_ticked(resource_type(one.name, resource), ResourceNode, resource, one.name, crew))
+    return palette
 
 
-def _type(skillset: str, skill: Skill, crew: Crew | None) -> NodeType:
-    name = f"{skillset}.{skill.name}"
-    ports = {one.name: _port(one) for one in skill.inputs}
-    ports[SUCCESS_PORT] = input_port(SUCCESS_PORT, STRING, doc="results that are a success, with semicolons between them")
-    ports[OUTCOME_PORT] = output_port(OUTCOME_PORT, STRING, doc="how it ended")
-    make = (
-        None
-        if crew is None
-        else type(name, (SkillNode,), {"crew": crew, "model": skill, "skillset": skillset, "__doc__": SkillNode.__doc__})
-    )
-    return NodeType(name, Category.ACTION, ports, "", make, CHILDREN[Category.ACTION])
-
-
-def _port(one: Parameter) -> Port:
-    type_ = NUMBERS.get(one.type) or PortType(one.type, _no_text(one.type), _as_it_is)
-    return Port(one.name, type_, Direction.INPUT, one.default or None, one.comment, required=not one.default)
-
-
-def _no_text(name: str) -> Callable[[str], object]:
-    def parse(text: str) -> object:
-        msg = f"'{text}' is no {name}: name an entry that has one, as {{entry}}"
-        raise ValueError(msg)
-
-    return parse
-
-
-def _as_it_is(value: object) -> object:
-    return value
+def _ticked(known: NodeType, node: type[SkillNode | ResourceNode], model: Skill | Resource, skillset: str, crew: Crew | None) -> NodeType:
+    if crew is None:
+        return known
+    return replace(known, make=type(known.name, (node,), {"crew": crew, "model": model, "skillset": skillset, "__doc__": node.__doc__}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.filed.skills import SkillNode
@@ -22,15 +23,8 @@ class World:
 
     def __init__(self, clients: Mapping[str, Client], memory: Blackboard) -> None:
         self._clients = clients
-        self._memory = memory
+        self.memory = memory
         self.leaves: dict[str, list[SkillNode]] = {}
-        self._functions: Mapping[str, Callable[[str], object]] = {
-            "running": lambda skill: any(leaf.running for leaf in self._of(skill)),
-            "progress": lambda skill: max((leaf.progress for leaf in self._of(skill)), default=0.0),
-            "failed": lambda name: any(failure.result == name for failure in memory.failures),
-            "failed_first": lambda skill: bool(memory.failures) and memory.failures[0].skill == skill,
-            "reason": memory.because,
-        }
 
     def value(self, name: str) -> object:
         """Return the state of a resource, NOT_HEARD when it was not heard of yet; None where there is no such skillset."""
@@ -40,17 +34,35 @@ class World:
 
     def call(self, name: str, arguments: Sequence[object]) -> object:
         """Ask; raises KeyError and ValueError."""
-        function = self._functions[name]
+        function = FUNCTIONS[name]
         if len(arguments) != 1:
             msg = f"{name}(...) takes one name"
             raise ValueError(msg)
-        return function(str(arguments[0]))
+        return function.ask(self, str(arguments[0]))
 
-    def _of(self, skill: str) -> Iterable[SkillNode]:
+    def of(self, skill: str) -> Iterable[SkillNode]:
+        """Return the leaves of a skill; raises ValueError where the tree has none."""
         if skill not in self.leaves:
             msg = f"the tree has no leaf {skill}"
             raise ValueError(msg)
         return self.leaves[skill]
+
+
+@dataclass(frozen=True)
+class Function:
+    """What scripts may ask: ``kind`` is what its one name is of. An end is a result, a precondition or an invariant."""
+
+    kind: str
+    ask: Callable[[World, str], object]
+
+
+FUNCTIONS: Mapping[str, Function] = {
+    "running": Function("skill", lambda world, skill: any(leaf.running for leaf in world.of(skill))),
+    "progress": Function("skill", lambda world, skill: max((leaf.progress for leaf in world.of(skill)), default=0.0)),
+    "failed_first": Function("skill", lambda world, skill: bool(world.memory.failures) and world.memory.failures[0].skill == skill),
+    "failed": Function("end", lambda world, end: any(failure.result == end for failure in world.memory.failures)),
+    "reason": Function("resource", lambda world, resource: world.memory.because(resource)),
+}
 
 
 def states_of(skillsets: Iterable[Skillset]) -> dict[str, float]:

@@ -15,11 +15,11 @@ from alula.trees.errors import Problem
 from alula.trees.node import pointer
 from alula.trees.palette import Direction, Port
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix, children
-from alula.trees.values import ANY, BOOL, DOUBLE, INT, STRING, TYPES, UINT
+from alula.trees.values import ANY, NUMBERS, STRING, TYPES
 
 NUMBER, TEXT, UNKNOWN = "a number", "a text", ""
 """What a script writes; a port writes what its type is called."""
-_NUMERIC = frozenset({NUMBER, INT.name, UINT.name, DOUBLE.name, BOOL.name})
+_NUMERIC = frozenset({NUMBER, *(one.name for one in NUMBERS)})
 _AT_ONCE = frozenset({"Parallel", "ParallelAll", "ReactiveSequence", "ReactiveFallback", "WhileDoElse", "PipelineSequence"})
 """Nodes whose children are ticked in an order that their answers make: what one writes, any other may find."""
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import subprocess
+import sys
 
 import pytest
 
@@ -41,7 +44,7 @@ def changed(name, tmp_path, old, new):
         ),
         ('height="{takeoff_height_m}"', "", r"mapping.xml:\d+:\d+: 'navigation.takeoff' needs the port 'height'; add height="),
         ('height="{takeoff_height_m}"', 'height="three"', "the port 'height': 'three' is no double"),
-        ('target="{waypoint}"', 'target="1;2;3"', "name an entry that has one"),
+        ('target="{waypoint}"', 'target="1;2;3"', "a Point comes from an entry"),
         ('name="route"', 'name="way"', "the mission needs `way` of its world"),
         ('default="3.0"', 'default="high"', "the default of the mission's port 'takeoff_height_m' is 'high', no number"),
     ],
@@ -59,3 +62,24 @@ def test_a_change_of_the_file_is_flown(tmp_path):
     plan = plan_of(scenario, inputs_of(scenario))
     assert plan.parameters["takeoff_height_m"] == 4.5
     assert flights.fly().end.outcome is Outcome.ACCOMPLISHED
+
+
+def command(name, *words):
+    """Return what a command writes to the standard output; it has to end with 0 and without a word on standard error."""
+    root = find_robot().root
+    ended = subprocess.run([sys.executable, "-m", f"alula.commands.{name}", *words], cwd=root, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, ""), ended.stdout
+    return ended.stdout
+
+
+def test_the_checker_finds_nothing_in_the_drones_missions():
+    names = ["missions/mapping.xml", "missions/inspection.xml"]
+    files = json.loads(command("check", "--json", *names))["files"]
+    assert [(one["file"], one["findings"]) for one in files] == [(name, []) for name in names]
+
+
+def test_a_mission_is_drawn_with_the_drones_own_nodes(tmp_path):
+    text = command("tree", "missions/mapping.xml", "--svg", str(tmp_path / "m.svg"))
+    for node in ("waypoint writer (uav.NextWaypoint)", "until the route is flown (Until)", "take off (takeoff)"):
+        assert node in text
+    assert "until the route is flown" in (tmp_path / "m.svg").read_text()
