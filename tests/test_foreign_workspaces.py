@@ -36,7 +36,7 @@ DISTRIBUTIONS = {
     "textual": "python3-textual-pip",
 }
 """Packages by module, as rosdep calls them; others are called as the module, with `python3-` before it unless they are of ROS."""
-OF_PYPI = {"yaml": "PyYAML", "z3": "z3-solver", "py_trees": "py-trees", "lsprotocol": "pygls"}
+OF_PYPI = {"yaml": "PyYAML", "z3": "z3-solver", "py_trees": "py-trees", "lsprotocol": "pygls", "zmq": "pyzmq"}
 ROS = re.compile(r"rclpy|rospy|roslib|rosgraph|genpy|actionlib|alula|skillset_ros2|skillset_interfaces|\w+_msgs|\w+_srvs|\w+_interfaces")
 
 

@@ -11,6 +11,7 @@ from alula.missions.blackboard import Blackboard
 from alula.missions.filed.palette import mission_palette
 from alula.missions.filed.part import NO_PART
 from alula.missions.filed.skills import Crew
+from alula.missions.filed.world import World
 from alula.missions.pending import PendingInterrupts
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import SkillHandle
@@ -79,3 +80,8 @@ def test_a_resource_is_a_condition():
 def test_numbers_have_the_limits_of_their_types():
     with pytest.raises(Exception, match="'300' is no int8"):
         tree_of('<arm.grip tries="300"/>', Arm())
+
+
+def test_what_is_no_resource_has_no_value_in_a_script():
+    world = World({"arm": Arm()}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)), frozenset({"arm.hand"}))
+    assert [world.value(name) for name in ("arm.hand", "arm.level", "arm.level.value", "leg.hand")] == ["OPEN", None, None, None]

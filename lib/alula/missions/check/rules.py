@@ -102,15 +102,18 @@ class SkillRules:
             yield in_value("ALU615", attribute, (one.offset, one.end), f"there is no {kind} `{name}`", cure)
 
     def _dotted(self, attribute: Attribute, node: Name) -> Iterator[Problem]:
-        skillset_name, name, *_ = node.name.split(".")
+        skillset_name, _, name = node.name.partition(".")
         place = (node.offset, node.end)
         skillset = self.skills.skillsets.get(skillset_name)
         if skillset is None:
             cure = nearest(skillset_name, self.skills.skillsets)
             yield in_value("ALU615", attribute, place, f"there is no skillset `{skillset_name}`", cure)
-        elif name not in skillset.resource_index and name not in skillset.data_index:
-            cure = nearest(name, [*skillset.resource_index, *skillset.data_index])
-            yield in_value("ALU615", attribute, place, f"`{skillset_name}` has no resource and no data `{name}`", cure)
+        elif name.partition(".")[0] in skillset.data_index:
+            cure = "have a precondition or an invariant of a skill ask for it"
+            yield in_value("ALU615", attribute, place, f"`{node.name}` is data: a mission's scripts ask for resources", cure)
+        elif name not in skillset.resource_index:
+            cure = nearest(name, skillset.resource_index)
+            yield in_value("ALU615", attribute, place, f"`{skillset_name}` has no resource `{name}`", cure)
 
     def _states(self, attribute: Attribute, node: Comparison) -> Iterator[Problem]:
         for one in node.operands:

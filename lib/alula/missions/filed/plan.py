@@ -77,11 +77,12 @@ class Maker:
         self.board = TreeBoard(clock_ns)
         self._clock_ns = clock_ns
         self._enums = states_of(skillsets)
+        self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
         self._palette = mission_palette(skillsets, part, crew)
 
     def tree(self, name: str) -> Tree:
         """Make one; that of the file where no name is given."""
-        world = World(self.crew.clients, self.crew.memory)
+        world = World(self.crew.clients, self.crew.memory, self._resources)
         files, board = self.files, self.board
         tree = build_tree(files, self._palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board)
         for node in tree.nodes:
@@ -99,6 +100,7 @@ def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: I
         raise InputError(str(error)) from error
     model = files.models.get(files.main) or node_type(files.main, Category.SUBTREE)
     parameters, own = _parameters(model), _inputs(model, inputs, path)
+    part.check_inputs(own)
     board: list[TreeBoard] = []
 
     def make(clients: Mapping[str, Client], clock_ns: Clock, values: Mapping[str, float]) -> tuple[FiledMission, Blackboard]:

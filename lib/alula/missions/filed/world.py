@@ -21,16 +21,16 @@ class World:
     that failed. ``reason(R)`` is what is known of the state of a resource, to be put behind a sentence.
     """
 
-    def __init__(self, clients: Mapping[str, Client], memory: Blackboard) -> None:
+    def __init__(self, clients: Mapping[str, Client], memory: Blackboard, resources: frozenset[str]) -> None:
         self._clients = clients
+        self._resources = resources
         self.memory = memory
         self.leaves: dict[str, list[SkillNode]] = {}
 
     def value(self, name: str) -> object:
-        """Return the state of a resource, NOT_HEARD when it was not heard of yet; None where there is no such skillset."""
+        """Return the state of a resource, NOT_HEARD when it was not heard of yet; None where the models have no such resource."""
         skillset, _, resource = name.partition(".")
-        client = self._clients.get(skillset)
-        return None if client is None else client.resources.get(resource, NOT_HEARD)
+        return self._clients[skillset].resources.get(resource, NOT_HEARD) if name in self._resources else None
 
     def call(self, name: str, arguments: Sequence[object]) -> object:
         """Ask; raises KeyError and ValueError."""

@@ -87,4 +87,4 @@ class DroneMemory(Blackboard):
         return f"{self.reason} ({reason})" if reason else self.reason
 
 
-PART = MissionPart((("uav.NextWaypoint", NextWaypoint), ("uav.PointsTo", PointsTo)), reasons.listen, DroneMemory)
+PART = MissionPart((("uav.NextWaypoint", NextWaypoint), ("uav.PointsTo", PointsTo)), reasons.listen, DroneMemory, route_of)
