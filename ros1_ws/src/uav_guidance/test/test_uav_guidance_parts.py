@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from perception_core import SettingsError
 from perception_core.ros.settings import override
 from perception_core.tunable import check_ranges, ranges
-from uav_guidance.commands import ATTEMPTS, Procedure, arm, set_mode, take_off
+from uav_guidance.commands import ATTEMPTS, Outcome, Procedure, arm, set_mode, take_off
 from uav_guidance.encoding import from_autopilot_to_us
 from uav_guidance.settings import Settings
 from uav_guidance.stamping import FineClock, StampClock
@@ -80,6 +80,26 @@ def test_refusal_carries_the_texts_before_and_shortly_after_the_answer(late):
     assert procedure.outcome is not None
     assert procedure.outcome.reason == "arm failed: Arm: GPS 1; Arm: Battery"
     assert procedure.outcome.answered
+
+
+def test_the_reason_is_waited_for_in_the_autopilots_own_time():
+    """The mission clock may run ahead of what is read of the link."""
+    procedure = Procedure([arm()])
+    assert procedure.due(1.0) is not None
+    procedure.on_vehicle("LOCAL_POSITION_NED", Vehicle(boot_ms=50_000))
+    procedure.on_answer(400, 4, 1.1)
+    assert procedure.due(1.9) is None
+    assert procedure.outcome is None, "the autopilot's next 0.4 s were not heard yet"
+    procedure.on_text(2, "Arm: Compass not calibrated")
+    procedure.on_vehicle("LOCAL_POSITION_NED", Vehicle(boot_ms=50_400))
+    procedure.due(1.9)
+    assert procedure.outcome == Outcome(accepted=False, reason="arm failed: Arm: Compass not calibrated")
+    silent = Procedure([arm()])
+    silent.due(1.0)
+    silent.on_vehicle("LOCAL_POSITION_NED", Vehicle(boot_ms=50_000))
+    silent.on_answer(400, 4, 1.1)
+    silent.due(3.2)
+    assert silent.outcome == Outcome(accepted=False, reason="arm failed")
 
 
 def test_text_chunks_are_put_together():

@@ -26,6 +26,7 @@ PROGRESS_S = 1.0  # from an answer that says "in progress" to the next one
 LIFT_OFF_S = 6.0  # from the command to lift-off, spooling up included; 5.4 s were seen
 # The autopilot queues its texts: they may leave up to a few 100 ms after the answer that they explain.
 TEXT_GRACE_S = 0.4
+TEXT_LIMIT_S = 2.0  # for an autopilot that tells no time any more
 WORST_SEVERITY_TOLD = 4  # WARNING; notices and infos are no reasons
 
 
@@ -94,7 +95,8 @@ class Procedure:
         self._commands = deque(commands)
         self._attempts = 0
         self._answer_until_s = 0.0
-        self._refusal: tuple[float, str] | None = None
+        self._refusal: tuple[float, int | None, str] | None = None
+        self._boot_ms: int | None = None
         self._texts: list[str] = []
 
     def due(self, now_s: float) -> Command | None:
@@ -118,10 +120,11 @@ class Procedure:
         elif result == ACCEPTED:
             self._go_on()
         else:
-            self._refusal = (now_s, RESULT_NAMES.get(result, f"result {result}"))
+            self._refusal = (now_s, self._boot_ms, RESULT_NAMES.get(result, f"result {result}"))
 
     def on_vehicle(self, kind: str, vehicle: Vehicle) -> None:
         """Take what a MAVLink message of this kind has just told of the vehicle: a command that is obeyed needs no answer."""
+        self._boot_ms = vehicle.boot_ms
         if self.outcome is not None or not self._attempts:
             return
         evidence = self._commands[0].evidence
@@ -151,9 +154,13 @@ class Procedure:
         """Return whether the command was refused; the outcome follows when the texts had time to arrive."""
         if self._refusal is None or self.outcome is not None:
             return False
-        refused_s, result = self._refusal
-        if now_s - refused_s >= TEXT_GRACE_S:
+        refused_s, refused_ms, result = self._refusal
+        if now_s - refused_s >= TEXT_LIMIT_S or min(now_s - refused_s, self._heard_s(refused_ms)) >= TEXT_GRACE_S:
             words = "; ".join(self._texts)
             reason = f"{self._commands[0].name} {result}" + (f": {words}" if words else "")
             self.outcome = Outcome(accepted=False, reason=reason)
         return True
+
+    def _heard_s(self, since_ms: int | None) -> float:
+        """Return the autopilot's own time that was heard since then: on a slow machine, what it has sent may wait to be read."""
+        return TEXT_GRACE_S if since_ms is None or self._boot_ms is None else (self._boot_ms - since_ms) / 1e3
