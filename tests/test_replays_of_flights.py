@@ -86,7 +86,7 @@ def test_a_failure_that_was_not_flown_is_decided_as_the_one_that_was(depth, tmp_
     assert (difference["now"]["kind"], difference["now"]["skill"]) == ("interrupt", "goto_straight")
 
 
-BRANCHES = [f'<SubTree ID="{name.lower()}_navigation" name="with the {name}" _autoremap="true"/>' for name in ("ZED", "LiDAR")]
+BRANCHES = [f'<SubTree ID="{name.lower()}_navigation" name="{name} navigation" _autoremap="true"/>' for name in ("ZED", "LiDAR")]
 
 
 def with_the_lidar_first(folder: Path) -> Path:
