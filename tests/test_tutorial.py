@@ -17,7 +17,7 @@ ALULA_ROOT = Path(__file__).resolve().parents[1]
 SECTION = (ALULA_ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ {4}(alula .*)$", SECTION, re.MULTILINE)
 BLOCKS = dict(re.findall(r"^```(\w+)\n(.*?)^```$", SECTION, re.MULTILINE | re.DOTALL))
-MODEL, HOOKS = "skillsets/rover.skill", "ros2_ws/src/rover_robot/rover_robot/hooks.py"
+MODEL, HOOKS, MISSION = "skillsets/rover.skill", "ros2_ws/src/rover_robot/rover_robot/hooks.py", "missions/patrol.xml"
 TEST_OF_REST = """
     def test_it_rests(rig):
         handle = rig.client.start("rest", duration=0.3)
@@ -62,7 +62,7 @@ def passed(output: str) -> int:
 @pytest.mark.timeout(0)  # builds a robot's interfaces: as long as the machine needs
 def test_the_tutorial_works(tmp_path):
     home = Home(tmp_path)
-    new, check, test, run, live, check_again, test_again = COMMANDS
+    new, check, test, run, live, check_again, test_again, check_mission, run_again = COMMANDS
     assert "skillsets/mock.yaml" in home.run(new)
     home.run(check)
     untouched = passed(home.run(test))
@@ -87,3 +87,10 @@ def test_the_tutorial_works(tmp_path):
     home.insert(live, "def test_what_can_not_be_is_refused", textwrap.dedent(TEST_OF_REST).lstrip())
     home.run(check_again)
     assert passed(home.run(test_again)) == untouched + 1
+
+    home.insert(MISSION, "        <rover.back_off", BLOCKS["xml"])
+    assert home.run(check_mission) == "missions/patrol.xml: ok\n"
+    assert "mission accomplished in degraded mode" in home.run(run_again)
+    flown = max(home.robot.glob("runs/*-patrol"), key=lambda run: (run / "report.html").stat().st_mtime)
+    summary = json.loads((flown / "summary.json").read_text(encoding="utf-8"))
+    assert [(one["skill"], one["result"]) for one in summary["skills"][1:]] == [("rest", "RESTED"), ("back_off", "CLEAR_OF_IT")]
