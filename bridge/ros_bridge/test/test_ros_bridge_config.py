@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from alula.language.robot import BridgedService, BridgedTopic
+from alula.language.robot import BridgedAction, BridgedService, BridgedTopic
 from ros_bridge.config import Direction, Reliability, RosVersion, ServiceRoute, TopicRoute
 from ros_bridge.config_file import SERVICE_KEYS, TOPIC_KEYS, load_config, read_config
 from ros_bridge.errors import ConfigError
@@ -52,7 +52,7 @@ def test_reads_all_keys_and_defaults(parsed):
 
 def test_a_robots_bindings_have_the_keys_of_routes():
     assert {field.name for field in fields(BridgedTopic)} == set(TOPIC_KEYS)
-    assert {field.name for field in fields(BridgedService)} == set(SERVICE_KEYS)
+    assert {field.name for field in fields(BridgedService)} == {field.name for field in fields(BridgedAction)} == set(SERVICE_KEYS)
 
 
 DISCOVERED = """

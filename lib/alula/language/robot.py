@@ -33,8 +33,8 @@ class BridgedTopic:
 
 
 @dataclass(frozen=True)
-class BridgedService:
-    """A service that crosses the bridge, as ``BridgedTopic``; ``server`` says in which world it is answered."""
+class _Served:
+    """What is called across the bridge, with the keys that the bridge has for it; ``server`` says in which world it is answered."""
 
     name: str
     server: World
@@ -43,6 +43,16 @@ class BridgedService:
     ros1_name: str = ""
     ros2_name: str = ""
     ros2_type: str = ""
+
+
+@dataclass(frozen=True)
+class BridgedService(_Served):
+    """A service that crosses the bridge, as ``BridgedTopic``."""
+
+
+@dataclass(frozen=True)
+class BridgedAction(_Served):
+    """An action that crosses the bridge: actionlib's in ROS 1. ``type`` is ``package/Name``, as ROS 2 has it (``move_base_msgs/MoveBase``)."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +71,7 @@ class Bindings:
     data: Mapping[tuple[str, str], DataSource] = field(default_factory=dict)
     topics: tuple[BridgedTopic, ...] = ()
     services: tuple[BridgedService, ...] = ()
+    actions: tuple[BridgedAction, ...] = ()
 
 
 @dataclass(frozen=True)

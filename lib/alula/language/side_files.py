@@ -12,11 +12,11 @@ import yaml
 from alula.common.suggestions import nearest, quoted
 from alula.language.errors import Diagnostic
 from alula.language.lexer import MAX_CHARACTERS
-from alula.language.robot import Bindings, BridgedService, BridgedTopic, DataSource
+from alula.language.robot import Bindings, BridgedAction, BridgedService, BridgedTopic, DataSource
 from alula.model.ros_types import PRIMITIVES, RosType, parse_type
 from alula.model.span import Span
 
-T = TypeVar("T", DataSource, BridgedTopic, BridgedService)
+T = TypeVar("T", DataSource, BridgedTopic, BridgedService, BridgedAction)
 
 
 def load_types(path: Path) -> tuple[dict[str, RosType], list[Diagnostic]]:
@@ -33,7 +33,7 @@ def load_types(path: Path) -> tuple[dict[str, RosType], list[Diagnostic]]:
 
 
 def load_bindings(path: Path) -> tuple[Bindings, list[Diagnostic]]:
-    """Read the sections `data`, `topics` and `services`."""
+    """Read the sections `data`, `topics`, `services` and `actions`."""
     findings: list[Diagnostic] = []
     document = _mapping(path, findings)
     for key in document:
@@ -52,10 +52,11 @@ def load_bindings(path: Path) -> tuple[Bindings, list[Diagnostic]]:
             data[skillset, member] = source
     topics = _records(path, "topics", document.get("topics"), BridgedTopic, findings)
     services = _records(path, "services", document.get("services"), BridgedService, findings)
-    return Bindings(data, tuple(topics), tuple(services)), findings
+    actions = _records(path, "actions", document.get("actions"), BridgedAction, findings)
+    return Bindings(data, tuple(topics), tuple(services), tuple(actions)), findings
 
 
-_SECTIONS = ("data", "topics", "services")
+_SECTIONS = ("data", "topics", "services", "actions")
 
 _CHECKS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
     "name": ("an absolute ROS name such as /zed/depth", lambda v: isinstance(v, str) and v.startswith("/")),

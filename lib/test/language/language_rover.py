@@ -41,4 +41,6 @@ topics:
   - {name: /out, direction: ros2_to_ros1, type: std_msgs/Header, ros1_name: /other, reliability: best_effort}
 services:
   - {name: /drive, server: ros1, type: std_srvs/SetBool, timeout_s: 2}
+actions:
+  - {name: /move_base, server: ros1, type: move_base_msgs/MoveBase, ros2_name: /go}
 """

@@ -107,7 +107,9 @@ def test_data_that_no_topic_can_carry(tmp_path):
         ("", "topics: [{name: /a, direction: ros1_to_ros2, type: std_msgs/Header, reliability: no}]", "should be reliable or best_effort"),
         ("", "services: [{name: /a, server: ros1, type: std_srvs/SetBool, timeout_s: -1}]", "`timeout_s` is -1"),
         ("", "services: [{name: /a, type: std_srvs/SetBool}]", "services[0] has no `server`"),
-        ("", "service: []", "unknown section `service`; there are `data`, `topics`, `services`"),
+        ("", "service: []", "unknown section `service`; there are `data`, `topics`, `services`, `actions`"),
+        ("", "actions: [{name: /a, server: ros1}]", "actions[0] has no `type`"),
+        ("", "actions: [{name: /a, server: ros1, type: move_base_msgs/MoveBase, latched: true}]", "unknown key `latched`"),
     ],
 )
 def test_side_files(tmp_path, types, bindings, message):

@@ -96,6 +96,9 @@ def test_the_bridge_configuration(files):
             {"name": "/rover/transition", "server": "ros2", "type": "skillset_interfaces/Transition", "timeout_s": 5.0},
             {"name": "/drive", "server": "ros1", "type": "std_srvs/SetBool", "timeout_s": 2.0},
         ],
+        "actions": [
+            {"name": "/move_base", "server": "ros1", "type": "move_base_msgs/MoveBase", "timeout_s": 5.0, "ros2_name": "/go"},
+        ],
     }
 
 
