@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from alula.common.faults import FaultRequest
-from alula.model.conditions import NO_DATA, judge
+from alula.model.breaking import breaks
 from alula.model.execution_state import ExecutionState as S
-from alula.model.expressions import ResourceIs, atoms
-from alula.model.model import Invariant, Resource, ResultKind, Skill, Skillset, Transition
+from alula.model.model import ResultKind, Skill, Skillset
 from alula.records.causes.effects import EXTERN
 from alula.records.causes.failures import SkillFailure, skill_failures
 from alula.records.causes.faults import Fault, trace
@@ -69,24 +67,6 @@ def ways_to_fail(skillsets: Iterable[Skillset], processes: Iterable[str] = ()) -
 
 def _failures_of(skill: Skill) -> list[str]:
     return [result.name for result in skill.results if skill.kind_of(result.name) is ResultKind.FAILURE]
-
-
-def breaks(skillset: Skillset, resource: Resource, arrow: Transition) -> bool:
-    """Tell whether an arrow can make an invariant false that was not."""
-    return any(_breaks(skillset, one, resource, arrow) for skill in skillset.skills for one in skill.invariants)
-
-
-def _breaks(skillset: Skillset, invariant: Invariant, resource: Resource, arrow: Transition) -> bool:
-    names = list(dict.fromkeys(atom.resource for atom in atoms(invariant.condition) if isinstance(atom, ResourceIs)))
-    if resource.name not in names:
-        return False
-    others = [name for name in names if name != resource.name]
-    for states in itertools.product(*(skillset.resource(name).states for name in others)):
-        rest = dict(zip(others, states, strict=True))
-        before, after = (judge(invariant.condition, {**rest, resource.name: state}, NO_DATA) for state in (arrow.source, arrow.target))
-        if before is not False and after is False:
-            return True
-    return False
 
 
 def _arrow(skillset: str, resource: str, source: str, target: str) -> str:

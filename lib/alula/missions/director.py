@@ -75,6 +75,17 @@ class Mission(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class DirectorMemory:
+    """Where a director is; times as ``Blackboard.now_s``."""
+
+    phase: str
+    end: End | None
+    start_s: float | None
+    wait_until_s: float | None
+    stops: bool
+
+
 class Director:
     """Waits for the robot, has the tree ticked, and knows the outcome. ``step`` is to be called at 10 Hz and after each event."""
 
@@ -92,6 +103,18 @@ class Director:
         self._stop: Behaviour | None = None
         self._stop_watch: TreeWatch | None = None
         self._phase: Callable[[], None] = self._wait
+
+    @property
+    def memory(self) -> DirectorMemory:
+        """What the next step hangs on, besides the trees."""
+        return DirectorMemory(self._phase.__name__, self.end, self.start_s, self._wait_until_s, self._stop is not None)
+
+    def recall(self, memory: DirectorMemory) -> None:
+        """Go on from another moment; a pause is none that can be gone on from."""
+        self._phase = getattr(self, memory.phase)
+        self.end, self.start_s, self._wait_until_s = memory.end, memory.start_s, memory.wait_until_s
+        self._pause = None
+        self._stop = self._mission.stop_here() if memory.stops else None
 
     def step(self) -> None:
         """Do what is to be done now; returns at once. The mission is over when ``end`` is set."""

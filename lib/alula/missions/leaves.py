@@ -51,7 +51,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         self._interrupted = False
         self._inputs = inputs
         self._blackboard = blackboard
-        self._success = frozenset(success)
+        self.success = frozenset(success)
         self._on_success = on_success
 
     @property
@@ -72,7 +72,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         handle = self.handle
         if handle is None or not handle.done:
             return Status.RUNNING
-        if handle.state is ExecutionState.TERMINATED and handle.result in self._success:
+        if handle.state is ExecutionState.TERMINATED and handle.result in self.success:
             self.feedback_message = handle.result
             self._on_success(self._blackboard)
             return Status.SUCCESS
@@ -87,6 +87,19 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
             self._interrupted = True
             self.feedback_message = "interrupted"
             self._blackboard.pending.interrupt(self.client.skillset, self.skill, self.handle)
+
+    @property
+    def interrupted(self) -> bool:
+        """Tell whether the tree has asked for the end of its execution."""
+        return self._interrupted
+
+    def recall(self, handle: SkillHandle | None, *, interrupted: bool) -> None:
+        """Follow another execution, as it was at another moment of the mission."""
+        self.handle, self._interrupted = handle, interrupted
+
+    def with_inputs(self, inputs: Inputs[Board]) -> None:
+        """Start with other inputs from now on."""
+        self._inputs = inputs
 
     def _start(self) -> bool:
         waits_for = self._blackboard.pending.names(self.client.skillset)

@@ -7,6 +7,7 @@ shared between two). The wait is bounded; after it the start is made anyway, and
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from alula.missions.skillset import NANOSECONDS, Clock
@@ -33,6 +34,15 @@ class PendingInterrupts:
         """Ask for the end of an execution and remember it until it has ended."""
         handle.interrupt()
         self._pending.append(_Pending(skillset, skill, handle, self._clock_ns()))
+
+    @property
+    def handles(self) -> list[SkillHandle]:
+        """Those that are remembered, ended or not."""
+        return [one.handle for one in self._pending]
+
+    def recall(self, interrupted: Iterable[tuple[str, SkillHandle]]) -> None:
+        """Remember these executions instead, each with its skillset, as at another moment of the mission."""
+        self._pending = [_Pending(skillset, handle.skill, handle, self._clock_ns()) for skillset, handle in interrupted]
 
     def names(self, skillset: str | None = None) -> list[str]:
         """Return the skills of this skillset (None: of all) whose interruption is under way and not overdue."""

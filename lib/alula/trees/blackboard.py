@@ -55,6 +55,17 @@ class Blackboard:
         # A list is made in one step: a viewer's thread asks, too, while the mission writes.
         return {name: entry.value for name, entry in list(self._entries.items()) if entry.value is not None}
 
+    def entries(self) -> Mapping[str, Entry]:
+        """Return its own entries by name."""
+        return dict(self._entries)
+
+    def recall(self, entries: Mapping[str, tuple[PortType, object]]) -> None:
+        """Have these entries of its own, types and values, and no others; each with a value counts as written once."""
+        known, self._entries = self._entries, {}
+        for key, (type_, value) in entries.items():
+            entry = self._entries[key] = known.get(key) or Entry(type_)
+            entry.type, entry.value, entry.sequence = type_, value, int(value is not None)
+
     def entry(self, key: str) -> Entry | None:
         """Return an entry, its own or one above; None when there is none."""
         board: Blackboard | None = self

@@ -97,6 +97,10 @@ class Node(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
     ports: ClassVar[tuple[Port, ...]] = ()
     child_count: ClassVar[tuple[int, int | None] | None] = None
     """How many children it may have, from and to; None: as its category."""
+    remembers: ClassVar[tuple[str, ...]] = ()
+    """The attributes that one tick leaves for the next, besides the status; what takes a tree to another moment needs all of them."""
+    remembers_running: ClassVar[tuple[str, ...]] = ()
+    """Those of them that are set anew when the node begins: while it does not run, nothing hangs on them."""
     status: Status
     children: list[Node]
 

@@ -40,6 +40,8 @@ class Stays(Action):
 
     ports = (IF, input_port("for", DOUBLE, doc="how long", unit="s"))
 
+    remembers_running = ("_since_ns",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._script = asked(self)
@@ -65,6 +67,8 @@ class Awaits(Action):
         input_port("within", DOUBLE, doc="how long to wait", unit="s"),
         input_port("for", DOUBLE, "0", "how long it holds", unit="s"),
     )
+
+    remembers_running = ("_since_ns", "_holds_since_ns")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -116,6 +120,8 @@ class RetryAfter(Decorator):
         input_port("attempts", INT, "2", "how many chances it has in all"),
         input_port("wait", DOUBLE, "0", "how long after the failure", unit="s"),
     )
+
+    remembers_running = ("_left", "_again_ns")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -65,7 +65,11 @@ class FiledMission:
 
     def stop_here(self) -> Node:
         """Make a tree that brings the robot to rest where it is."""
-        return self._make.tree(STOP_HERE).root
+        return self.stop_tree().root
+
+    def stop_tree(self) -> Tree:
+        """Make the tree `stop_here`, whole."""
+        return self._make.tree(STOP_HERE)
 
 
 class Maker:

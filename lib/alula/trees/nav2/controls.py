@@ -12,6 +12,8 @@ from alula.trees.values import BOOL, INT, STRING
 class PipelineSequence(Control):
     """Ticks its children in order, and those before the one that runs again in each tick, until the last one succeeds."""
 
+    remembers = ("_reached",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._reached = 0
@@ -45,6 +47,8 @@ class RecoveryNode(Control):
 
     ports = (input_port("number_of_retries", INT, "1", "how often the second child is tried"),)
     child_count = (2, 2)
+
+    remembers = ("_recovers", "_retries")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -97,6 +101,8 @@ class RoundRobin(Control):
     """Ticks its children by turns, one a success: the next time the one after it is the first."""
 
     ports = (input_port("wrap_around", BOOL, "false", "whether the first child is tried again after the last one"),)
+
+    remembers = ("_turn", "_failed")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -51,6 +51,8 @@ class RateController(_Gate):
 
     ports = (input_port("hz", DOUBLE, "10.0", "how often the child is begun", unit="Hz"),)
 
+    remembers = ("_since_ns",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._since_ns = 0
@@ -76,6 +78,8 @@ class DistanceController(_Gate):
         input_port("global_frame", STRING, None, "reference frame"),
         input_port("robot_base_frame", STRING, None, "the robot's own frame"),
     )
+
+    remembers = ("_from",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -105,6 +109,8 @@ class _GoalGate(_Gate):
         input_port("goal", doc="the goal (default: the entry 'goal')"),
         input_port("goals", doc="the goals (default: the entry 'goals')"),
     )
+
+    remembers: ClassVar[tuple[str, ...]] = ("_goals",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -137,6 +143,8 @@ class SpeedController(_GoalGate):
         input_port("max_speed", DOUBLE, "0.5", "highest speed", unit="m/s"),
         *_GoalGate.ports,
     )
+
+    remembers = ("_goals", "_since_ns", "_period_s")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -174,6 +182,8 @@ class SpeedController(_GoalGate):
 
 class SingleTrigger(Decorator):
     """Ticks its child until it has ended once, and fails from then on until it is begun anew."""
+
+    remembers = ("_over",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -221,6 +231,8 @@ class PathLongerOnApproach(Decorator):
         input_port("prox_len", DOUBLE, "3.0", "the goal is near when the path to it is shorter", unit="m"),
         input_port("length_factor", DOUBLE, "2.0", "a path is much longer when it is so many times as long"),
     )
+
+    remembers = ("_before",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

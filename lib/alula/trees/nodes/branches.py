@@ -17,6 +17,8 @@ class IfThenElse(Control):
 
     child_count = (2, 3)
 
+    remembers = ("_chosen",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._chosen = 0
@@ -72,6 +74,8 @@ class WhileDoElse(Control):
 
 class Switch(Control):
     """Ticks the child of the case that equals the variable, else the last child; asks again in each tick."""
+
+    remembers = ("_running",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -142,6 +146,8 @@ class TryCatch(Control):
 
     child_count = (2, None)
     ports = (input_port("catch_on_halt", BOOL, "false", "have the last child tick once when it is halted, too"),)
+
+    remembers = ("_index", "_skipped", "_cleans_up")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

@@ -60,6 +60,8 @@ class _Again(Decorator):
     again: ClassVar[Answer]
     port: ClassVar[str]
 
+    remembers = ("_count",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._count = 0
@@ -113,6 +115,8 @@ class RunOnce(Decorator):
 
     ports = (input_port("then_skip", BOOL, "true", "skip afterwards; else answer as the first time"),)
 
+    remembers = ("_answer",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._answer: Answer | None = None
@@ -133,6 +137,8 @@ class Precondition(Decorator):
     """Ticks its child when a script says yes; it is asked until the child runs."""
 
     ports = (input_port("if", STRING, doc="the script"), input_port("else", STATUS, "FAILURE", "what it answers when the script says no"))
+
+    remembers = ("_begun",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
@@ -169,6 +175,8 @@ class Delay(Decorator):
 
     ports = (input_port("delay_msec", UINT, doc="after how long", unit="ms"),)
 
+    remembers = ("_until_ns",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._until_ns: int | None = None
@@ -196,6 +204,8 @@ class Timeout(Decorator):
     """Halts its child and fails when it runs for longer; 0: never."""
 
     ports = (input_port("msec", UINT, doc="for how long at most", unit="ms"),)
+
+    remembers = ("_until_ns",)
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

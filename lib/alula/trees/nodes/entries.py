@@ -56,6 +56,8 @@ class WasEntryUpdated(SyncAction):
 
     ports = ENTRY
 
+    remembers = ("_seen",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._seen = 0
@@ -74,6 +76,8 @@ class _IfUpdated(Decorator):
 
     ports = ENTRY
     otherwise: ClassVar[Answer]
+
+    remembers = ("_seen", "_running")
 
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)

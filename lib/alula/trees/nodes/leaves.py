@@ -78,6 +78,8 @@ class Sleep(Action):
 
     ports = (input_port("msec", UINT, doc="for how long", unit="ms"),)
 
+    remembers_running = ("_until_ns",)
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._until_ns = 0

@@ -15,6 +15,8 @@ class Loop(Decorator):
     A list of the file begins anew each time; one of the blackboard is used up.
     """
 
+    remembers = ("_running", "_items")
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._running = False

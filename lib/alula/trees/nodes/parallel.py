@@ -10,6 +10,8 @@ from alula.trees.values import INT
 
 
 class _AtOnce(Control):
+    remembers = ("_done", "_failed")
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._done: set[int] = set()

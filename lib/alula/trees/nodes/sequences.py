@@ -18,6 +18,8 @@ class _InTurn(Control):
     gives_way: ClassVar[bool] = False
     """After a child that has ended in its first tick it answers RUNNING, so that it can be halted between quick children."""
 
+    remembers = ("_index", "_skipped")
+
     def __init__(self, wiring: Wiring) -> None:
         super().__init__(wiring)
         self._index = 0

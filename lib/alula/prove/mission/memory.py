@@ -1,0 +1,192 @@
+"""The memory of a mission between two ticks as one value: taken out of the engine's own nodes, and put back into them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from alula.missions.director import Director, DirectorMemory, End, Outcome
+from alula.missions.filed.skills import SkillNode
+from alula.model.model import Skillset
+from alula.prove.mission.moments import Later, Moment, thawed
+from alula.prove.mission.oracle import UndecidedError
+from alula.prove.mission.reading import Read
+from alula.prove.mission.robot import Handle, Memory, Robot
+from alula.prove.mission.unknown import UNKNOWN, Unknown, UnknownNumber
+from alula.trees.node import Node
+from alula.trees.status import IDLE, RUNNING, Skipped, Status
+from alula.trees.tree import Tree
+
+SEEN = "_seen"
+
+
+class TreeMemory(NamedTuple):
+    """All that the next tick hangs on besides the managers. ``held`` are the leaves whose executions it hangs on."""
+
+    phase: str
+    end: Outcome | None
+    started: bool
+    waits: Hashable
+    stops: bool
+    nodes: tuple[Hashable, ...]
+    boards: tuple[Hashable, ...]
+    leaves: tuple[tuple[int, bool], ...]
+    pending: tuple[int, ...]
+    first_failure: str
+    ends: frozenset[str]
+
+    @property
+    def held(self) -> frozenset[int]:
+        """The leaves whose executions the tree still hangs on."""
+        return frozenset((*(leaf for leaf, _ in self.leaves), *self.pending))
+
+
+@dataclass(frozen=True)
+class Body:
+    """The parts of a mission that have a memory."""
+
+    robot: Robot
+    director: Director
+    board: Memory
+    trees: tuple[Tree, ...]
+    skillsets: Mapping[str, Skillset]
+    read: Read
+
+    def nodes(self) -> list[Node]:
+        """Return all nodes, tree by tree."""
+        return [node for tree in self.trees for node in tree.nodes]
+
+
+class Keeper:
+    """Takes the memory out of a mission, and puts it back."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._nodes = [(node, node.remembers, node.remembers_running) for node in body.nodes()]
+        self.leaves = [node for node in body.nodes() if isinstance(node, SkillNode)]
+        self._boards = [subtree.blackboard for tree in body.trees for subtree in tree.subtrees]
+
+    # --- out ---------------------------------------------------------------------------------------------------------
+
+    def take(self) -> TreeMemory:
+        """Return the memory."""
+        director, board = self._body.director.memory, self._body.board
+        leaves = [(number, node.leaf.interrupted) for number, node in enumerate(self.leaves) if _follows(node)]
+        ends = frozenset(one.result for one in board.failures if one.result in self._body.read.ends)
+        first = board.failures[0].skill if board.failures and self._body.read.asks_first else ""
+        waits = _frozen(director.wait_until_s) if director.phase == "_wait" else None
+        return TreeMemory(
+            director.phase,
+            None if director.end is None else director.end.outcome,
+            director.start_s is not None,
+            waits,
+            director.stops,
+            tuple(value for one in self._nodes for value in self._of(*one)),
+            tuple(self._entries(number) for number in range(len(self._boards))),
+            tuple(leaves),
+            tuple(sorted(one.leaf for one in board.pending.handles if isinstance(one, Handle) and not one.done)),
+            first,
+            ends,
+        )
+
+    def _of(self, node: Node, names: tuple[str, ...], of_run: tuple[str, ...]) -> Iterable[Hashable]:
+        yield node.status
+        for name in names:
+            yield self._seen(node) if name == SEEN else _frozen(getattr(node, name))
+        for name in of_run:
+            yield None if node.status is IDLE else _frozen(getattr(node, name))
+
+    @staticmethod
+    def _seen(node: Node) -> bool:
+        entry = node.entry("entry")
+        return bool(getattr(node, SEEN) == (0 if entry is None else entry.sequence))
+
+    def _entries(self, number: int) -> Hashable:
+        read = self._body.read
+        entries = self._boards[number].entries()
+        return tuple((name, entries[name].type, _frozen(read.value(name, entries[name].value))) for name in sorted(entries))
+
+    # --- back --------------------------------------------------------------------------------------------------------
+
+    def put(self, memory: TreeMemory) -> None:
+        """Put a memory back."""
+        body = self._body
+        body.robot.begin()
+        body.director.recall(
+            DirectorMemory(
+                memory.phase,
+                None if memory.end is None else End(memory.end),
+                0.0 if memory.started else None,
+                self._thawed(memory.waits),  # type: ignore[arg-type]
+                memory.stops,
+            )
+        )
+        for number, frozen in enumerate(memory.boards):
+            self._boards[number].recall({name: (kind, self._thawed(value)) for name, kind, value in frozen})  # type: ignore[attr-defined]
+        self._put_nodes(memory)
+        body.board.recall_failures(memory.first_failure, memory.ends)
+        handles = {leaf: self._handle(leaf) for leaf in memory.held}
+        interrupted = dict(memory.leaves)
+        for number, node in enumerate(self.leaves):
+            node.leaf.recall(handles.get(number) if number in interrupted else None, interrupted=interrupted.get(number, False))  # type: ignore[arg-type]
+        body.board.pending.recall([(handles[leaf].skillset, handles[leaf]) for leaf in memory.pending])  # type: ignore[misc]
+
+    def _put_nodes(self, memory: TreeMemory) -> None:
+        values = iter(memory.nodes)
+        for node, names, of_run in self._nodes:
+            status = next(values)
+            node.status = status  # type: ignore[assignment]
+            for name in names:
+                value = next(values)
+                if name == SEEN:
+                    entry = node.entry("entry")
+                    setattr(node, SEEN, (0 if entry is None else entry.sequence) if value else -1)
+                else:
+                    setattr(node, name, self._thawed(value))
+            for name in of_run:
+                value = next(values)
+                if status is not IDLE:
+                    setattr(node, name, self._thawed(value))
+
+    def _handle(self, leaf: int) -> Handle:
+        node = self.leaves[leaf]
+        return Handle(self._body.robot, leaf, self._body.skillsets[node.skillset], node.model.name)
+
+    def _thawed(self, value: Hashable) -> object:
+        match value:
+            case ("list", tuple(items)):
+                return [self._thawed(one) for one in items]
+            case ("tuple", tuple(items)):
+                return tuple(self._thawed(one) for one in items)
+            case ("set", frozenset() as items):
+                return set(items)
+            case ("number", (str(what), float(low), float(high))):
+                return UnknownNumber(self._body.robot.oracle, what, low, high)
+            case (_, *_):
+                return thawed(self._body.robot.oracle, value)
+        return value
+
+
+def _frozen(value: object) -> Hashable:
+    match value:
+        case UnknownNumber():
+            return ("number", value.frozen)
+        case Moment() | Later():
+            return value.frozen
+        case None | bool() | int() | float() | str() | Status() | Skipped() | Unknown():
+            return value
+        case list():
+            return ("list", tuple(_frozen(one) for one in value))
+        case tuple():
+            return ("tuple", tuple(_frozen(one) for one in value))
+        case set():
+            return ("set", frozenset(value))
+        case dict():
+            return UNKNOWN
+    raise UndecidedError(f"a node remembers {value!r}, which the search can't keep")
+
+
+def _follows(node: SkillNode) -> bool:
+    handle = node.leaf.handle
+    return handle is not None and (node.status is RUNNING or not handle.done)

@@ -1,0 +1,196 @@
+"""What stands in the place of a robot when a mission's tree is ticked in the search: clients, executions, nodes of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from alula.missions.blackboard import Blackboard, Failure
+from alula.missions.filed.part import MissionPart
+from alula.missions.pending import PendingInterrupts
+from alula.model.execution_state import ExecutionState
+from alula.model.model import Skillset
+from alula.prove.mission.moments import Moment
+from alula.prove.mission.oracle import Oracle
+from alula.prove.mission.unknown import UNKNOWN, UnknownNumber
+from alula.trees.node import Node, pointer
+from alula.trees.palette import Direction
+from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
+from alula.trees.values import BOOL, NUMBERS, STRING, PortType
+
+NO_END = ("sent",)
+
+
+@dataclass
+class Robot:
+    """What all of it shares: the oracle of the tick, and what the tree asks for in it."""
+
+    oracle: Oracle
+    starting: int = -1
+    """The leaf that starts a skill now."""
+    started: list[int] = field(default_factory=list)
+    interrupted: list[int] = field(default_factory=list)
+    now: Moment = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.now = Moment(self.oracle, now=True)
+
+    def clock_ns(self) -> int:
+        """Return now, which is no number but computes with times as one."""
+        return self.now  # type: ignore[return-value]
+
+    def begin(self) -> None:
+        """Begin another tick."""
+        self.started, self.interrupted = [], []
+        self.now = Moment(self.oracle, now=True)
+
+
+class Handle:
+    """An execution as the tree's leaf sees it; ``fresh``: it was asked for in this very tick."""
+
+    message = ""
+
+    def __init__(self, robot: Robot, leaf: int, skillset: Skillset, skill: str, *, fresh: bool = False, failed: bool = False) -> None:
+        self.leaf = leaf
+        self.id = str(leaf)
+        self.skillset = skillset.name
+        self.skill = skill
+        self._robot = robot
+        self._outputs = skillset.skill(skill).outputs
+        self._fixed = ("ended", ExecutionState.FAILED.value, "") if failed else NO_END if fresh else None
+
+    @property
+    def _seen(self) -> tuple[str, ...]:
+        return self._fixed or self._robot.oracle.look(("execution", self.leaf))  # type: ignore[return-value]
+
+    @property
+    def state(self) -> ExecutionState:
+        """Where it is, as far as the client has heard."""
+        phase, *end = self._seen
+        if phase == "ended":
+            return ExecutionState(end[0])
+        return ExecutionState.RUNNING if phase == "running" else ExecutionState.REQUESTED
+
+    @property
+    def done(self) -> bool:
+        """Tell whether it has ended."""
+        return self._seen[0] == "ended"
+
+    @property
+    def result(self) -> str:
+        """As a client's handle has it."""
+        return self._seen[2] if self.done else ""
+
+    @property
+    def outputs(self) -> Mapping[str, object]:
+        """Nothing is known of what a function returns."""
+        return {one.name: unknown(self._robot.oracle, f"{self.skill}'s {one.name}", STRING) for one in self._outputs}
+
+    @property
+    def progress(self) -> float:
+        """Any number that is not negative."""
+        return UnknownNumber(self._robot.oracle, f"the progress of {self.skillset}.{self.skill}", 0.0)
+
+    def interrupt(self) -> None:
+        """Ask for its end."""
+        if not self.done:
+            self._robot.interrupted.append(self.leaf)
+
+
+class States(Mapping[str, str]):
+    """The states of a skillset's resources, as its client knows them; none while the managers are not there."""
+
+    def __init__(self, robot: Robot, skillset: Skillset) -> None:
+        self._robot = robot
+        self._skillset = skillset
+
+    def __getitem__(self, name: str) -> str:
+        if name not in self._skillset.resource_index:
+            raise KeyError(name)
+        state = self._robot.oracle.look(("resource", self._skillset.name, name))
+        if state is None:
+            raise KeyError(name)
+        return str(state)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._skillset.resource_index)
+
+    def __len__(self) -> int:
+        return len(self._skillset.resource_index)
+
+
+class Client:
+    """A skillset's client as missions use it."""
+
+    def __init__(self, robot: Robot, skillset: Skillset) -> None:
+        self.skillset = skillset.name
+        self.resources = States(robot, skillset)
+        self._robot = robot
+        self._model = skillset
+
+    @property
+    def ready(self) -> bool:
+        """Tell whether the managers are there."""
+        return bool(self._robot.oracle.look(("alive", self.skillset)))
+
+    def start(self, skill: str, **_inputs: object) -> Handle:
+        """Ask for an execution; one that nobody can be asked for has FAILED."""
+        leaf = self._robot.starting
+        if not self.ready:
+            return Handle(self._robot, leaf, self._model, skill, failed=True)
+        self._robot.started.append(leaf)
+        return Handle(self._robot, leaf, self._model, skill, fresh=True)
+
+
+class Waits(PendingInterrupts):
+    """Executions that end some time after they were interrupted, always before the bound: the managers see to that."""
+
+    def __init__(self, clock_ns: Callable[[], int]) -> None:
+        super().__init__(clock_ns, math.inf)
+
+
+class Memory(Blackboard):
+    """A mission's memory: of the failures, what scripts ask for."""
+
+    def __post_init__(self) -> None:
+        self.pending = Waits(self.clock_ns)
+
+    def recall_failures(self, first: str, ends: frozenset[str]) -> None:
+        """Have had these: the skill that failed first, and all ends that there were."""
+        known = [Failure("", first, ExecutionState.FAILED, "", "")] if first else []
+        self.failures = known + [Failure("", "", ExecutionState.FAILED, end, "") for end in sorted(ends)]
+        self.reason = ""
+
+
+def opaque(robot: Robot, part: MissionPart) -> MissionPart:
+    """Return a robot's part with nodes that may answer all that they declare, and write values of which nothing is known."""
+    return MissionPart(tuple((name, _opaque(robot, node)) for name, node in part.nodes), memory=Memory)
+
+
+def _opaque(robot: Robot, real: type[Node]) -> type[Node]:
+    several = "on_running" in {name for one in real.__mro__[:-1] for name in vars(one)}
+    options: tuple[Answer, ...] = (SUCCESS, FAILURE, RUNNING) if several else (SUCCESS, FAILURE)
+
+    def update(self: Node) -> Answer:
+        names = tuple(one.value for one in options if hasattr(one, "value"))
+        answer = options[names.index(str(robot.oracle.choose(("answer", self.name), names)))]
+        for port in self.wiring.type.ports.values():
+            text = self.wiring.ports.get(port.name, "")
+            if port.direction is not Direction.INPUT and pointer(text, port.name) is not None:
+                self.put(port.name, unknown(robot.oracle, f"`{pointer(text, port.name)}`", port.type))
+        return answer
+
+    def halt(self: Node) -> None:
+        self.reset_children() if hasattr(self, "reset_children") else None
+        self.become(IDLE)
+
+    content = {"ports": real.ports, "update": update, "category": real.category, "child_count": real.child_count, "halt": halt}
+    return type(real.__name__, (Node,), {**content, "__doc__": real.__doc__})
+
+
+def unknown(oracle: Oracle, what: str, type_: PortType) -> object:
+    """Return a value of a type of which nothing is known."""
+    if type_ is BOOL:
+        return UnknownNumber(oracle, what, 0.0, 1.0)
+    return UnknownNumber(oracle, what) if type_ in NUMBERS else UNKNOWN

@@ -1,0 +1,260 @@
+"""The transition system of a mission: its tree, the managers of its skillsets, and what can fail.
+
+    system = System.read(Path("missions/mapping.xml"), models, part)       # models: the robot's skillsets, part: its MissionPart
+    state = system.initial()                                               # power-up; the mission waits for what it needs
+    for event, after in system.steps(state):                               # every step, also those that only an unlucky robot takes
+        ...
+    system.running(state, "navigation.goto"), system.resource(state, "navigation.flight_status"), system.outcome(state)
+
+States are values that can be compared and hashed. Ticks and managers are asynchronous: what the tree asks for is under way
+(`Execution.phase` "sent") until it arrives in a step of its own, and anything may happen before. Ticks that change nothing are no
+steps. A tick has one step for each way in which it can go: ``Event.choices`` says what was chosen (a time is over, an unknown number
+is large enough, what a node of the robot's own answers). A mission that is over takes no more ticks; what still runs comes to
+its end, and nothing else happens.
+
+``Failures`` says what may fail. Which arrows are failures (``Event.failure``) follows from the models: those that can break an invariant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from alula.missions.director import Director, Outcome
+from alula.missions.filed.part import MissionPart
+from alula.missions.filed.plan import STOP_HERE, FiledMission, plan_of_file
+from alula.missions.plan import InputError
+from alula.missions.skill_types import OUTCOME_PORT
+from alula.model.execution_state import ExecutionState
+from alula.model.model import Skillset
+from alula.prove.limits import Deadline
+from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
+from alula.prove.mission.memory import Body, TreeMemory
+from alula.prove.mission.oracle import Answer, Oracle, Question
+from alula.prove.mission.reading import what_is_read
+from alula.prove.mission.robot import Client, Memory, Robot, opaque
+from alula.prove.mission.state import Event, Execution, Kind, Managers, State
+from alula.prove.mission.ticking import ABORT, TICK, OneStop, Ticker
+from alula.prove.mission.ticking import Outcome as Ticked
+from alula.prove.mission.unknown import UNKNOWN
+from alula.trees.node import Node, pointer
+from alula.trees.palette import Direction, Port
+from alula.trees.reading import TreeFiles, read_files, type_name
+from alula.trees.status import RUNNING as TICKED
+
+_GIVEN_S = 30.0
+TERMINATED, FAILED = ExecutionState.TERMINATED.value, ExecutionState.FAILED.value
+
+
+class System:
+    """All runs of a mission. ``skillsets`` are those that its trees name, in the models' order."""
+
+    def __init__(self, ticker: Ticker, body: Body, skillsets: Sequence[Skillset], failures: Failures, deadline: Deadline) -> None:
+        self.skillsets = tuple(skillsets)
+        self.failures = failures
+        self.ticker = ticker
+        self.trees = body.trees
+        self.leaves = tuple(ticker.leaves)
+        """The leaves that are skills, by the numbers that executions and events have them by."""
+        self.nodes: tuple[Node, ...] = tuple(ticker.nodes)
+        self._steps = [ManagersSteps(one, self._skills_of(one), failures, deadline, self._told_end) for one in skillsets]
+        self._read = body.read
+        self._place = {one.name: number for number, one in enumerate(skillsets)}
+        self._managers: list[Managers] = []
+        self._numbers: dict[Managers, int] = {}
+        self._moves: dict[tuple[int, int], tuple[tuple[Event, int], ...]] = {}
+
+    @classmethod
+    def read(
+        cls,
+        path: Path,
+        models: Sequence[Skillset],
+        part: MissionPart,
+        failures: Failures = Failures(),  # noqa: B008 - a value
+        deadline: Deadline | None = None,
+    ) -> System:
+        """Read a mission's file; raises InputError where it can't be used, UndecidedError where the search can't look at it."""
+        files = read_files(path)
+        skillsets = [one for one in models if one.name in _named(files)]
+        oracle = Oracle()
+        robot = Robot(oracle)
+        inputs = {port.name: UNKNOWN for port in _ports(files)}
+        plan = plan_of_file(path, path.stem, skillsets, inputs, opaque(robot, part))
+        clients = {one.name: Client(robot, one) for one in skillsets}
+        oracle.begin(lambda _: None)
+        mission, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
+        if not isinstance(mission, FiledMission) or not isinstance(board, Memory):
+            raise InputError(f"{path}: is no mission in a file")
+        stop = mission.stop_tree() if STOP_HERE in files.trees else None
+        trees = (mission.tree, *([stop] if stop else []))
+        director = Director(OneStop(mission, stop), board)
+        unread = [*(name for name, _ in part.nodes), *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
+        read = what_is_read(files, unread, plan.parameters, oracle)
+        body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read)
+        ticker = Ticker(body, oracle)
+        for number, node in enumerate(ticker.leaves):
+            node.leaf.with_inputs(_Starting(robot, number))
+        return cls(ticker, body, skillsets, failures, deadline or Deadline.after(_GIVEN_S))
+
+    # --- steps -------------------------------------------------------------------------------------------------------
+
+    def initial(self) -> State:
+        """Return the situation at power-up."""
+        return State(self.ticker.initial, tuple(self._number(one.initial()) for one in self._steps))
+
+    def steps(self, state: State) -> Iterator[tuple[Event, State]]:
+        """Yield each step out of a state."""
+        over = self.outcome(state) is not None
+        if not over:
+            yield from self._ticks(state, TICK, Kind.TICK)
+            if self.failures.aborts and self._may_abort(state):
+                yield from self._ticks(state, ABORT, Kind.ABORT)
+        for place, number in enumerate(state.managers):
+            for event, after in self._moves_of(place, number):
+                if over and event.leaf < 0:
+                    continue
+                spent = state.spent + (event.failure and self.failures.most is not None)
+                if self.failures.most is None or spent <= self.failures.most:
+                    managers = (*state.managers[:place], after, *state.managers[place + 1 :])
+                    yield event, State(state.memory, managers, spent)
+
+    def _ticks(self, state: State, act: str, kind: Kind) -> Iterator[tuple[Event, State]]:
+        for ticked in self.ticker.outcomes(state.memory, lambda question: self._observed(state, question), act):
+            after = State(ticked.memory, self._commanded(state, ticked), state.spent)
+            if after != state:
+                started, interrupted, choices, touched = ticked[1:]
+                yield Event(kind, started=started, interrupted=interrupted, choices=choices, touched=touched), after
+
+    def _may_abort(self, state: State) -> bool:
+        memory = self.memory(state)
+        return memory.started and not memory.stops and len(self.trees) > 1 and memory.phase == "_run"
+
+    def _moves_of(self, place: int, number: int) -> tuple[tuple[Event, int], ...]:
+        key = (place, number)
+        if key not in self._moves:
+            found = self._steps[place].moves(self._managers[number])
+            self._moves[key] = tuple((event, self._number(after)) for event, after in found if after != self._managers[number])
+        return self._moves[key]
+
+    def _commanded(self, state: State, ticked: Ticked) -> tuple[int, ...]:
+        """Return the managers with what a tick has asked for under way, without ends that the tree hangs on no more."""
+        held = self.ticker.memories[ticked.memory].held
+        found: list[int] = []
+        for place, number in enumerate(state.managers):
+            managers = self._managers[number]
+            skills = self._steps[place].skills
+            kept = [one for one in managers.executions if one.phase != ENDED or one.leaf in held]
+            kept = [one._replace(asked=True) if one.leaf in ticked.interrupted and one.phase != ENDED else one for one in kept]
+            new = [Execution(leaf, SENT, asked=leaf in ticked.interrupted) for leaf in ticked.started if leaf in skills]
+            kept = [one for one in kept if one.leaf not in ticked.started]
+            running = [one for one in kept if one.phase == RUNNING]
+            others = sorted(one for one in (*kept, *new) if one.phase != RUNNING)
+            found.append(self._number(Managers(managers.states, (*running, *others))))
+        return tuple(found)
+
+    # --- observers ---------------------------------------------------------------------------------------------------
+
+    def memory(self, state: State) -> TreeMemory:
+        """Return what the tree remembers."""
+        return self.ticker.memories[state.memory]
+
+    def managers(self, state: State, skillset: str) -> Managers:
+        """Return the managers of a skillset."""
+        return self._managers[state.managers[self._place[skillset]]]
+
+    def outcome(self, state: State) -> Outcome | None:
+        """Return how the mission ended, None while it has not."""
+        return self.memory(state).end
+
+    def started(self, state: State) -> bool:
+        """Tell whether the mission has begun: before that it waits for what it needs."""
+        return self.memory(state).started
+
+    def resource(self, state: State, name: str) -> str | None:
+        """Return the state of ``skillset.resource``, None while its managers are not there."""
+        skillset, _, resource = name.partition(".")
+        place = self._place[skillset]
+        return self._steps[place].resource(self._managers[state.managers[place]], resource)
+
+    def running(self, state: State, skill: str) -> bool:
+        """Tell whether an execution of ``skillset.skill`` runs in its managers."""
+        skillset, _, name = skill.partition(".")
+        skills = self._steps[self._place[skillset]].skills
+        return any(one.phase == RUNNING and skills[one.leaf] == name for one in self.managers(state, skillset).executions)
+
+    def open(self, state: State) -> list[tuple[int, Execution]]:
+        """Return what is under way or runs: each with its leaf."""
+        return [(one.leaf, one) for number in state.managers for one in self._managers[number].executions if one.phase != ENDED]
+
+    def active(self, state: State) -> list[Node]:
+        """Return the nodes that run, from the root down."""
+        memory, found, at = self.memory(state), [], 0
+        for node in self.nodes:
+            if memory.nodes[at] is TICKED:
+                found.append(node)
+            at += 1 + len(node.remembers) + len(node.remembers_running)
+        return found
+
+    def _observed(self, state: State, question: Question) -> Answer:
+        match question:
+            case ("resource", str(skillset), str(name)):
+                return self.resource(state, f"{skillset}.{name}")
+            case ("alive", str(skillset)):
+                return bool(self.managers(state, skillset).states)
+            case ("execution", int(leaf)):
+                known = next(one for one in self.managers(state, self.leaves[leaf].skillset).executions if one.leaf == leaf)
+                return (known.phase, known.state, known.result) if known.phase == ENDED else (known.phase,)
+        raise KeyError(question)
+
+    def _told_end(self, leaf: int, end: End) -> End:
+        """Return an end that is the same to the tree: of those that nothing tells apart always the same one."""
+        node = self.leaves[leaf]
+        state, result = end
+        success = state == TERMINATED and result in node.leaf.success
+        outcome = pointer(node.wiring.ports.get(OUTCOME_PORT, ""), OUTCOME_PORT)
+        told = (result or state) if outcome is None else self._read.value(outcome.removeprefix("@"), result or state)
+        if success:
+            return (state, result) if outcome is not None and told == result else (TERMINATED, min(node.leaf.success))
+        return (state, result) if result in self._read.ends or (outcome is not None and told == (result or state)) else (FAILED, "")
+
+    def _skills_of(self, skillset: Skillset) -> Mapping[int, str]:
+        return {number: leaf.model.name for number, leaf in enumerate(self.leaves) if leaf.skillset == skillset.name}
+
+    def _number(self, managers: Managers) -> int:
+        number = self._numbers.setdefault(managers, len(self._managers))
+        if number == len(self._managers):
+            self._managers.append(managers)
+        return number
+
+
+class _Starting:
+    """Tells the robot which leaf starts; nothing that the search looks at hangs on inputs."""
+
+    def __init__(self, robot: Robot, leaf: int) -> None:
+        self._robot = robot
+        self._leaf = leaf
+
+    def __call__(self, _: object) -> Mapping[str, object]:
+        self._robot.starting = self._leaf
+        return {}
+
+
+def _named(files: TreeFiles) -> frozenset[str]:
+    """Return what stands before a dot anywhere in the trees: names of skillsets are among it."""
+    found: set[str] = set()
+    for tree in files.trees.values():
+        for element in tree.iterate():
+            texts = [type_name(element), *(one.value for one in element.attributes.values())]
+            found |= {word.rpartition(" ")[2] for text in texts for word in _words(text)}
+    return frozenset(found)
+
+
+def _words(text: str) -> list[str]:
+    plain = "".join(letter if letter.isalnum() or letter in "_." else " " for letter in text)
+    return [part.partition(".")[0] for part in plain.split() if "." in part]
+
+
+def _ports(files: TreeFiles) -> list[Port]:
+    model = files.models.get(files.main)
+    ports = [] if model is None else list(model.ports.values())
+    return [one for one in ports if one.direction is Direction.INPUT and one.default is None]

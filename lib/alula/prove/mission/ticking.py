@@ -1,0 +1,171 @@
+"""Ticks of a mission's tree by the engine's own nodes: each tick that differs is done once, and known from then on.
+
+What a tick does hangs on the tree's memory, on what it observes, and on what nobody knows. Its questions and answers make a tree of
+decisions; a situation that gives answers which are known already needs no tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from alula.missions.director import Director
+from alula.missions.filed.plan import STOP_HERE, FiledMission
+from alula.prove.mission.memory import Body, Keeper, TreeMemory
+from alula.prove.mission.oracle import Answer, Asked, Oracle, Question, UndecidedError, View
+from alula.trees.node import Node
+from alula.trees.status import Status
+from alula.trees.tree import Tree
+
+TICK, ABORT = "tick", "abort"
+
+
+class Outcome(NamedTuple):
+    """What a tick comes to: the number of the memory after it, what it asks for, and what was seen of the nodes."""
+
+    memory: int
+    started: tuple[int, ...]
+    interrupted: tuple[int, ...]
+    choices: tuple[Asked, ...]
+    touched: frozenset[tuple[int, str]]
+
+
+@dataclass
+class _Decision:
+    """A question, and what follows from each answer; ``options`` are empty for an observation."""
+
+    question: Question
+    options: tuple[Answer, ...]
+    next: dict[Answer, _Decision | Outcome] = field(default_factory=dict)
+
+
+class OneStop:
+    """The mission, with one tree that brings the robot to rest: a mission is aborted once."""
+
+    def __init__(self, mission: FiledMission, stop: Tree | None) -> None:
+        self._mission = mission
+        self._stop = stop
+        self.root = mission.root
+        self.conditions = mission.conditions
+
+    @property
+    def degraded(self) -> bool:
+        """As the mission."""
+        return self._mission.degraded
+
+    @property
+    def stopping(self) -> bool:
+        """As the mission."""
+        return self._mission.stopping
+
+    def stop_here(self) -> Node:
+        """Return the tree that there is."""
+        if self._stop is None:
+            raise UndecidedError(f"the mission has no tree `{STOP_HERE}`")
+        return self._stop.root
+
+
+class Ticker:
+    """Ticks a mission from any of its memories, which it numbers."""
+
+    def __init__(self, body: Body, oracle: Oracle) -> None:
+        self._body = body
+        self._oracle = oracle
+        self._keeper = Keeper(body)
+        self.leaves = self._keeper.leaves
+        self.nodes = body.nodes()
+        self.memories: list[TreeMemory] = []
+        self.runs = 0
+        """How many ticks were done by the engine."""
+        self._numbers: dict[TreeMemory, int] = {}
+        self._known: dict[tuple[int, str], _Decision | Outcome] = {}
+        self._touched: set[tuple[int, str]] = set()
+        self._of = {id(node): number for number, node in enumerate(self.nodes)}
+        oracle.begin(lambda _: None)
+        self.initial = self._number(self._keeper.take())
+
+    def outcomes(self, memory: int, view: View, act: str = TICK) -> Iterator[Outcome]:
+        """Yield all that a tick (or an abort) can come to where observations are as ``view`` answers."""
+        todo: list[tuple[_Decision | Outcome | None, tuple[Answer, ...]]] = [(self._known.get((memory, act)), ())]
+        while todo:
+            known, answers = todo.pop()
+            if known is None:
+                self._run(memory, act, view, answers)
+                known = self._at(memory, act, answers)
+            while isinstance(known, _Decision):
+                if known.options:
+                    todo += [(known.next.get(option), (*answers, option)) for option in known.options[1:]]
+                    answer = known.options[0]
+                else:
+                    answer = view(known.question)
+                answers = (*answers, answer)
+                if answer not in known.next:
+                    self._run(memory, act, view, answers)
+                known = known.next[answer]
+            yield known
+
+    def _at(self, memory: int, act: str, answers: Sequence[Answer]) -> _Decision | Outcome:
+        known = self._known[memory, act]
+        for answer in answers:
+            assert isinstance(known, _Decision)  # noqa: S101 - the answers are those of its decisions
+            known = known.next[answer]
+        return known
+
+    def _run(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> None:
+        """Do a tick by the engine, and keep what it came to."""
+        self.runs += 1
+        self._oracle.begin(view, answers)
+        self._keeper.put(self.memories[memory])
+        self._touched = set()
+        self._watch()
+        director = self._body.director
+        if act == ABORT:
+            director.abort("asked from outside")
+        else:
+            self._step(director)
+        after = self._number(self._keeper.take())
+        asked = self._oracle.asked
+        robot = self._body.robot
+        choices = tuple(one for one in asked if one.options)
+        outcome = Outcome(after, tuple(robot.started), tuple(robot.interrupted), choices, frozenset(self._touched))
+        self._keep(memory, act, asked, outcome)
+
+    def _step(self, director: Director) -> None:
+        """Do what the driver of a mission does: a tree that can't be ticked is left, and the robot brought to rest."""
+        try:
+            director.step()
+        except UndecidedError:
+            raise
+        except Exception as error:  # noqa: BLE001 - as the driver
+            director.abort(f"the tree raised {type(error).__name__}: {error}")
+
+    def _keep(self, memory: int, act: str, asked: Sequence[Asked], outcome: Outcome) -> None:
+        if not asked:
+            self._known[memory, act] = outcome
+            return
+        known = self._known.setdefault((memory, act), _Decision(asked[0].question, asked[0].options))
+        for number, one in enumerate(asked):
+            assert isinstance(known, _Decision)  # noqa: S101
+            assert known.question == one.question, (known.question, one.question)  # noqa: S101 - a tick hangs on nothing else
+            if number + 1 == len(asked):
+                known.next[one.answer] = outcome
+            else:
+                following = asked[number + 1]
+                known = known.next.setdefault(one.answer, _Decision(following.question, following.options))
+
+    def _watch(self) -> None:
+        """Have only this watch the nodes: views of the tree are made of them elsewhere."""
+        for tree in self._body.trees:
+            watchers = tree.root.watchers
+            watchers[:] = [self._changed]
+
+    def _changed(self, node: Node, _previous: Status, status: Status) -> None:
+        if status is not Status.INVALID and id(node) in self._of:
+            self._touched.add((self._of[id(node)], status.value))
+
+    def _number(self, memory: TreeMemory) -> int:
+        number = self._numbers.setdefault(memory, len(self.memories))
+        if number == len(self.memories):
+            self.memories.append(memory)
+        return number
