@@ -11,7 +11,7 @@ FAULTS: dict[str, tuple[str, ...]] = {
     "wheels": ("slip", "weak"),
     "bumper": ("stuck",),
     "battery": ("drains",),
-    "door": ("store", "lab", "kitchen", "office", "inner"),
+    "door": ("store", "workshop", "kitchen", "office", "side"),
     "person": ("stays", "silent"),
     "pose": ("lost",),
 }

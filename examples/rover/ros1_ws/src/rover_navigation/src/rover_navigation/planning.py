@@ -1,0 +1,82 @@
+"""The way: shortest paths on the map and on what the laser has seen besides, by scikit-image's minimum-cost paths."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+from skimage.graph import route_through_array
+
+from rover_navigation.geometry import Points, Pose, transformed
+from rover_navigation.grid_map import GridMap
+
+RADIUS_M = 0.25
+MARGIN_M = 0.06  # at least so far from everything
+KEEP_M = 0.5  # ways nearer to something than this cost more
+COARSE = 2  # planning's cells are so many of the map's
+SEEN_M = 0.15  # what the laser hits so near to something of the map is no news
+CLEARED_M = 4.0  # how far beams clear what was seen before
+LEAVE_M = 0.4  # around the rover itself ways are allowed that are too narrow: it stands there
+
+
+class NoWayError(Exception):
+    """There is no way; the message says why."""
+
+
+class Surroundings:
+    """The map, and what has been seen that is not on it: it stays until a beam goes through where it was."""
+
+    def __init__(self, grid: GridMap) -> None:
+        self.grid = grid
+        self.seen = np.zeros_like(grid.occupied)
+
+    def look(self, pose: Pose, points: Points) -> None:
+        """Take in what the laser hit, in base_link, from a pose in map."""
+        self._clear(pose, points)
+        cells = self.grid.cells(transformed(pose, points))
+        news = self.grid.distance_m[cells] > SEEN_M
+        self.seen[cells[0][news], cells[1][news]] = True
+
+    def forget(self) -> None:
+        """Forget what was seen: after the pose was wrong it is in wrong places."""
+        self.seen[:] = False
+
+    def distance_m(self, *, seen: bool) -> NDArray[np.float64]:
+        """Return how far each cell is from the next occupied one; ``seen``: also from what was seen."""
+        return np.asarray(distance_transform_edt(~(self.grid.occupied | self.seen))) * self.grid.resolution_m if seen else self.grid.distance_m
+
+    def _clear(self, pose: Pose, points: Points) -> None:
+        far = np.linalg.norm(points, axis=1)
+        steps = np.arange(RADIUS_M, CLEARED_M, self.grid.resolution_m)
+        rays = points[:, None, :] / far[:, None, None] * steps[None, :, None]
+        before = steps[None, :] < far[:, None] - 2.0 * self.grid.resolution_m
+        self.seen[self.grid.cells(transformed(pose, rays[before]))] = False
+
+
+def plan(around: Surroundings, start: Pose, goal: Pose, *, seen: bool = True) -> Points:
+    """Return the way as points in map, from the start to the goal.
+
+    Raises:
+        NoWayError: the goal is too near to something, or everything between is too narrow.
+    """
+    distance = around.distance_m(seen=seen)[::COARSE, ::COARSE]
+    size = around.grid.resolution_m * COARSE
+    ends = np.array([start[:2], goal[:2]])
+    rows, columns = (np.minimum(cells // COARSE, most - 1) for cells, most in zip(around.grid.cells(ends), distance.shape, strict=True))
+    narrow = distance < RADIUS_M + MARGIN_M
+    if narrow[rows[1], columns[1]]:
+        raise NoWayError(f"({goal[0]:.2f}, {goal[1]:.2f}) is taken: something is {distance[rows[1], columns[1]]:.2f} m from it")
+    cost = 1.0 + 4.0 * np.clip(1.0 - (distance - RADIUS_M) / KEEP_M, 0.0, 1.0)
+    row, column = np.indices(distance.shape)
+    here = np.hypot(row - rows[0], column - columns[0]) * size < LEAVE_M
+    cost[narrow] = np.inf
+    cost[narrow & here & (distance > 0.0)] = 50.0
+    cost[rows[0], columns[0]] = 1.0
+    try:
+        cells, total = route_through_array(cost, (rows[0], columns[0]), (rows[1], columns[1]), fully_connected=True, geometric=True)
+    except ValueError as error:  # scikit-image's word for an end that can't be reached
+        raise NoWayError(f"no way to ({goal[0]:.2f}, {goal[1]:.2f}): everything between is too narrow") from error
+    if not np.isfinite(total):
+        raise NoWayError(f"no way to ({goal[0]:.2f}, {goal[1]:.2f}): everything between is too narrow")
+    way = around.grid.middles(np.array(cells, dtype=np.intp) * COARSE)
+    return np.vstack((way[1:-1], goal[:2]))
