@@ -20,17 +20,29 @@ class YamlError(Exception):
 
 
 class Located:
-    """A part of a YAML document. ``make_error`` makes the exception of a complaint: the reader's own class."""
+    """A part of a YAML document.
 
-    def __init__(self, path: Path, node: yaml.Node, make_error: MakeError = YamlError) -> None:
+    Args:
+        path: of the document.
+        node: the part.
+        make_error: makes the exception of a complaint: the reader's own class.
+        columns: complaints name the column, too.
+    """
+
+    def __init__(self, path: Path, node: yaml.Node, make_error: MakeError = YamlError, *, columns: bool = False) -> None:
         self._path = path
         self._node = node
         self._make_error = make_error
+        self._columns = columns
 
     @property
     def place(self) -> str:
-        """File and line, from 1."""
-        return f"{self._path}:{self._node.start_mark.line + 1}"
+        """File and line, and the column where that is asked for, from 1."""
+        mark = self._node.start_mark
+        return f"{self._path}:{mark.line + 1}" + (f":{mark.column + 1}" if self._columns else "")
+
+    def _part(self, node: yaml.Node) -> Located:
+        return Located(self._path, node, self._make_error, columns=self._columns)
 
     def wrong(self, message: str) -> Exception:
         """Make a complaint about this part."""
@@ -62,10 +74,8 @@ class Located:
         for key, value in self._node.value:
             name = str(key.value) if isinstance(key, yaml.ScalarNode) else ""
             if not name or name in found:
-                raise Located(self._path, key, self._make_error).wrong(
-                    f"{what}: `{name}` is given twice" if name else f"{what}: a key should be a word"
-                )
-            found[name] = Located(self._path, value, self._make_error)
+                raise self._part(key).wrong(f"{what}: `{name}` is given twice" if name else f"{what}: a key should be a word")
+            found[name] = self._part(value)
         return found
 
     def record(self, what: str, known: Collection[str]) -> dict[str, Located]:
@@ -79,7 +89,7 @@ class Located:
     def elements(self) -> list[Located]:
         """Return the elements of a list; anything else is a list of one."""
         if isinstance(self._node, yaml.SequenceNode):
-            return [Located(self._path, node, self._make_error) for node in self._node.value]
+            return [self._part(node) for node in self._node.value]
         return [self]
 
     def text(self, what: str) -> str:
@@ -103,8 +113,12 @@ def choices(name: str, known: Collection[str]) -> str:
     return (", ".join(known) or "none") + (f" ({hint})" if hint.startswith("did") else "")
 
 
-def read_yaml(path: Path, make_error: MakeError = YamlError) -> Located | None:
-    """Read a document; None for an empty one. Raises what ``make_error`` makes: the file can't be read, or is no YAML."""
+def read_yaml(path: Path, make_error: MakeError = YamlError, *, columns: bool = False) -> Located | None:
+    """Read a document; None for an empty one; ``columns``: complaints name them.
+
+    Raises:
+        what ``make_error`` makes: the file can't be read, or is no YAML.
+    """
     try:
         text = path.read_text(encoding="utf-8")
         if len(text) > MAX_CHARACTERS:
@@ -119,7 +133,7 @@ def read_yaml(path: Path, make_error: MakeError = YamlError) -> Located | None:
         line = f":{mark.line + 1}" if mark is not None else ""
         problem = " ".join(str(getattr(error, "problem", None) or error).split())  # some of its messages have several lines
         raise make_error(f"{path}{line}: is no YAML: {problem}") from None
-    return None if node is None else Located(path, node, make_error)
+    return None if node is None else Located(path, node, make_error, columns=columns)
 
 
 def _shown(node: yaml.Node) -> str:

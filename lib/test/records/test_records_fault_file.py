@@ -53,8 +53,12 @@ def test_the_example_of_the_page_is_right(tmp_path):
 @pytest.mark.parametrize(
     ("text", "line", "complaint"),
     [
-        ("fault: {}", 1, "a file of faults has no `fault`; it may have faults, processes (did you mean `faults`?)"),
-        ("faults:\n  zed: {state: {}}", 2, "`zed` has no `state`; it may have states, later, ends (did you mean `states`?)"),
+        ("fault: {}", 1, "a file of faults has no `fault`; it may have faults, processes, skills (did you mean `faults`?)"),
+        (
+            "faults:\n  zed: {state: {}}",
+            2,
+            "`zed` has no `state`; it may have states, later, ends, happens, lasts, source (did you mean `states`?)",
+        ),
         ("faults:\n  zed:\n    states: {perception.zed_statu: BROKEN}", 3, "there is no resource `perception.zed_statu`; there are"),
         (
             "faults:\n  zed:\n    states: {perception.zed_status: [OK,\n      BROKE]}",

@@ -15,8 +15,11 @@ from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
 
-SECTIONS = ("faults", "processes")
+EFFECTS, FIGURES = ("faults", "processes"), "skills"
+SECTIONS = (*EFFECTS, FIGURES)
 PARTS = ("states", "later", "ends")
+ODDS = ("happens", "lasts", "source")
+"""What an entry says besides about how often it comes: `alula.odds.reading` reads it, and the section of figures."""
 BAD_ENDS = (S.FAILED.value, S.INTERRUPTED.value, S.NOT_VALIDATED.value)
 """States in which an execution ends without the name of a result or a condition."""
 
@@ -66,10 +69,12 @@ def load_effects(path: Path, skillsets: Sequence[Skillset]) -> EffectsByFault:
     ends = {f"{one.name}.{skill.name}": _ends(skill) for one in skillsets for skill in one.skills}
     known: dict[str, FaultEffects] = {}
     for section, part in sections.items():
+        if section == FIGURES:
+            continue
         for name, entry in part.entries(f"`{section}`").items():
             if name in known:
                 raise entry.wrong(f"`{name}` is a fault already; a process needs another name")
-            said = entry.record(f"`{name}`", PARTS)
+            said = entry.record(f"`{name}`", (*PARTS, *ODDS))
             known[name] = FaultEffects(
                 states=_read(said.get("states"), "resource", "state", states),
                 later=_read(said.get("later"), "resource", "state", states),

@@ -1,0 +1,66 @@
+"""What is needed of a mission together with its models: which situations there are, and what can happen in each."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, Protocol, TypeVar
+
+State = TypeVar("State", bound=Hashable)
+
+TAKE_OFF = "take-off"
+"""The use that the robot's departure is."""
+
+
+class Kind(Enum):
+    """What decides when a step is taken."""
+
+    NOW = "now"
+    """The software takes it, as soon as it can: a tick, a message, an answer of a manager."""
+    END = "end"
+    """An execution ends with a result; its skill's figures say when, and how likely with which."""
+    FAULT = "fault"
+    """A fault comes."""
+    MENDED = "mended"
+    """A fault is over."""
+    ANY = "any"
+    """It may come at any time, or never; no figure is for it."""
+
+
+class Outcome(Enum):
+    """How a mission has ended."""
+
+    ACCOMPLISHED = "accomplished"
+    DEGRADED = "degraded"
+    GIVEN_UP = "given_up"
+
+
+@dataclass(frozen=True)
+class Step(Generic[State]):
+    """One way from a situation to the next.
+
+    Attributes:
+        name: of the skill that ends, ``skillset.skill``, or of the fault; of the others, what a reader calls it.
+        result: how an execution ends.
+        uses: what is used from here on: skills that start, as ``skillset.skill``, and TAKE_OFF.
+    """
+
+    kind: Kind
+    name: str
+    target: State
+    result: str = ""
+    uses: tuple[str, ...] = ()
+
+
+class LabelledSystem(Protocol[State]):
+    """A mission with its models, as a labelled transition system."""
+
+    def initial(self) -> Iterable[State]:
+        """Return where it can begin."""
+
+    def steps(self, state: State) -> Iterable[Step[State]]:
+        """Return what can happen there: none where the mission has ended, or waits for ever."""
+
+    def outcome(self, state: State) -> Outcome | None:
+        """Return how the mission has ended; None: it has not, or in none of these ways."""
