@@ -1,0 +1,133 @@
+"""Nodes of the rover's own in files of missions: what is next of its parcels, ways, doors and places."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from alula.missions.filed.part import MissionPart
+from alula.trees.errors import TickError
+from alula.trees.node import SyncAction
+from alula.trees.palette import Port, input_port, output_port
+from alula.trees.status import FAILURE, SUCCESS, Answer
+from alula.trees.values import ANY, INT, STRING
+
+COUNT = input_port("done", INT, doc="how many of them are behind")
+MANY = output_port("count", INT, doc="how many there are")
+
+
+class Next(SyncAction):
+    """Writes the next one of a list; fails when there are no more. It is the same one until ``done`` has grown."""
+
+    def listed(self) -> list[Any]:
+        """Return the list."""
+        raise NotImplementedError
+
+    def write(self, entry: Any) -> str:
+        """Write what is next; return what to tell of it."""
+        raise NotImplementedError
+
+    def update(self) -> Answer:
+        """Write it."""
+        entries, done = self.listed(), self.number("done")
+        if not isinstance(entries, list):
+            raise TickError(f"{self.place()}: that is no list")
+        if "count" in self.ports_by_name():
+            self.put("count", len(entries))
+        if done >= len(entries):
+            self.feedback_message = "no more"
+            return FAILURE
+        self.feedback_message = f"{done + 1} of {len(entries)}: {self.write(entries[done])}"
+        return SUCCESS
+
+    def ports_by_name(self) -> set[str]:
+        """Return the names of its ports."""
+        return {port.name for port in self.ports}
+
+
+class NextParcel(Next):
+    """The parcel that is next, and the rooms at its two ends."""
+
+    ports: tuple[Port, ...] = (
+        input_port("parcels", ANY),
+        COUNT,
+        MANY,
+        output_port("parcel", STRING),
+        output_port("from", ANY, doc="a room"),
+        output_port("to", ANY, doc="a room"),
+    )
+
+    def listed(self) -> list[Any]:
+        """Return the parcels."""
+        parcels: list[Any] = self.get("parcels")  # type: ignore[assignment]
+        return parcels
+
+    def write(self, entry: Any) -> str:
+        """Write it."""
+        self.put("parcel", entry["name"])
+        self.put("from", entry["from"])
+        self.put("to", entry["to"])
+        return str(entry["name"])
+
+
+class NextWay(Next):
+    """A way into a room that was not tried yet: its doors; and the place in the room."""
+
+    ports: tuple[Port, ...] = (input_port("room", ANY), COUNT, output_port("way", ANY, doc="doors"), output_port("inside", ANY, unit="m"))
+
+    def listed(self) -> list[Any]:
+        """Return the ways."""
+        room: Any = self.get("room")
+        ways: list[Any] = room["ways"]
+        return ways
+
+    def write(self, entry: Any) -> str:
+        """Write it."""
+        room: Any = self.get("room")
+        self.put("way", entry)
+        self.put("inside", room["inside"])
+        return f"{room['name']} by {' and '.join(door['door'] for door in entry)}"
+
+
+class NextDoor(Next):
+    """The next door on a way: where the rover stands before it, and the safe place near it."""
+
+    ports: tuple[Port, ...] = (
+        input_port("way", ANY),
+        COUNT,
+        MANY,
+        output_port("door", STRING),
+        output_port("at", ANY, unit="m"),
+        output_port("safe", ANY, unit="m"),
+    )
+
+    def listed(self) -> list[Any]:
+        """Return the doors."""
+        way: list[Any] = self.get("way")  # type: ignore[assignment]
+        return way
+
+    def write(self, entry: Any) -> str:
+        """Write it."""
+        for name in ("door", "at", "safe"):
+            self.put(name, entry[name])
+        return str(entry["door"])
+
+
+class NextPlace(Next):
+    """The next place of a round."""
+
+    ports: tuple[Port, ...] = (input_port("places", ANY), COUNT, MANY, output_port("place", ANY, unit="m"))
+
+    def listed(self) -> list[Any]:
+        """Return the places."""
+        places: list[Any] = self.get("places")  # type: ignore[assignment]
+        return places
+
+    def write(self, entry: Any) -> str:
+        """Write it."""
+        self.put("place", entry)
+        return f"({entry['x']:g}, {entry['y']:g})"
+
+
+PART = MissionPart(
+    (("rover.NextParcel", NextParcel), ("rover.NextWay", NextWay), ("rover.NextDoor", NextDoor), ("rover.NextPlace", NextPlace))
+)
