@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Protocol
 
 from alula.model.conditions import data_of
@@ -31,6 +31,14 @@ class Client(Protocol):
     @property
     def resources(self) -> Mapping[str, str]:
         """State of every resource; empty until the skillset was heard of."""
+        ...
+
+    def follow(self, data: Collection[str]) -> None:
+        """Have the values of these data at hand from when it can be called."""
+        ...
+
+    def value(self, data: str) -> object | None:
+        """Return the last value of a data, None where there is none, or it is stale."""
         ...
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
@@ -65,7 +73,8 @@ class MissionClient:
         self.skillset = client.skillset
         self._wake = wake
         self._recorder = recorder
-        self._follows_data = recorder is None
+        self._followed: Collection[str] = ()
+        self._follows_data = False
         client.on_change(lambda _: wake())
 
     @property
@@ -80,6 +89,15 @@ class MissionClient:
     def resources(self) -> Mapping[str, str]:
         """State of every resource; empty until the skillset was heard of."""
         return self.client.resources
+
+    def follow(self, data: Collection[str]) -> None:
+        """Have the values of these data at hand, and each of them recorded; to be called before `ready`."""
+        self._followed = data
+
+    def value(self, data: str) -> object | None:
+        """Return the last value of a data, None where there is none, or it is stale."""
+        feed = self.client.data_feed(data)
+        return None if feed.sample is None or feed.stale else feed.sample.value
 
     def start(self, skill: str, **inputs: object) -> SkillHandle:
         """Start an execution, record it as a decision, and wake the mission when it ends."""
@@ -97,7 +115,11 @@ class MissionClient:
         handle.on_report(lambda _: recorder.report(self.skillset, handle))
 
     def _follow_data(self) -> None:
-        asked_for = asked_data(self.client.model)
+        if self._recorder is None:
+            for name in self._followed:
+                self.client.data_feed(name)
+            return
+        asked_for = asked_data(self.client.model) | set(self._followed)
         for data in self.client.model.data:
             every_s = 0.0 if data.name in asked_for else 1.0
             self.client.data_feed(data.name).on_sample(Thinned(self._sample_of(data.name), every_s))

@@ -90,8 +90,12 @@ def _data_holds(atom: DataIs, data: Data) -> bool | None:
 
 def value_of(atom: DataIs, data: Data) -> object | None:
     """Return the value that an atom is about; None when there is none, or it is not a number where one was measured (NaN)."""
-    value = data.get(atom.data)
-    for name in atom.path:
+    return value_in(data.get(atom.data), atom.path)
+
+
+def value_in(value: object, path: Sequence[str]) -> object | None:
+    """Return the value of a field; None when there is none, or it is not a number where one was measured (NaN)."""
+    for name in path:
         value = getattr(value, name, None)
     return None if isinstance(value, float) and math.isnan(value) else value
 

@@ -14,6 +14,7 @@ from alula.trees.nodes.subtree import SubTree
 from alula.trees.palette import CHILDREN, Category, NodeType, Palette
 from alula.trees.reading import AUTOREMAP, POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, node_name, type_name
 from alula.trees.script import Program, ScriptError, parse
+from alula.trees.script.scope import Unknown
 from alula.trees.structure import verify
 from alula.trees.tree import Subtree, Tree
 from alula.trees.values import ANY, STRING
@@ -75,13 +76,14 @@ class Scope:
         return self.surroundings.call(name, args)
 
 
-@dataclass(frozen=True)
+@dataclass
 class BoundScript:
-    """A script of a node."""
+    """A script of a node; ``unknown`` is why its last answer as a condition was false, where that was because nobody knows."""
 
     program: Program
     scope: Scope
     where: str
+    unknown: str = ""
 
     def run(self) -> object:
         """Run it; raises TickError."""
@@ -91,11 +93,13 @@ class BoundScript:
             raise TickError(f"{self.where}: {error}") from error
 
     def holds(self) -> bool:
-        """Run it as a condition; raises TickError."""
+        """Run it as a condition; what is unknown does not hold. Raises TickError."""
         try:
-            return self.program.holds(self.scope)
+            answer = self.program.judge(self.scope)
         except ScriptError as error:
             raise TickError(f"{self.where}: {error}") from error
+        self.unknown = answer.why if isinstance(answer, Unknown) else ""
+        return answer is True
 
 
 def make_tree(

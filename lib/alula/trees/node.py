@@ -26,6 +26,9 @@ Watcher = Callable[["Node", Status, Status], None]
 class Script(Protocol):
     """A script that was read, over a node's blackboard; raises TickError."""
 
+    unknown: str
+    """Why its last answer as a condition was false, where that was because nobody knows."""
+
     def run(self) -> object:
         """Run it, and return its value."""
         ...

@@ -291,11 +291,3 @@ def test_a_foreign_missions_entries_may_come_from_outside(robot, tmp_path):
     (foreign,) = findings_of("mission.xml", text, robot, [palette])
     assert (ours.code, ours.severity) == ("ALU607", Severity.ERROR)
     assert (foreign.code, foreign.severity) == ("ALU607", Severity.WARNING)
-
-
-def test_data_in_a_script_is_refused():
-    (file,) = check_texts([ModelFile("s.rl", "skillset s { type Level  data level: Level period 1 sec  skill f { success R {} } }")])
-    text = '<root BTCPP_format="4"><BehaviorTree ID="m"><ScriptCondition code="s.level.value &lt; 2"/></BehaviorTree></root>'
-    (finding,) = findings_of("mission.xml", text.encode(), file.skillsets)
-    assert (finding.code, finding.severity) == ("ALU615", Severity.ERROR)
-    assert "is data" in finding.message

@@ -83,5 +83,5 @@ def test_numbers_have_the_limits_of_their_types():
 
 
 def test_what_is_no_resource_has_no_value_in_a_script():
-    world = World({"arm": Arm()}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)), frozenset({"arm.hand"}))
+    world = World({"arm": Arm()}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)), frozenset({"arm.hand"}), frozenset())
     assert [world.value(name) for name in ("arm.hand", "arm.level", "arm.level.value", "leg.hand")] == ["OPEN", None, None, None]

@@ -84,7 +84,7 @@ def test_enums_come_before_entries_and_stand_in_texts():
 def test_dotted_names_are_read():
     program = parse("navigation.flight_status == 'IN_AIR' && navigation.guidance_state.obstacle_m<2")
     world = World({"navigation.flight_status": "IN_AIR", "navigation.guidance_state.obstacle_m": 1.5})
-    assert program.holds(world)
+    assert program.judge(world) is True
     assert parse("a.b..c.d").run(World({"a.b": "x", "c.d": "y"})) == "xy"
 
 
@@ -130,7 +130,7 @@ def test_what_is_neither_true_nor_false_is_refused(value):
 
 def test_a_condition_that_is_neither_has_a_place():
     with pytest.raises(ScriptError) as failure:
-        parse("1; 'x'").holds(World())
+        parse("1; 'x'").judge(World())
     assert failure.value.offset == 3
 
 

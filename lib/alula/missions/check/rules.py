@@ -10,7 +10,7 @@ from alula.common.suggestions import nearest, quoted
 from alula.missions.check.resources import clash
 from alula.missions.check.skills import Skills, named_results
 from alula.missions.filed.world import FUNCTIONS
-from alula.missions.skill_types import OUTCOME_PORT, SUCCESS_PORT
+from alula.missions.skill_types import OUTCOME_PORT, PORT_TYPES, SUCCESS_PORT
 from alula.model.model import Skill
 from alula.model.units import KIND_OF_UNIT, UNIT_IN_SI
 from alula.trees.check.checking import Whole
@@ -21,7 +21,7 @@ from alula.trees.check.sites import Site
 from alula.trees.check.traits import F
 from alula.trees.document import Attribute
 from alula.trees.errors import Problem
-from alula.trees.script.syntax import Call, Comparison, Literal, Name, Node, walk
+from alula.trees.script.syntax import Assignment, Call, Comparison, Literal, Name, Node, walk
 
 _NUMBER_WITH_UNIT = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*([A-Za-z%/]+)\s*")
 
@@ -72,6 +72,7 @@ class SkillRules:
             for attribute in (*before(site), *within(site), *after(site)):
                 program = whole.scripts.program(attribute)
                 for statement in program.statements if program else ():
+                    yield from self._unguarded(attribute, statement)
                     asked: set[int] = set()
                     for node in walk(statement):
                         yield from self._node(attribute, node, asked)
@@ -109,11 +110,28 @@ class SkillRules:
             cure = nearest(skillset_name, self.skills.skillsets)
             yield in_value("ALU615", attribute, place, f"there is no skillset `{skillset_name}`", cure)
         elif name.partition(".")[0] in skillset.data_index:
-            cure = "have a precondition or an invariant of a skill ask for it"
-            yield in_value("ALU615", attribute, place, f"`{node.name}` is data: a mission's scripts ask for resources", cure)
+            data, _, field = name.partition(".")
+            plain = skillset.data_index[data].type in PORT_TYPES
+            if plain and field:
+                yield in_value("ALU615", attribute, place, f"`{skillset_name}.{data}` has no fields", f"write `{skillset_name}.{data}`")
+            elif not plain and not field:
+                yield in_value("ALU615", attribute, place, f"`{node.name}` is no single value", f"name a field: `{node.name}.FIELD`")
         elif name not in skillset.resource_index:
-            cure = nearest(name, skillset.resource_index)
-            yield in_value("ALU615", attribute, place, f"`{skillset_name}` has no resource `{name}`", cure)
+            cure = nearest(name, {*skillset.resource_index, *skillset.data_index})
+            yield in_value("ALU615", attribute, place, f"`{skillset_name}` has no resource and no data `{name}`", cure)
+
+    def _unguarded(self, attribute: Attribute, statement: Node) -> Iterator[Problem]:
+        """Yield data that an assignment takes: they may be unknown when it does, and then it can't."""
+        if isinstance(statement, Assignment):
+            for node in walk(statement.value):
+                data = ".".join(node.name.split(".", 2)[:2]) if isinstance(node, Name) else ""
+                if data in self.skills.names["data"] and not self._asked_only(statement.value, node):
+                    message = f"`{data}` may have no fresh value here, and an entry takes no unknown one"
+                    yield in_value("ALU615", attribute, (node.offset, node.end), message, "ask for data in conditions")
+
+    def _asked_only(self, value: Node, name: Node) -> bool:
+        """Tell whether a name is but an argument, such as that of `fresh`."""
+        return any(isinstance(call, Call) and any(one is name for one in call.arguments) for call in walk(value))
 
     def _states(self, attribute: Attribute, node: Comparison) -> Iterator[Problem]:
         for one in node.operands:

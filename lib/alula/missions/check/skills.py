@@ -39,6 +39,7 @@ class Skills:
         return {
             "skill": frozenset(f"{skillset}.{skill.name}" for skillset, skill in skills),
             "end": frozenset(ends),
+            "data": frozenset(f"{one.name}.{data}" for one in sets for data in one.data_index),
             "resource": frozenset(f"{one.name}.{resource.name}" for one in sets for resource in one.resources),
         }
 

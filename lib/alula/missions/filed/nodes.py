@@ -17,6 +17,13 @@ def asked(node: Action | Condition | Decorator, port: str = "if") -> Script:
     return node.wiring.compile(node.wiring.ports.get(port, "true"), port)
 
 
+def holds(node: Action, script: Script) -> bool:
+    """Ask; where nobody knows, the node says why."""
+    answer = script.holds()
+    node.feedback_message = script.unknown
+    return answer
+
+
 class WaitFor(Action):
     """Runs until a condition holds."""
 
@@ -32,7 +39,7 @@ class WaitFor(Action):
 
     def on_running(self) -> Answer:
         """Look."""
-        return SUCCESS if self._script.holds() else RUNNING
+        return SUCCESS if holds(self, self._script) else RUNNING
 
 
 class Stays(Action):
@@ -54,7 +61,7 @@ class Stays(Action):
 
     def on_running(self) -> Answer:
         """Look and count."""
-        if not self._script.holds():
+        if not holds(self, self._script):
             return FAILURE
         return SUCCESS if self.now_ns - self._since_ns >= seconds_ns(self, "for") else RUNNING
 
@@ -84,7 +91,7 @@ class Awaits(Action):
     def on_running(self) -> Answer:
         """Look and count."""
         now_ns = self.now_ns
-        if not self._script.holds():
+        if not holds(self, self._script):
             self._holds_since_ns = None
         elif self._holds_since_ns is None:
             self._holds_since_ns = now_ns

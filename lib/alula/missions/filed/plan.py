@@ -17,7 +17,7 @@ from alula.missions.filed.nodes import Needs
 from alula.missions.filed.palette import mission_palette
 from alula.missions.filed.part import MissionPart
 from alula.missions.filed.skills import Crew, SkillNode
-from alula.missions.filed.world import World, states_of
+from alula.missions.filed.world import World, asked_data, states_of
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import InputError, Inputs, MissionPlan
 from alula.missions.skillset import Client, Clock
@@ -82,11 +82,15 @@ class Maker:
         self._clock_ns = clock_ns
         self._enums = states_of(skillsets)
         self._resources = frozenset(f"{one.name}.{resource}" for one in skillsets for resource in one.resource_index)
+        self._data = frozenset(f"{one.name}.{data}" for one in skillsets for data in one.data_index)
         self._palette = mission_palette(skillsets, part, crew)
+        for skillset, data in asked_data(files, skillsets).items():
+            if data:
+                crew.clients[skillset].follow(data)
 
     def tree(self, name: str) -> Tree:
         """Make one; that of the file where no name is given."""
-        world = World(self.crew.clients, self.crew.memory, self._resources)
+        world = World(self.crew.clients, self.crew.memory, self._resources, self._data)
         files, board = self.files, self.board
         tree = build_tree(files, self._palette, self._clock_ns, main=name, enums=self._enums, surroundings=world, blackboard=board)
         for node in tree.nodes:

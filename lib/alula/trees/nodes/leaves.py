@@ -70,7 +70,10 @@ class ScriptCondition(Condition):
 
     def update(self) -> Answer:
         """Ask."""
-        return SUCCESS if self._code.script().holds() else FAILURE
+        script = self._code.script()
+        holds = script.holds()
+        self.feedback_message = script.unknown
+        return SUCCESS if holds else FAILURE
 
 
 class Sleep(Action):

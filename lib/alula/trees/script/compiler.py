@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TypeAlias, cast
 
 from alula.trees.script.errors import ScriptError
-from alula.trees.script.scope import Reference, Scope, Value
+from alula.trees.script.scope import Reference, Scope, Unknown, Value
 from alula.trees.script.syntax import Assignment, Call, Chain, Comparison, Conditional, Literal, Name, Node, Prefix
 from alula.trees.script.values import ValueMismatch, as_float, as_integer, as_text, fitted, is_number, joined, kind, number_or_enum, truth
 
@@ -110,6 +110,8 @@ def _prefix(node: Prefix) -> Code:
 
     def run(scope: Scope) -> Value:
         value = operand(scope)
+        if isinstance(value, Unknown):
+            return value
         try:
             return apply(_number(value, node.operator))
         except ValueMismatch as error:
@@ -135,6 +137,8 @@ def _combine(symbol: str, left: Value, right: Value) -> Value:
     for side, value in (("left", left), ("right", right)):
         if value is None:
             raise ValueMismatch(f"the {side} operand of `{symbol}` has no value yet")
+    if isinstance(left, Unknown) or isinstance(right, Unknown):
+        return _of_unknown(symbol, left, right)
     texts = isinstance(left, str) + isinstance(right, str)
     if symbol == "+" and texts == 2:
         return joined(as_text(left), as_text(right))
@@ -150,6 +154,14 @@ def _combine(symbol: str, left: Value, right: Value) -> Value:
         return float(_BITS[symbol](as_integer(left), as_integer(right)))
     first, second = truth(left), truth(right)
     return float(first and second) if symbol == "&&" else float(first or second)
+
+
+def _of_unknown(symbol: str, left: Value, right: Value) -> Value:
+    """Return what an operator makes of two values one of which at least is unknown: what the other decides, else the unknown."""
+    unknown, other = (left, right) if isinstance(left, Unknown) else (right, left)
+    if symbol in {"&&", "||"} and is_number(other) and truth(other) == (symbol == "||"):
+        return float(symbol == "||")
+    return unknown
 
 
 def _chain(node: Chain) -> Code:
@@ -192,7 +204,11 @@ _TEXTS: dict[str, Callable[[str, str], bool]] = {
 }
 
 
-def _holds(symbol: str, left: Value, right: Value, scope: Scope) -> bool:
+def _holds(symbol: str, left: Value, right: Value, scope: Scope) -> bool | Unknown:
+    if isinstance(left, Unknown):
+        return left
+    if isinstance(right, Unknown):
+        return right
     if isinstance(left, str) and isinstance(right, str):
         return _TEXTS[symbol](left, right)
     sides = []
@@ -211,15 +227,19 @@ def _comparison(node: Comparison) -> Code:
 
     def run(scope: Scope) -> Value:
         left = first(scope)
+        answer: Value = 1.0
         for symbol, code, place in steps:
             right = code(scope)
             try:
-                if not _holds(symbol, left, right, scope):
-                    return 0.0
+                holds = _holds(symbol, left, right, scope)
             except ValueMismatch as error:
                 raise _error(error, node.offset, place.end) from error
+            if not holds:
+                return 0.0
+            if isinstance(holds, Unknown):
+                answer = holds
             left = right
-        return 1.0
+        return answer
 
     return run
 
@@ -228,8 +248,11 @@ def _conditional(node: Conditional) -> Code:
     condition, then, otherwise = compile_node(node.condition), compile_node(node.then), compile_node(node.otherwise)
 
     def run(scope: Scope) -> Value:
+        asked = condition(scope)
+        if isinstance(asked, Unknown):
+            return asked
         try:
-            chosen = then if as_float(condition(scope)) != 0 else otherwise
+            chosen = then if as_float(asked) != 0 else otherwise
         except ValueMismatch as error:
             raise _error(error, node.condition.offset, node.condition.end) from error
         return chosen(scope)
@@ -282,6 +305,8 @@ def _old(scope: Scope, node: Assignment, name: str) -> Callable[[], Value]:
 def _assigned(symbol: str, old: Value, value: Value, scope: Scope) -> Value:
     if value is None:
         raise ValueMismatch("the right side has no value yet")
+    if isinstance(value, Unknown):
+        raise ValueMismatch(f"the right side is unknown: {value}", "ask for data in conditions")
     if symbol in {":=", "="}:
         return fitted(value, old, scope.enums)
     if old is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from alula.trees.script.compiler import Code, compile_node
 from alula.trees.script.errors import ScriptError
-from alula.trees.script.scope import Scope, Value
+from alula.trees.script.scope import Scope, Unknown, Value
 from alula.trees.script.syntax import Assignment, Call, Name, Node, walk
 from alula.trees.script.values import ValueMismatch, truth
 
@@ -52,11 +52,11 @@ class Program:
             value = code(scope)
         return value
 
-    def holds(self, scope: Scope) -> bool:
-        """Run the script as a condition; raise ScriptError where its value is neither true nor false."""
+    def judge(self, scope: Scope) -> bool | Unknown:
+        """Run the script as a condition; raise ScriptError where its value is neither true nor false, nor unknown."""
         value = self.run(scope)
         try:
-            return truth(value)
+            return value if isinstance(value, Unknown) else truth(value)
         except ValueMismatch as error:
             last = self.statements[-1]
             raise ScriptError(f"a condition's value: {error}", last.offset, end=last.end, cure=error.cure) from error

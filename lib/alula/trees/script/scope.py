@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 Value: TypeAlias = object
@@ -10,6 +11,20 @@ Value: TypeAlias = object
 
 Anything else is a value of the robot's own: a script copies it and can do no more with it.
 """
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """The value of what is not known now, such as data that are too old; ``why`` is a sentence.
+
+    What is made of it is unknown, too, unless the other operand of `&&` or `||` decides (Kleene's logic); as a condition it is false.
+    """
+
+    why: str
+
+    def __str__(self) -> str:
+        """Return why it is not known."""
+        return self.why
 
 
 class Reference(str):

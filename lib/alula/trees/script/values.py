@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 
-from alula.trees.script.scope import Value
+from alula.trees.script.scope import Unknown, Value
 
 MAX_TEXT = 1_000_000
 """Characters of a text that a script makes: `a += a`, ticked a hundred times, must not eat the memory."""
@@ -44,6 +44,8 @@ def kind(value: Value) -> str:
             return "a number"
         case str():
             return "a text"
+        case Unknown():
+            return "the unknown"
         case _:
             return f"a {type(value).__name__}"
 
