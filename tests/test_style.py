@@ -31,6 +31,7 @@ TYPED = [
     "bridge/ros_bridge/ros_bridge",
     "tools/bridge_tools",
     "tools/skill_bench",
+    "tools/flight_bench",
     "tools/console_bench",
     "tools/perception_bench",
     "tools/log_mutations",
