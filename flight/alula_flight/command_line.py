@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+import argparse
+import sys
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from alula.commands.run_options import check_seed, groot_address, run_folder, run_parser, world_file
 from alula.common.faults import FaultError, parse_fault
 from alula.common.network import free_port
 from alula.common.scenarios import Scenario, ScenarioError, load_scenario
+from alula.live import options
 from alula.live.part import RunPart
 from alula.live.spec import RequestError, RunSpec
 from alula_flight.launch import launch_file
+
+
+class TellOptions(argparse.Action):
+    """Prints what the robot's part declares, and exits, as ``--help`` does."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, *, part: RunPart, **others: Any) -> None:
+        super().__init__(option_strings, dest, nargs=0, default=argparse.SUPPRESS, **others)
+        self._part = part
+
+    def __call__(self, parser: argparse.ArgumentParser, *_others: object) -> None:
+        """Print and exit."""
+        sys.stdout.write(f"{options.as_json(self._part)}\n")
+        parser.exit()
 
 
 def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
@@ -20,6 +37,7 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
     parser = run_parser("Run a scenario of the robot, in a ROS graph of its own.")
     parser.add_argument("--console", action="store_true", help="serve the operator's page beside the run")
     parser.add_argument("--behaviour", action="append", default=[], metavar="FILE", help="with --mock: behaviour file of the mocks")
+    parser.add_argument(options.FLAG, action=TellOptions, part=part, help="print the robot's own options as JSON, and run nothing")
     part.add_options(parser)
     given = parser.parse_args(arguments)
     scenario = read_scenario(given.scenario)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import uuid
+from dataclasses import asdict
 
 import psutil
 import pytest
@@ -16,6 +17,7 @@ from alula.common.network import NoFreeDomainError, claim_domain, free_port
 from alula.common.processes import RUN_ID_VARIABLE, end_run, processes_of_run
 from alula.common.record import EVENTS, RecordWriter
 from alula.common.record import FILE as RECORD
+from alula.live.options import RunOption, words_of
 from alula.live.part import RunPart
 from alula.live.spec import RequestError, RunSpec
 from alula.model.execution_state import ExecutionState
@@ -28,6 +30,34 @@ from alula_flight.command_line import parse
 from alula_flight.console_page import console_page
 from alula_flight.outcome import CANNOT_START
 from alula_flight.run import main, monitor_of
+
+
+class Delivering(RunPart):
+    """A robot that can be told where to and how."""
+
+    def add_options(self, parser):
+        parser.add_argument("--to", metavar="ROOM", default="dock", help="where the parcel goes")
+        parser.add_argument("--gently", action="store_true", help="slow in curves")
+        parser.add_argument("--gear", type=int, choices=[1, 2], help="of the drive")
+
+
+def test_the_robots_own_options_are_told_as_data(tmp_path, capsys):
+    with pytest.raises(SystemExit) as told:
+        parse(["--options"], Delivering())
+    assert told.value.code == 0
+    options = [
+        RunOption("to", "where the parcel goes", metavar="ROOM", default="dock"),
+        RunOption("gently", "slow in curves", takes_value=False),
+        RunOption("gear", "of the drive", choices=("1", "2")),
+    ]
+    assert json.loads(capsys.readouterr().out) == [json.loads(json.dumps(asdict(option))) for option in options]
+    words = words_of({"to": "lab 3", "gently": "", "gear": "2"}, options)
+    assert words == ["--to=lab 3", "--gently", "--gear=2"]
+    assert parse(["mapping", *words, "--out", str(tmp_path / "run")], Delivering()).scenario == "mapping"
+    with pytest.raises(RequestError, match="--gear: there is no '3'; there are 1, 2"):
+        words_of({"gear": "3"}, options)
+    with pytest.raises(RequestError, match="no option --rate; it declares --to, --gently, --gear"):
+        words_of({"rate": "0"}, options)
 
 
 @pytest.mark.parametrize("arguments", [["mapping", "--seed", "x"], [], ["mapping", "--nosuch"]])

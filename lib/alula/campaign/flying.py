@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from alula.campaign.mock_flights import MockFlights, load_flights
 from alula.campaign.plan import SIMULATOR, Flight
 from alula.common.record import RecordError, read_record
 from alula.common.robots import find_robot
+from alula.live.options import entry
 from alula.records.causes.effects import EffectsByFault
 from alula.records.causes.fault_file import effects_of_robot
 from alula.records.causes.faults import Fault, faults_asked
@@ -31,10 +31,10 @@ from alula.runtime.mock import Behaviour
 Row = dict[str, Any]
 
 
-def fly(flights: Sequence[Flight], over: str, behaviour: tuple[str, ...], out: str) -> list[Row]:
+def fly(flights: Sequence[Flight], over: str, behaviour: tuple[str, ...], out: str, options: tuple[str, ...] = ()) -> list[Row]:
     """Fly one after another; return a row of each. ``out`` is the campaign's folder: flights in the simulator leave theirs there."""
     if over == SIMULATOR:
-        return [_simulated(flight, Path(out)) for flight in flights]
+        return [_simulated(flight, options, Path(out)) for flight in flights]
     return [_mocked(flight, behaviour) for flight in flights]
 
 
@@ -126,14 +126,14 @@ def _ended(died: Mapping[str, Any], events: Sequence[EngineEvent], effects: Effe
 # --- in the simulator ---------------------------------------------------------------------------------------------------
 
 
-def _simulated(flight: Flight, out: Path) -> Row:
+def _simulated(flight: Flight, options: Sequence[str], out: Path) -> Row:
     """Fly as a user does; the flight's folder stays."""
     folder = out / f"flight-{flight.number:05d}"
     for number in range(2, 1000):  # one that a crash has left half done stays as it is
         if not folder.exists():
             break
         folder = out / f"flight-{flight.number:05d}-{number}"
-    words = [str(Path(os.environ["ALULA_ROOT"]) / "alula"), "fly", flight.scenario, "--seed", str(flight.seed), "--rate", "0"]
+    words = [entry(), "run", flight.scenario, "--seed", str(flight.seed), *options]
     if flight.world is not None:
         words += ["--world", str(flight.world.absolute())]
     for fault in flight.faults:

@@ -14,7 +14,7 @@ from alula.common.located_yaml import Located, choices, read_yaml
 from alula.common.scenarios import scenario_names
 from alula.records.errors import AnalysisError
 
-KEYS = ("about", "over", "scenarios", "seeds", "faults", "flights", "seed", "draw", "worlds", "behaviour", "at_once")
+KEYS = ("about", "over", "scenarios", "seeds", "faults", "flights", "seed", "draw", "worlds", "options", "behaviour", "at_once")
 DRAW = ("faults", "most", "in_turn", "at_s", "lasts_s")
 MOCKS, SIMULATOR = "mocks", "simulator"
 MOST_FLIGHTS = 1_000_000
@@ -22,7 +22,7 @@ MOST_FLIGHTS = 1_000_000
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight of a campaign; ``faults`` as on the command line of ``fly``; ``world`` is a file, None: the scenario's own."""
+    """One flight of a campaign; ``faults`` as on the command line of ``run``; ``world`` is a file, None: the scenario's own."""
 
     number: int
     scenario: str
@@ -38,10 +38,14 @@ class Flight:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Flights, numbered from 0, and over what they are flown; ``at_once`` is how many at a time, None: one a core."""
+    """Flights, numbered from 0, and over what they are flown.
+
+    ``options`` are the robot's own of a live run, by name; ``at_once`` is how many at a time, None: one a core.
+    """
 
     over: str
     flights: tuple[Flight, ...]
+    options: Mapping[str, str] = field(default_factory=dict)
     behaviour: tuple[Path, ...] = ()
     at_once: int | None = None
     scenarios: tuple[str, ...] = field(default=())
@@ -49,7 +53,12 @@ class Campaign:
     def as_dict(self) -> dict[str, object]:
         """Return what decides the table: a campaign goes on only where this is the same."""
         flights = [{**asdict(flight), "world": flight.world and flight.world.read_text(encoding="utf-8")} for flight in self.flights]
-        return {"over": self.over, "behaviour": [path.read_text(encoding="utf-8") for path in self.behaviour], "flights": flights}
+        return {
+            "over": self.over,
+            "behaviour": [path.read_text(encoding="utf-8") for path in self.behaviour],
+            "flights": flights,
+            **({"options": dict(self.options)} if self.options else {}),
+        }
 
 
 def load_campaign(path: Path) -> Campaign:
@@ -74,13 +83,17 @@ def load_campaign(path: Path) -> Campaign:
     flights = _drawn(document, said, scenarios) if drawn else _listed(said, scenarios)
     if over == SIMULATOR and "behaviour" in said:
         raise said["behaviour"].wrong("`behaviour` is for mocks only; leave it out, or fly `over: mocks`")
-    if over == MOCKS and "worlds" in said:
-        raise said["worlds"].wrong("`worlds` is for the simulator only; leave it out, or fly `over: simulator`")
+    for key in ("worlds", "options"):
+        if over == MOCKS and key in said:
+            raise said[key].wrong(f"`{key}` is for the simulator only; leave it out, or fly `over: simulator`")
     worlds = said["worlds"].record("`worlds`", scenarios) if "worlds" in said else {}
     files = {scenario: _file(path, part, "a world file") for scenario, part in worlds.items()}
     return Campaign(
         over=over,
         flights=tuple(replace(flight, world=files.get(flight.scenario)) for flight in flights),
+        options={name: one.text(f"the option `{name}`") for name, one in said["options"].entries("`options`").items()}
+        if "options" in said
+        else {},
         behaviour=tuple(_file(path, part, "a behaviour file") for part in said["behaviour"].elements()) if "behaviour" in said else (),
         at_once=_whole(said["at_once"], "`at_once`", 1, 64) if "at_once" in said else (1 if over == SIMULATOR else None),
         scenarios=scenarios,

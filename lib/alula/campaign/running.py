@@ -10,6 +10,8 @@ from pathlib import Path
 from alula.campaign.flying import fly
 from alula.campaign.plan import SIMULATOR, Campaign, Flight
 from alula.campaign.table import Table
+from alula.live.options import ask_options, words_of
+from alula.live.spec import RequestError
 from alula.records.errors import AnalysisError
 
 TOGETHER = 10
@@ -24,11 +26,12 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: s
     """Fly what is missing in the table.
 
     Raises:
-        AnalysisError: there is no Dask scheduler at the address.
+        AnalysisError: there is no Dask scheduler at the address, or the robot has no such options.
     """
     left = [flight for flight in campaign.flights if flight.number not in table.rows]
     if not left:
         return
+    options = _words(campaign)
     from dask import config  # late: it takes a second, and a finished campaign does not need it
     from distributed import Client, LocalCluster, as_completed
 
@@ -48,10 +51,17 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: s
             raise AnalysisError(f"--dask {dask}: can't be used: {error}") from None
         behaviour = tuple(str(path.absolute()) for path in campaign.behaviour)
         parts = list(_parts(left, 1 if campaign.over == SIMULATOR else TOGETHER))
-        futures = client.map(fly, parts, over=campaign.over, behaviour=behaviour, out=str(out.absolute()), pure=False)
+        futures = client.map(fly, parts, over=campaign.over, behaviour=behaviour, out=str(out.absolute()), options=options, pure=False)
         for _, rows in as_completed(futures, with_results=True):
             table.add(rows)
             progress(len(table.rows))
+
+
+def _words(campaign: Campaign) -> tuple[str, ...]:
+    try:
+        return tuple(words_of(campaign.options, ask_options())) if campaign.options else ()
+    except RequestError as error:
+        raise AnalysisError(f"`options`: {error}") from None
 
 
 def _parts(flights: Sequence[Flight], size: int) -> Iterator[Sequence[Flight]]:

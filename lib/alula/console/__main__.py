@@ -23,6 +23,7 @@ from alula.console.admission import Admission, is_loopback
 from alula.console.certificates import fingerprint, own_certificate, server_context
 from alula.console.link import ActError, Link, Mission, Skillsets
 from alula.console.server import Console
+from alula.live.options import ask_options
 
 PORT = 8440
 DOMAINS = range(233)
@@ -84,7 +85,7 @@ def first_run(options: argparse.Namespace) -> Path | None:
     if options.domain is not None:
         found = next((run.folder for run in live_runs() if run.domain == options.domain), None)
         if found is None:
-            raise ValueError(f"--domain {options.domain}: no run is under way there; start one (./alula fly mapping), or leave it out")
+            raise ValueError(f"--domain {options.domain}: no run is under way there; start one (alula run SCENARIO), or leave it out")
         return found
     if options.run == LATEST:
         return None
@@ -117,7 +118,7 @@ async def serve_until_told(console: Console, admission: Admission, known_by: str
         sys.stdout.flush()
         if known_by:
             sys.stderr.write(f"the certificate is self-signed; check that the browser shows this SHA-256 fingerprint: {known_by}\n")
-        sys.stderr.write("the operator's page is served there; Ctrl-C ends the server, not a flight\n")
+        sys.stderr.write("the operator's page is served there; Ctrl-C ends the server, not a run\n")
         await told.wait()
 
 
@@ -149,7 +150,7 @@ def main(arguments: Sequence[str] | None = None, make_link: Callable[[], Link] =
         token = "" if is_loopback(options.host) else secrets.token_urlsafe(24)
         tls, known_by = tls_of(options)
         admission = Admission(options.host, port_of(options), token, tls)
-        asyncio.run(serve_until_told(Console(admission, LateLink(make_link), fixed=fixed), admission, known_by))
+        asyncio.run(serve_until_told(Console(admission, LateLink(make_link), fixed=fixed, ask_options=ask_options), admission, known_by))
     except (ValueError, OSError) as error:
         sys.stderr.write(f"alula console: {error}\n")
         return 2

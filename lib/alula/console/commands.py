@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from alula.common.runs import NoRunError, Run, load_run
 from alula.console import acts
 from alula.console.link import ActError, Link, Mission, PerRun
 from alula.console.manual_control import QUESTIONS, ManualControl
+from alula.live.options import RunOption
 
 ON_THE_FLIGHT = frozenset({"abort", "pause", "resume", "off"})
 """Acts of which each is begun once: a request that comes while the act is under way gets the same answer."""
@@ -33,7 +34,8 @@ Asked = Mapping[str, Any]
 class Commands:
     """The acts by name. They wait for answers, so they are called in threads."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: Link, options: Callable[[], Sequence[RunOption]]) -> None:
+        self._options = options
         self._missions: PerRun[Mission] = PerRun(link.connect)
         self._controls: PerRun[ManualControl] = PerRun(lambda domain: ManualControl(link.listen(domain)))
         self._acts: Mapping[str, Callable[[Asked, Path | None], Done]] = {
@@ -71,7 +73,7 @@ class Commands:
         self._controls.keep(_runs_of(manual))
 
     def _start(self, asked: Asked, _run: Path | None) -> Done:
-        folder = acts.start(acts.read_flight(asked))
+        folder = acts.start(acts.read_wanted(asked, self._options()))
         return Done(folder, "start", f"{folder.name} is started")
 
     def _told(self, what: str, asked: Asked, run: Path | None, act: Callable[[Mission], str]) -> Done:

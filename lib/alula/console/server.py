@@ -9,9 +9,10 @@ import asyncio
 import contextlib
 import json
 import secrets
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ from alula.console.admission import Admission
 from alula.console.feed import Feed, place_of
 from alula.console.link import ActError, Link
 from alula.console.page import REPORT, make_page
+from alula.live.options import RunOption
+from alula.live.spec import RequestError
 
 FEED = "/feed"
 STATUS_S = 0.3
@@ -61,12 +64,19 @@ class Viewer:
 
 
 class Console:
-    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest. ``link`` reaches the robots."""
+    """Serves the page of all runs in a folder; ``fixed`` is the one that is shown first, else the newest. ``link`` reaches the robots.
 
-    def __init__(self, admission: Admission, link: Link, *, fixed: Path | None = None) -> None:
+    ``ask_options`` says which options the robot's live runs have; it raises RequestError where none can be started.
+    """
+
+    def __init__(
+        self, admission: Admission, link: Link, *, fixed: Path | None = None, ask_options: Callable[[], Sequence[RunOption]] = tuple
+    ) -> None:
         self._admission = admission
         self._fixed = fixed
-        self._offers = {"scenarios": scenario_names(), "worlds": acts.world_names(), "vehicles": acts.VEHICLES}
+        self._offers: dict[str, object] = {"scenarios": scenario_names(), "worlds": acts.world_names(), "over": [acts.MOCKS], "options": []}
+        self._ask_options = ask_options
+        self._options: Sequence[RunOption] = ()
         self._page = make_page(title="Alula", entries=None).encode()
         self._feeds: dict[Path, tuple[Feed, asyncio.Task[None]]] = {}
         self._viewers: set[Viewer] = set()
@@ -74,7 +84,7 @@ class Console:
         self._runs: list[Path] = []
         self._live: set[Path] = set()
         self._starting = asyncio.Lock()
-        self._commands = commands.Commands(link)
+        self._commands = commands.Commands(link, lambda: self._options)
         self._threads = {manual: ThreadPoolExecutor(WAITING, "manual" if manual else "acts") for manual in (False, True)}
         self._under_way: dict[tuple[object, ...], asyncio.Task[commands.Done]] = {}
         self._manual: dict[Path, str] = {}
@@ -86,7 +96,10 @@ class Console:
     async def open(self) -> Any:
         """Serve as long as the context lasts."""
         server: Server
-        looking = [asyncio.create_task(job) for job in (self._look_for_runs(), self._look_at_skills(), self._stay_connected())]
+        looking = [
+            asyncio.create_task(job)
+            for job in (self._learn_options(), self._look_for_runs(), self._look_at_skills(), self._stay_connected())
+        ]
         async with serve(
             self._serve_viewer,
             self._admission.host,
@@ -159,6 +172,15 @@ class Console:
         return Response(status.value, status.phrase, headers, body)
 
     # --- runs ----------------------------------------------------------------------------------------------------------
+
+    async def _learn_options(self) -> None:
+        """Ask once, as it takes a second or two; until then, and where no live run can be started here, the page offers mocks only."""
+        try:
+            self._options = await asyncio.to_thread(self._ask_options)
+        except RequestError as error:
+            sys.stderr.write(f"alula console: runs can be started over mocks only: {error}\n")
+            return
+        self._offers |= {"over": [acts.LIVE, acts.MOCKS], "options": [asdict(option) for option in self._options]}
 
     async def _look_for_runs(self) -> None:
         while True:

@@ -8,7 +8,7 @@ import json
 import threading
 import urllib.error
 import urllib.request
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,15 @@ from alula.common.network import free_port
 from alula.console.admission import Admission
 from alula.console.link import ActError, Link, Skillsets
 from alula.console.server import FEED, Console
+from alula.live.options import RunOption
 
 WAIT_S = 60.0
+
+OPTIONS = (
+    RunOption("link", "where the robot is", metavar="URL"),
+    RunOption("quick", "does not wait", takes_value=False),
+    RunOption("record", "what is recorded", default="functional", choices=("functional", "sensors")),
+)
 
 
 class Robot:
@@ -107,8 +114,8 @@ async def answer_to(viewer: ClientConnection, **asked: object) -> str:
 class Served:
     """A console in a thread of its own, which can be stopped and started."""
 
-    def __init__(self, fixed: Path, link: Link) -> None:
-        self._fixed, self._link, self.port = fixed, link, free_port()
+    def __init__(self, fixed: Path, link: Link, options: Sequence[RunOption]) -> None:
+        self._fixed, self._link, self._options, self.port = fixed, link, options, free_port()
         self._stop: Callable[[], None] = lambda: None
 
     def start(self) -> None:
@@ -118,7 +125,8 @@ class Served:
             over = asyncio.Event()
             loop = asyncio.get_running_loop()
             self._stop = lambda: loop.call_soon_threadsafe(over.set)
-            async with Console(Admission("127.0.0.1", self.port, ""), self._link, fixed=self._fixed).open():
+            admission = Admission("127.0.0.1", self.port, "")
+            async with Console(admission, self._link, fixed=self._fixed, ask_options=lambda: self._options).open():
                 up.set()
                 await over.wait()
 
@@ -136,8 +144,8 @@ class Served:
 
 
 @contextlib.contextmanager
-def served(fixed: Path, link: Link | None = None) -> Iterator[Served]:
-    console = Served(fixed, link or Robot())
+def served(fixed: Path, link: Link | None = None, options: Sequence[RunOption] = ()) -> Iterator[Served]:
+    console = Served(fixed, link or Robot(), options)
     console.start()
     try:
         yield console

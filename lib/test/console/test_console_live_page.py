@@ -14,10 +14,10 @@ import pytest
 from console_page import DRAWN, SIZES, UNNAMED, Page
 from console_records import HOSTILE, LIFT_OFF_S, failing_story, transition, write_record
 from console_reports import SUMMARY
-from console_serving import WAIT_S, Robot, served
+from console_serving import OPTIONS, WAIT_S, Robot, served
 
 from alula.common.record import EVENTS, MISSION, OPERATOR, TICKS, TREE
-from alula.console.acts import ActError, Flight
+from alula.console.acts import ActError, WantedRun
 from alula.console.entries import FAULT, HEALTH, PATH
 from alula.console.page import write_report
 
@@ -80,7 +80,7 @@ def test_a_run_that_ends_without_a_verdict_is_not_said_to_be_under_way(
     writer.close()
 
 
-def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
+def test_a_run_is_started_by_the_form_and_a_refusal_is_shown(
     browser: Any, make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from selenium.webdriver.common.keys import Keys
@@ -88,20 +88,23 @@ def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
 
     first, asked = make_run("first"), []
 
-    def start(flight: Flight) -> Path:
-        asked.append(flight)
-        if flight.seed == 8:
+    def start(wanted: WantedRun) -> Path:
+        asked.append(wanted)
+        if wanted.seed == 8:
             raise ActError("all DDS domains are taken")
         return make_run("second", story=[])
 
     monkeypatch.setattr("alula.console.acts.start", start)
-    with served(first) as console:
+    with served(first, options=OPTIONS) as console:
         page = Page(browser, console.address)
         page.wait("document.querySelectorAll('#operator form select option').length > 3 && alula.live.state === 'over'")
         browser.find_element("css selector", "#operator summary").click()
-        scenario, vehicle = browser.find_elements("css selector", "#operator form select")
+        scenario, over, record = browser.find_elements("css selector", "#operator form select")
         Select(scenario).select_by_visible_text("mapping")
-        Select(vehicle).select_by_visible_text("mocks")
+        browser.find_element("css selector", "#operator form .own input").send_keys("tcp:base:5")
+        assert [option.text for option in Select(record).options] == ["functional", "sensors"]
+        Select(over).select_by_visible_text("mocks")
+        assert page.run("document.querySelector('#operator .own').checkVisibility()") is False
         world = browser.find_element("css selector", "#operator form input[list]")
         world.send_keys(HOSTILE)
         seed = browser.find_element("css selector", "#operator form input[type=number]")
@@ -126,7 +129,14 @@ def test_a_flight_is_started_by_the_form_and_a_refusal_is_shown(
         page.wait("alula.live.link.status.run === 'second'")
         assert page.run("document.querySelector('#operator details').open") is False
         assert page.complaints() == []
-    assert asked[1] == Flight("mapping", 7, ("zed@30", "lidar@60"), "", "mocks", "")
+        browser.find_element("css selector", "#operator summary").click()
+        Select(over).select_by_visible_text("live")
+        Select(record).select_by_visible_text("sensors")
+        button.click()
+        button.click()
+        page.wait("document.querySelector('#flight output').textContent === 'start: second is started'")
+    again = WantedRun("mapping", 7, ("zed@30", "lidar@60"), options=("--link=tcp:base:5", "--record=sensors"))
+    assert asked[1:] == [WantedRun("mapping", 7, ("zed@30", "lidar@60"), mock=True), again]
 
 
 def test_an_act_needs_two_presses_and_everything_off_a_word(

@@ -16,14 +16,14 @@ from typing import Any
 
 import pytest
 from console_records import failing_story, write_record
-from console_serving import WAIT_S, Bench, Robot, answer_to, heard, serve
+from console_serving import OPTIONS, WAIT_S, Bench, Robot, answer_to, heard, serve
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from alula.common.record import EVENTS, MISSION, OPERATOR
 from alula.console import acts, commands, server
 from alula.console.__main__ import main
-from alula.console.acts import ActError, Flight, read_flight
+from alula.console.acts import ActError, WantedRun, read_wanted
 from alula.console.admission import is_loopback
 from alula.console.server import FEED, MAX_COMMANDS_PER_S, MAX_MESSAGE_BYTES
 from alula.report import ends
@@ -227,35 +227,39 @@ def test_everything_off_ends_the_processes_of_the_run(make_run: Callable[..., Pa
         ({"scenario": "mapping", "world": "--help"}, "is no world"),
         ({"scenario": "mapping", "world": "yard\n"}, "is no world"),
         ({"scenario": "mapping", "world": 3}, "is no world"),
-        ({"scenario": "mapping", "vehicle": "balloon"}, "there is no vehicle 'balloon'; there are simulator, mocks, vehicle"),
-        ({"scenario": "mapping", "vehicle": "vehicle"}, "needs the MAVLink connection"),
-        ({"scenario": "mapping", "autopilot": "tcp:127.0.0.1:5760"}, "a vehicle, and only that"),
-        ({"scenario": "mapping", "vehicle": "vehicle", "autopilot": "-o x"}, "is no MAVLink connection"),
+        ({"scenario": "mapping", "over": "balloon"}, "a run is live or over mocks, not 'balloon'"),
+        ({"scenario": "mapping", "options": ["--rate=0"]}, "options are texts by their names"),
+        ({"scenario": "mapping", "options": {"rate": 0}}, "options are texts by their names"),
+        ({"scenario": "mapping", "options": {"out": "/etc"}}, "the robot has no option --out; it declares --link, --quick, --record"),
+        ({"scenario": "mapping", "options": {"link": "a\nb"}}, "--link: needs a text of one line"),
+        ({"scenario": "mapping", "options": {"record": "all"}}, "--record: there is no 'all'; there are functional, sensors"),
     ],
 )
-def test_a_flight_that_can_not_be_is_refused(asked: dict[str, object], why: str) -> None:
+def test_a_run_that_can_not_be_is_refused(asked: dict[str, object], why: str) -> None:
     with pytest.raises(ActError, match=why.replace("'", ".")):
-        read_flight(asked)
+        read_wanted(asked, OPTIONS)
 
 
-def test_a_flight_is_the_command_line_that_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_is_the_command_line_that_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = {"scenario": "mapping", "seed": 3, "faults": ["zed@30"]}
-    mocked, elsewhere = read_flight({**asked, "vehicle": "mocks"}), read_flight({**asked, "world": "forest"})
-    real = read_flight({"scenario": "mapping", "vehicle": "vehicle", "autopilot": "/dev/ttyACM0"})
+    mocked, elsewhere = read_wanted({**asked, "over": "mocks"}, ()), read_wanted({**asked, "world": "forest"}, OPTIONS)
+    options = {"link": "-o /dev/ttyACM0", "quick": "ignored", "record": "sensors"}
+    real = read_wanted({"scenario": "mapping", "over": "live", "options": options}, OPTIONS)
     monkeypatch.setenv("ALULA_ROOT", "/alula")
-    words = ["/alula/alula", "fly", "mapping", "--seed", "3", "--out", "/out", "--fail", "zed@30"]
+    words = ["/alula/alula", "run", "mapping", "--seed", "3", "--out", "/out", "--fail", "zed@30"]
     assert mocked.words(Path("/out")) == [*words, "--mock"]
     assert elsewhere.words(Path("/out")) == [*words, "--world=forest"]
-    assert real.words(Path("/out")) == ["/alula/alula", "fly", "mapping", "--seed", "0", "--out", "/out", "--autopilot=/dev/ttyACM0"]
+    own = ["--link=-o /dev/ttyACM0", "--quick", "--record=sensors"]
+    assert real.words(Path("/out")) == ["/alula/alula", "run", "mapping", "--seed", "0", "--out", "/out", *own]
 
 
-def test_a_flight_that_does_not_start_says_why(make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_does_not_start_says_why(make_run: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     script = tmp_path / "alula"
-    script.write_text("#!/bin/sh\necho looking >&2\necho 'alula fly: all DDS domains are taken' >&2\nexit 2\n", encoding="utf-8")
+    script.write_text("#!/bin/sh\necho looking >&2\necho 'alula run: all DDS domains are taken' >&2\nexit 2\n", encoding="utf-8")
     script.chmod(0o755)
     monkeypatch.setenv("ALULA_ROOT", str(tmp_path))
-    with pytest.raises(ActError, match="alula fly: all DDS domains are taken"):
-        acts.start(Flight("mapping", 0, vehicle="mocks"))
+    with pytest.raises(ActError, match="alula run: all DDS domains are taken"):
+        acts.start(WantedRun("mapping", 0, mock=True))
 
 
 def test_only_the_link_to_a_robot_needs_ros() -> None:
@@ -265,7 +269,7 @@ def test_only_the_link_to_a_robot_needs_ros() -> None:
     assert [name for name in modules if name.split(".")[0] in {"rclpy", "std_srvs", "skillset_interfaces"}] == []
 
 
-@pytest.mark.parametrize("name", ["scenario", "world", "autopilot", "seed", "faults", "vehicle"])
+@pytest.mark.parametrize("name", ["scenario", "world", "options", "seed", "faults", "over"])
 def test_half_a_character_is_refused_with_one_line_and_the_viewer_stays(
     make_run: Callable[..., Path], capfd: pytest.CaptureFixture[str], name: str
 ) -> None:
@@ -309,14 +313,14 @@ def test_a_file_that_is_no_world_is_refused_and_nothing_of_it_is_shown(tmp_path:
     file.write_text(content, encoding="utf-8")
     for world in (file, tmp_path, tmp_path / "nowhere", Path("/dev/zero")):
         with pytest.raises(ActError, match=r"is no world: give one of .*yard") as refused:
-            read_flight({"scenario": "mapping", "world": str(world)})
+            read_wanted({"scenario": "mapping", "world": str(world)}, ())
         assert "secret" not in str(refused.value)
 
 
 def test_a_file_with_a_route_is_a_world(tmp_path: Path) -> None:
     file = tmp_path / "meadow.yaml"
     file.write_text("route: [[0, 0, 3], [5, 0, 3]]\n", encoding="utf-8")
-    assert read_flight({"scenario": "mapping", "world": str(file)}).world == str(file)
+    assert read_wanted({"scenario": "mapping", "world": str(file)}, ()).world == str(file)
 
 
 # --- stamps ---------------------------------------------------------------------------------------------------------------

@@ -54,18 +54,38 @@ class OperatorBar {
     const text = (placeholder, label, attributes = {}) => el("input", { type: "text", placeholder, "aria-label": label, autocomplete: "off", ...attributes });
     this.scenario = el("select", { name: "scenario" });
     this.seed = el("input", { type: "number", min: 0, max: 2147483647, value: 0 });
-    this.faults = text("zed@30, lidar@60", "failures, as zed@30");
+    this.faults = text("WHAT@SECONDS, ...", "failures, as WHAT@SECONDS");
     this.worlds = el("datalist", { id: "worlds" });
-    this.world = text("the scenario's", "route and world: a name, or a file on the robot's computer", { list: "worlds" });
-    this.vehicle = el("select", { onchange: () => this.enable() });
-    this.autopilot = text("udpin:127.0.0.1:14550", "MAVLink connection of the vehicle's autopilot");
+    this.world = text("the scenario's", "world: a name, or a file on the robot's computer", { list: "worlds" });
+    this.over = el("select", { name: "over", onchange: () => this.enable() });
+    this.own = el("span", { class: "own", "aria-label": "Options of the robot" });
     this.begin = this.armed("start", "press again: start", () => {
       const faults = this.faults.value.split(/[\s,]+/).filter(Boolean);
-      const autopilot = this.vehicle.value === "vehicle" ? this.autopilot.value.trim() : "";
-      this.tell("start", { scenario: this.scenario.value, seed: Number(this.seed.value), faults, world: this.world.value.trim(), vehicle: this.vehicle.value, autopilot });
+      this.tell("start", { scenario: this.scenario.value, seed: Number(this.seed.value), faults, world: this.world.value.trim(), over: this.over.value, options: this.ownOptions() });
     }, "go");
-    this.connection = field("at", this.autopilot);
-    return el("form", { "aria-label": "Start a mission", onsubmit: (event) => event.preventDefault() }, field("scenario", this.scenario), field("route and world", this.world), this.worlds, field("vehicle", this.vehicle), this.connection, field("seed", this.seed), field("failures", this.faults), this.begin);
+    this.worldField = field("world", this.world);
+    return el("form", { "aria-label": "Start a mission", onsubmit: (event) => event.preventDefault() }, field("scenario", this.scenario), this.worldField, this.worlds, field("run", this.over), field("seed", this.seed), field("failures", this.faults), this.own, this.begin);
+  }
+
+  /** Makes a field for each option that the robot's live runs have. */
+  offerOwn(options) {
+    const key = JSON.stringify(options);
+    if (this.own.offered === key) return;
+    this.own.offered = key;
+    const input = ({ name, about, metavar, default: usual, choices, takes_value: value }) => {
+      const attributes = { name, title: about, "aria-label": `${name}: ${about}` };
+      if (!value) return el("input", { type: "checkbox", ...attributes });
+      if (choices.length) return el("select", attributes, el("option", { value: "" }, usual || "–"), ...choices.filter((one) => one !== usual).map((one) => el("option", { value: one }, one)));
+      return el("input", { type: "text", autocomplete: "off", placeholder: usual || metavar, ...attributes });
+    };
+    this.own.replaceChildren(...options.map((option) => el("label", {}, `${option.name.replaceAll("-", " ")} `, input(option))));
+  }
+
+  /** What was filled in, by name; a run over mocks has none of these. */
+  ownOptions() {
+    if (this.over.value === "mocks") return {};
+    const given = [...this.own.querySelectorAll("input, select")].filter((input) => (input.type === "checkbox" ? input.checked : input.value.trim()));
+    return Object.fromEntries(given.map((input) => [input.name, input.type === "checkbox" ? "" : input.value.trim()]));
   }
 
   /** Sends an act, and says so until its answer comes. */
@@ -137,7 +157,9 @@ class OperatorBar {
     if (this.runs.value !== status.run && document.activeElement !== this.runs) this.runs.value = status.run;
     offer(this.scenario, status.scenarios);
     offer(this.worlds, status.worlds);
-    offer(this.vehicle, status.vehicles);
+    offer(this.over, status.over);
+    this.offerOwn(status.options);
+    this.worldField.hidden = !status.worlds.length;
     this.report.hidden = !status.report;
     if (status.report) this.report.href = `/runs/${encodeURIComponent(status.run)}/report.html`;
     const viewers = `${status.viewers} ${status.viewers === 1 ? "viewer" : "viewers"}`;
@@ -153,7 +175,7 @@ class OperatorBar {
     this.begin.disabled = !may;
     this.abort.disabled = this.pause.disabled = this.resume.disabled = !may || !this.status.live;
     [this.pause.hidden, this.resume.hidden] = [this.paused, !this.paused];
-    this.connection.hidden = this.vehicle.value !== "vehicle";
+    this.own.hidden = this.over.value === "mocks";
     this.off.disabled = this.abort.disabled || this.word.value.trim().toUpperCase() !== "OFF";
   }
 }

@@ -257,7 +257,7 @@ def drive(options: argparse.Namespace, out: Out) -> int:
     session = Session("alula", domain=place.domain)
     try:
         names: list[str] = []
-        problem = CommandError(f"no skillset runs {place.title}; ./alula fly mapping or ./alula mock skillsets/uav starts some")
+        problem = CommandError(f"no skillset runs {place.title}; alula run SCENARIO or alula mock starts some")
         # What is not there may belong to a skillset that the graph has not told of yet.
         while more := _other_skillsets(session.node, options.namespace, names):
             names = sorted([*names, *more])

@@ -1,0 +1,90 @@
+"""The options that a robot's part adds to its live runs, as data: for those who can't import the part, and ask ``alula run --options``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from alula.live.part import RunPart
+from alula.live.spec import RequestError
+
+FLAG = "--options"
+TIMEOUT_S = 120.0  # wall clock; it may have to set up what has changed
+_VALUE = re.compile(r"[^\x00-\x1f\x7f]{1,300}")
+
+
+@dataclass(frozen=True)
+class RunOption:
+    """An option without its dashes. ``default``: what holds where it is left out; ``choices``: empty where any text may stand."""
+
+    name: str
+    about: str
+    metavar: str = ""
+    default: str = ""
+    choices: tuple[str, ...] = ()
+    takes_value: bool = True
+
+    def word(self, value: str) -> str:
+        """Return it for a command line; raises RequestError for a value that it can't have."""
+        if self.takes_value and not _VALUE.fullmatch(value):
+            raise RequestError(f"--{self.name}: needs a text of one line, at most 300 characters")
+        if self.choices and value not in self.choices:
+            raise RequestError(f"--{self.name}: there is no {value!r}; there are {', '.join(self.choices)}")
+        return f"--{self.name}={value}" if self.takes_value else f"--{self.name}"
+
+
+def options_of(part: RunPart) -> list[RunOption]:
+    """Return what a part declares, in its order."""
+    parser = argparse.ArgumentParser(add_help=False)
+    part.add_options(parser)
+    return [_option(action) for action in parser._actions]  # noqa: SLF001  (argparse offers no other way to look at what was declared)
+
+
+def _option(action: argparse.Action) -> RunOption:
+    return RunOption(
+        name=next(word for word in action.option_strings if word.startswith("--"))[2:],
+        about=action.help or "",
+        metavar=action.metavar if isinstance(action.metavar, str) else "",
+        default="" if action.default is None or action.nargs == 0 else str(action.default),
+        choices=tuple(map(str, action.choices or ())),
+        takes_value=action.nargs != 0,
+    )
+
+
+def as_json(part: RunPart) -> str:
+    """Return what `ask_options` reads."""
+    return json.dumps([asdict(option) for option in options_of(part)])
+
+
+def ask_options() -> list[RunOption]:
+    """Ask the robot's ``alula run``; raises RequestError, with its words, where the robot can't be run live here."""
+    try:
+        done = subprocess.run(
+            [entry(), "run", FLAG], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=TIMEOUT_S
+        )
+        if done.returncode:
+            raise RequestError((done.stderr.strip().splitlines() or [f"alula run {FLAG} ended with {done.returncode}"])[-1])
+        return [RunOption(**{**said, "choices": tuple(said["choices"])}) for said in json.loads(done.stdout)]
+    except (OSError, subprocess.TimeoutExpired, ValueError, TypeError) as error:
+        raise RequestError(f"alula run {FLAG}: {error}") from None
+
+
+def entry() -> str:
+    """Return the entry script, of the checkout that this process belongs to."""
+    return str(Path(os.environ["ALULA_ROOT"]) / "alula")
+
+
+def words_of(given: Mapping[str, str], known: Sequence[RunOption]) -> list[str]:
+    """Return options for a command line; raises RequestError where the robot declares no such option, or the value can't be."""
+    options = {option.name: option for option in known}
+    for name in given:
+        if name not in options:
+            said = f"it declares --{', --'.join(options)}" if options else "it declares none"
+            raise RequestError(f"the robot has no option --{name}; {said}")
+    return [options[name].word(value) for name, value in given.items()]
