@@ -40,8 +40,6 @@ class Blackboard:
     pending: PendingInterrupts
     failures: list[Failure] = field(default_factory=list)
     reason: str = ""
-    reasons: dict[str, str] = field(default_factory=dict)
-    """Why a resource is as it is, in the robot's own words, by ``skillset.resource``."""
     entries: Callable[[], Mapping[str, object]] = dict
     """What is on the blackboard of a mission that is a file, by name."""
 
@@ -58,12 +56,3 @@ class Blackboard:
         """Keep what went wrong up to here as the mission's reason; what fails afterwards, while stopping, is not the reason."""
         sentences = dict.fromkeys(failure.sentence() for failure in self.failures)
         self.reason = "; then ".join(sentences)
-
-    def explained(self) -> str:
-        """Return the reason as it is told at the end; a robot's blackboard may add what it knows beyond the skills."""
-        return self.reason
-
-    def because(self, resource: str) -> str:
-        """Return the reason for a resource's state, to be put behind a sentence; empty when there is nothing."""
-        reason = self.reasons.get(resource, "")
-        return f": {reason}" if reason else ""

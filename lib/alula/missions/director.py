@@ -229,7 +229,7 @@ class Director:
         if self._stop is not None:
             return End(Outcome.ABORTED, self._abort_reason)
         if self._mission.root.status is not Status.SUCCESS:
-            return End(Outcome.GIVEN_UP, self.blackboard.explained())
+            return End(Outcome.GIVEN_UP, self.blackboard.reason)
         if self._mission.degraded:
             return End(Outcome.DEGRADED, "; then ".join(failure.sentence() for failure in self.blackboard.failures))
         return End(Outcome.ACCOMPLISHED)

@@ -24,10 +24,6 @@ def nothing_more() -> Mapping[str, object]:
     return {}
 
 
-def hear_nothing(_node: object, _blackboard: Blackboard) -> None:
-    """Listen to nothing beyond the skillsets."""
-
-
 @dataclass(frozen=True)
 class MissionPlan:
     """One mission.
@@ -39,7 +35,6 @@ class MissionPlan:
         parameters: numbers that may be set from outside, with their defaults; on ROS 2 they are parameters of the node.
         inputs: what it was made of.
         facts: what ``mission.json`` says beyond the outcome, asked at the beginning and at the end.
-        listen: on ROS 2, has the node listen to what says why a resource is as it is (``Blackboard.reasons``).
     """
 
     scenario: str
@@ -48,7 +43,6 @@ class MissionPlan:
     parameters: Mapping[str, float] = field(default_factory=dict)
     inputs: Inputs = field(default_factory=dict)
     facts: Callable[[], Mapping[str, object]] = nothing_more
-    listen: Callable[[Any, Blackboard], None] = hear_nothing
 
 
 class InputError(Exception):

@@ -33,6 +33,11 @@ class Client(Protocol):
         """State of every resource; empty until the skillset was heard of."""
         ...
 
+    @property
+    def reasons(self) -> Mapping[str, str]:
+        """Why each resource is in its state, in the words of the functional layer; empty where it told nothing."""
+        ...
+
     def follow(self, data: Collection[str]) -> None:
         """Have the values of these data at hand from when it can be called."""
         ...
@@ -89,6 +94,11 @@ class MissionClient:
     def resources(self) -> Mapping[str, str]:
         """State of every resource; empty until the skillset was heard of."""
         return self.client.resources
+
+    @property
+    def reasons(self) -> Mapping[str, str]:
+        """Why each resource is in its state, in the words of the functional layer; empty where it told nothing."""
+        return self.client.reasons
 
     def follow(self, data: Collection[str]) -> None:
         """Have the values of these data at hand, and each of them recorded; to be called before `ready`."""

@@ -82,7 +82,7 @@ def _because(step: Step, invariant: Invariant) -> tuple[Unmet, str]:
     causes = [happening for happening in step.happenings if isinstance(happening, Change)]
     if causes:
         last = causes[-1]
-        message += f", after {last.resource} {last.source} -> {last.target} ({last.cause})"
+        message += f", after {last.resource} {last.source} -> {last.target} ({last.cause})" + (f": {last.reason}" if last.reason else "")
     return unmet, message
 
 

@@ -110,9 +110,9 @@ def extern_refusal(skillset: Skillset, situation: Situation, resource: str, targ
     return f"resource {resource} is {source} and has no extern transition {source} -> {target}"
 
 
-def transition(skillset: Skillset, situation: Situation, resource: str, target: str) -> Step:
-    """Take an extern transition that ``extern_refusal`` does not refuse."""
-    change = Change(resource, situation.states[resource], target, EXTERN)
+def transition(skillset: Skillset, situation: Situation, resource: str, target: str, reason: str = "") -> Step:
+    """Take an extern transition that ``extern_refusal`` does not refuse; ``reason``: why, in words."""
+    change = Change(resource, situation.states[resource], target, EXTERN, reason)
     return propagate(skillset, Step(replace(situation, states=after(situation.states, (change,))), (change,)))
 
 

@@ -38,12 +38,13 @@ class Situation:
 
 @dataclass(frozen=True)
 class Change:
-    """A resource went from one state to another."""
+    """A resource went from one state to another; ``reason``: why, in the words of the one who reports it, which are not compared."""
 
     resource: str
     source: str
     target: str
     cause: str
+    reason: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

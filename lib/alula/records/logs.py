@@ -140,7 +140,8 @@ def _from_message(message: Any, path: Path) -> Logged:
     stamp_s = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
     names = ("sequence", "skillset", "skill", "id", "state", "result", "message", "resource", "from_state", "to_state", "cause")
     value = {"stamp_s": stamp_s, "kind": _KINDS.get(message.kind), **{name: getattr(message, name) for name in names}}
-    value |= {"result_kind": getattr(message, "result_kind", "")} | dict(_values(message, path))
+    # Older bags say neither.
+    value |= {name: getattr(message, name, "") for name in ("result_kind", "reason")} | dict(_values(message, path))
     return _event(value, str(path), message.header.frame_id)
 
 

@@ -26,7 +26,7 @@ class SkillSummary(TypedDict):
 
 ResourceSummary = TypedDict(
     "ResourceSummary",
-    {"t_s": float | None, "skillset": str, "resource": str, "from": str, "to": str, "cause": str},
+    {"t_s": float | None, "skillset": str, "resource": str, "from": str, "to": str, "cause": str, "reason": str},
 )
 
 
@@ -60,6 +60,7 @@ def resources(history: History, phases: Phases) -> list[ResourceSummary]:
             "from": change.from_state,
             "to": change.to_state,
             "cause": change.cause,
+            "reason": change.reason,
         }
         for change in history.transitions
     ]

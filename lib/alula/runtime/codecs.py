@@ -103,7 +103,10 @@ def _decode_why(response: Any) -> WhyReply:
         )
         for one in response.unmet
     )
-    history = tuple(TransitionEvent(0, e.stamp_ns, e.resource, e.from_state, e.to_state, e.cause) for e in response.history)
+    history = tuple(
+        TransitionEvent(0, one.stamp_ns, one.resource, one.from_state, one.to_state, one.cause, reason=one.reason)
+        for one in response.history
+    )
     return WhyReply("", Why("", response.ready, response.reason, response.refusal, found, history))
 
 
@@ -116,9 +119,8 @@ def event_of(message: Any) -> EngineEvent:
     """Return an event without the name of its managers."""
     stamp_ns = stamp_ns_of(message.header.stamp)
     if message.kind == type(message).TRANSITION:
-        return TransitionEvent(
-            message.sequence, stamp_ns, message.resource, message.from_state, message.to_state, message.cause, message.skillset
-        )
+        states = (message.resource, message.from_state, message.to_state)
+        return TransitionEvent(message.sequence, stamp_ns, *states, message.cause, message.skillset, message.reason)
     return ExecutionEvent(
         message.sequence,
         stamp_ns,
@@ -138,7 +140,7 @@ def event_of(message: Any) -> EngineEvent:
 def states_of(message: Any) -> ResourceStates:
     """Read ``ResourceStates``; ``frame_id`` holds the instance id and the number of the last event."""
     instance_id, _, after = message.header.frame_id.partition(" ")
-    values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns) for one in message.resources}
+    values = {one.name: ResourceStatus(one.state, one.previous_state, one.stamp_ns, one.reason) for one in message.resources}
     return ResourceStates(instance_id, int(after or 0), stamp_ns_of(message.header.stamp), values)
 
 
@@ -195,7 +197,7 @@ class Codecs:
                 message.outputs_json = json.dumps(to_plain(event.outputs))
         else:
             message.kind = kind.TRANSITION
-            message.resource, message.cause = event.resource, event.cause
+            message.resource, message.cause, message.reason = event.resource, event.cause, event.reason
             message.from_state, message.to_state = event.from_state, event.to_state
         return message
 
@@ -226,7 +228,9 @@ class Codecs:
         return message
 
     def _resource_state(self, name: str, state: str, status: ResourceStatus) -> Any:
-        return self._messages.ResourceState(name=name, state=state, previous_state=status.previous, stamp_ns=status.stamp_ns)
+        return self._messages.ResourceState(
+            name=name, state=state, previous_state=status.previous, stamp_ns=status.stamp_ns, reason=status.reason
+        )
 
     def _skill(self, name: str, skill: SkillRecord) -> Any:
         kept, message = self._encoded.get(name, (None, None))
@@ -270,7 +274,10 @@ class Codecs:
             ),
             "pause": ServiceCodec(services.SetPaused, ("id", "paused"), _encode_trigger, lambda r: PauseReply(r.accepted, r.reason)),
             "transition": ServiceCodec(
-                services.Transition, ("resource", "to"), _encode_transition, lambda r: TransitionReply(r.accepted, r.reason, r.state)
+                services.Transition,
+                ("resource", "to", "reason"),
+                _encode_transition,
+                lambda r: TransitionReply(r.accepted, r.reason, r.state),
             ),
             "trigger": ServiceCodec(
                 services.TriggerEvent, ("event",), _encode_trigger, lambda r: TransitionReply(r.accepted, r.reason, "")
@@ -288,7 +295,7 @@ class Codecs:
         response.unmet = [self._unmet(one, reply) for one in why.unmet]
         response.history = [
             self._messages.ResourceTransition(
-                stamp_ns=e.stamp_ns, resource=e.resource, from_state=e.from_state, to_state=e.to_state, cause=e.cause
+                stamp_ns=e.stamp_ns, resource=e.resource, from_state=e.from_state, to_state=e.to_state, cause=e.cause, reason=e.reason
             )
             for e in why.history
         ]

@@ -82,6 +82,11 @@ class Access(Protocol):
         """State of each resource by name, as last heard."""
         ...
 
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why each resource is in its state, by name, as last heard."""
+        ...
+
     def on_change(self, callback: Callable[[dict[str, str]], None]) -> Unsubscribe:
         """Call ``callback(resources)`` after each step that changed a resource."""
         ...
@@ -98,7 +103,7 @@ class Access(Protocol):
         """Ask whether the skill could start now."""
         ...
 
-    def transition(self, resource: str, to: str) -> Pending[TransitionReply]:
+    def transition(self, resource: str, to: str, reason: str = "") -> Pending[TransitionReply]:
         """Ask for an extern transition."""
         ...
 
@@ -159,6 +164,11 @@ class ResourceView(Generic[StateT]):
             raise RuntimeError(f"nothing was heard of {self._client.skillset}.{self.name} yet; call wait_ready first")
         return cast("StateT", state)
 
+    @property
+    def reason(self) -> str:
+        """Why it is in its state, as the functional layer has told, in words; empty where it told nothing."""
+        return self._client.reasons.get(self.name, "")
+
     def on_change(self, callback: Callable[[StateT], None]) -> Unsubscribe:
         """Call ``callback(state)`` after each change, on the thread that brings it; the return value unsubscribes."""
         known = [self._client.resources.get(self.name)]
@@ -185,9 +195,9 @@ class ResourceView(Generic[StateT]):
         look(self._client.resources)
         return reached
 
-    def transition(self, to: StateT) -> Pending[TransitionReply]:
+    def transition(self, to: StateT, reason: str = "") -> Pending[TransitionReply]:
         """Take an extern transition, as the functional layer does; refused with a reason when the model has no such arrow."""
-        return self._client.transition(self.name, to)
+        return self._client.transition(self.name, to, reason)
 
 
 class DataView(Generic[ValueT]):

@@ -29,6 +29,7 @@ class Client:
     skillset: str = "arm"
     ready: bool = True
     resources: dict[str, str] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
     started: list[tuple[str, dict, SkillHandle]] = field(default_factory=list)
     interrupts: list[str] = field(default_factory=list)
 

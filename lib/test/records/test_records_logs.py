@@ -54,7 +54,7 @@ def bag(path, events, storage):
             fields = {
                 name: told.get(name, "") for name in ("skillset", "skill", "id", "state", "result", "result_kind", "message", "resource")
             }
-            fields |= {name: told.get(name, "") for name in ("from_state", "to_state", "cause")}
+            fields |= {name: told.get(name, "") for name in ("from_state", "to_state", "cause", "reason")}
             stamp = time(sec=event.stamp_ns // 10**9, nanosec=event.stamp_ns % 10**9)
             whole = message(
                 header=header(stamp=stamp, frame_id="one"),

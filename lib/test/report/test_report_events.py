@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,10 @@ def test_a_record_is_one_of_an_event():
         **record(kind="TRANSITION", resource="zed_status", cause="extern"),
         "from_state": "OK",
         "to_state": "BROKEN",
+        "reason": "",
     }
+    because = replace(event, reason="the lens is covered")
+    assert read_event(json.loads(json.dumps(event_record(because)))) == because
 
 
 @pytest.mark.parametrize(

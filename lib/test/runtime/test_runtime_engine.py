@@ -13,6 +13,7 @@ from alula.model.expressions import And, Comparison, DataIs, Not
 from alula.model.model import Assignment, Data, Effect, Event, Interrupt, Invariant, Precondition, Result
 from alula.runtime.core import SkillsetEngine
 from alula.runtime.core.errors import SkillRuntimeError
+from alula.runtime.core.events import TransitionEvent
 from alula.runtime.core.hook_calls import LocalHooks
 from alula.runtime.hooks import SkillHooks
 from alula_testing.recorder import Recorder
@@ -170,6 +171,19 @@ def test_extern_transitions_are_refused_with_a_reason():
     assert (reply.accepted, reply.state) == (False, "AVAILABLE")
     assert "sdk is AVAILABLE" in reply.reason
     assert bench.story() == ["sdk AVAILABLE"]
+
+
+def test_the_reason_of_a_transition_is_told_by_its_event_and_by_what_it_breaks():
+    bench = Bench()
+    execution = bench.run()
+    assert bench.engine.transition("sdk", "UNAVAILABLE", "the pilot has it").accepted
+    event = bench.steps[-1][0]
+    assert isinstance(event, TransitionEvent)
+    assert (event.cause, event.reason) == ("extern", "the pilot has it")
+    assert bench.engine.resources["sdk"].reason == "the pilot has it"
+    assert execution.message.endswith("after sdk AVAILABLE -> UNAVAILABLE (extern): the pilot has it")
+    assert bench.engine.transition("sdk", "AVAILABLE").accepted
+    assert bench.engine.resources["sdk"].reason == ""
 
 
 def test_a_broken_invariant_ends_in_the_same_step_and_stops_the_function():

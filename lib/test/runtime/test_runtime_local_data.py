@@ -157,7 +157,7 @@ def test_records_are_those_of_the_event_messages():
         "inputs": {"height": 3.0},
         "outputs": {},
     }
-    assert set(taken) == {"stamp_s", "sequence", "skillset", "kind", "resource", "from_state", "to_state", "cause"}
+    assert set(taken) == {"stamp_s", "sequence", "skillset", "kind", "resource", "from_state", "to_state", "cause", "reason"}
     assert records[-1]["outputs"] == {"reached": 2.5}
 
 

@@ -57,7 +57,7 @@ class Hasty(VirtualMiddleware):
     def serve(self, service, handler):
         super().serve(service, handler)
         if service == "transition":
-            handler({"resource": "sdk", "to": "AVAILABLE"}, self.replies.append)
+            handler({"resource": "sdk", "to": "AVAILABLE", "reason": ""}, self.replies.append)
 
     def serve_action(self, skill, on_goal, on_cancel):
         server = super().serve_action(skill, on_goal, on_cancel)
@@ -172,3 +172,22 @@ def test_several_skillsets_share_a_clock_and_nothing_else():
 def test_no_ros_is_needed():
     code = "import sys, alula.runtime.local; assert not {m for m in sys.modules if m.startswith(('rclpy', 'rospy', 'rosidl'))}"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_reason_of_a_state_reaches_clients_with_it_and_also_without_a_transition():
+    world = LocalWorld(latency_s=0.01)
+    managers = world.serve(flying_skillset(), timed)
+    client = world.client("flying")
+    changes: list[str] = []
+    client.on_change(lambda _: changes.append(client.reasons["sdk"]))
+    assert client.wait_ready(1.0)
+    reply = managers.transition("sdk", "UNAVAILABLE", "no link")
+    assert (reply.accepted, reply.state) == (False, "UNAVAILABLE"), "it is so already: only the reason is new"
+    world.run_for(0.1)
+    assert (client.resources["sdk"], client.reasons["sdk"]) == ("UNAVAILABLE", "no link")
+    assert client.transition("sdk", "AVAILABLE", "the pilot gave it").get(1.0).accepted
+    assert managers.transition("sdk", "UNAVAILABLE", "the link is lost").accepted
+    assert not managers.transition("sdk", "UNAVAILABLE", "the pilot has it").accepted
+    assert not managers.transition("sdk", "UNAVAILABLE", "the pilot has it").accepted
+    world.run_for(0.1)
+    assert changes[-4:] == ["no link", "the pilot gave it", "the link is lost", "the pilot has it"]

@@ -150,9 +150,9 @@ function foldTransition(run, t, value) {
   if (!run.resources.has(name)) run.resources.set(name, newTrack());
   const track = run.resources.get(name);
   if (!track.t.length) push(track, run.begin ?? t, { state: value.from_state, from: "", cause: "" });
-  push(track, t, { state: value.to_state, from: value.from_state, cause: value.cause, alarm: value.alarm });
+  push(track, t, { state: value.to_state, from: value.from_state, cause: value.cause, reason: value.reason || "", alarm: value.alarm });
   const bad = isAlarm(run, value.alarm, t);
-  if (value.cause === "extern" || bad) moment(run, t, "resource", `${name}: ${value.from_state} → ${value.to_state} (${value.cause})`, bad);
+  if (value.cause === "extern" || bad) moment(run, t, "resource", `${name}: ${value.from_state} → ${value.to_state} (${value.cause})${value.reason ? `: ${value.reason}` : ""}`, bad);
 }
 
 /** Whether the vehicle is away from where it began, at t. */

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from alula.missions.blackboard import Blackboard
-from alula.missions.plan import Inputs, hear_nothing
+from alula.missions.plan import Inputs
 from alula.trees.node import Node
 
 
 @dataclass(frozen=True)
 class MissionPart:
-    """Nodes of its own by their names in files; what says why a resource is as it is; the memory that knows what the reasons mean.
+    """Nodes of its own by their names in files, and the memory of its missions.
 
     ``check_inputs`` raises InputError for inputs that the robot's missions can't use: before the run, not in the middle of it.
     """
 
     nodes: tuple[tuple[str, type[Node]], ...] = ()
-    listen: Callable[[Any, Blackboard], None] = hear_nothing
     memory: type[Blackboard] = Blackboard
     check_inputs: Callable[[Inputs], object] = dict
 

@@ -127,7 +127,7 @@ def plan_of_file(path: Path, name: str, skillsets: Sequence[Skillset], inputs: I
         told = [port.name for port in model.ports.values() if port.direction is not Direction.INPUT]
         return {name: board[0].get(name) if board else _number(model.ports[name]) for name in told}
 
-    return MissionPlan(name, tuple(one.name for one in skillsets), make, parameters, own, facts, part.listen)
+    return MissionPlan(name, tuple(one.name for one in skillsets), make, parameters, own, facts)
 
 
 def _parameters(model: NodeType) -> dict[str, float]:

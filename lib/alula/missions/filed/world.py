@@ -66,6 +66,12 @@ class World:
             raise ValueError(msg)
         return function.ask(self, str(arguments[0]))
 
+    def because(self, resource: str) -> str:
+        """Return why a resource is in its state, to be put behind a sentence; empty where nothing was told."""
+        skillset, _, name = resource.partition(".")
+        reason = self._clients[skillset].reasons.get(name, "") if skillset in self._clients else ""
+        return f": {reason}" if reason else ""
+
     def of(self, skill: str) -> Iterable[SkillNode]:
         """Return the leaves of a skill; raises ValueError where the tree has none."""
         if skill not in self.leaves:
@@ -88,7 +94,7 @@ FUNCTIONS: Mapping[str, Function] = {
     "fresh": Function("data", lambda world, data: world.fresh(data)),
     "failed_first": Function("skill", lambda world, skill: bool(world.memory.failures) and world.memory.failures[0].skill == skill),
     "failed": Function("end", lambda world, end: any(failure.result == end for failure in world.memory.failures)),
-    "reason": Function("resource", lambda world, resource: world.memory.because(resource)),
+    "reason": Function("resource", lambda world, resource: world.because(resource)),
 }
 
 

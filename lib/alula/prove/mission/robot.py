@@ -126,6 +126,8 @@ class Client:
     def __init__(self, robot: Robot, skillset: Skillset) -> None:
         self.skillset = skillset.name
         self.resources = States(robot, skillset)
+        self.reasons: Mapping[str, str] = {}
+        """Words decide nothing."""
         self._robot = robot
         self._model = skillset
 

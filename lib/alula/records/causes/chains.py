@@ -92,7 +92,9 @@ def _causes(failure: SkillFailure, fault: KnownFault | None, scene: Scene) -> It
     yield from _measurement(end, fault, change, scene)
     if isinstance(change, TransitionEvent):
         by = REPORTED if change.cause == EXTERN else change.cause
-        yield Step("resource", change.stamp_s, f"{change.skillset}.{change.resource}: {change.from_state} → {change.to_state}, {by}")
+        because = f": {change.reason}" if change.reason else ""
+        text = f"{change.skillset}.{change.resource}: {change.from_state} → {change.to_state}, {by}{because}"
+        yield Step("resource", change.stamp_s, text)
     elif fault is not None and fault.detected_s is not None and " -> " in fault.detected_by:
         yield Step("resource", fault.detected_s, f"{fault.detected_by.replace(' ', ': ', 1).replace('->', '→')}, {REPORTED}")
     if end.state is S.RESOURCE_INVARIANT_VIOLATED:

@@ -234,7 +234,7 @@ class RecordedSkills(Vehicle):
         place = (event.skillset, event.resource)
         if diverged and place in self.caused and not self._explained(event.skillset):
             return
-        self.robot.take({place: event.to_state})
+        self.robot.take({place: event.to_state}, event.reason)
 
     def sample(self, skillset: str, data: str, value: object) -> None:
         """Have a data arrive, unless a fault that was not recorded makes it untrue."""

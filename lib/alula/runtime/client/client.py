@@ -85,6 +85,11 @@ class Client:
         return {} if self._connection.gone else dict(self._news.resources)
 
     @property
+    def reasons(self) -> dict[str, str]:
+        """Why each resource is in its state, as the functional layer has told, in words; empty where it told nothing."""
+        return {} if self._connection.gone else dict(self._news.reasons)
+
+    @property
     def skills(self) -> dict[str, SkillRecord]:
         """Return what runs of every skill, and what ended last; empty until the managers were heard, and when they have gone."""
         return {} if self._connection.gone else dict(self._news.skills)
@@ -186,15 +191,15 @@ class Client:
 
     # --- resources and data ------------------------------------------------------------------------------------------
 
-    def transition(self, resource: str, to: str) -> Pending[TransitionReply]:
-        """Ask for an extern transition, as the functional layer does."""
+    def transition(self, resource: str, to: str, reason: str = "") -> Pending[TransitionReply]:
+        """Ask for an extern transition, as the functional layer does; ``reason``: why the resource is so, in words."""
 
         def answer(reply: TransitionReply, tries: int) -> TransitionReply:
             # An answer that got lost may have been that the transition was taken.
             accepted = reply.accepted or (tries > 1 and reply.state == to)
             return TransitionReply(accepted, "" if accepted else reply.reason, reply.state)
 
-        return self._ask("transition", {"resource": resource, "to": to}, answer)
+        return self._ask("transition", {"resource": resource, "to": to, "reason": reason}, answer)
 
     def trigger(self, event: str) -> Pending[TransitionReply]:
         """Ask for an event of the model; it is asked for once only, as it may be taken again and again."""

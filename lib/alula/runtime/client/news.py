@@ -39,6 +39,7 @@ class ClientNews:
     def __init__(self, middleware: Middleware, skillset: str) -> None:
         self.skillset = skillset
         self.resources: dict[str, str] = {}
+        self.reasons: dict[str, str] = {}
         self.skills: dict[str, SkillRecord] = {}
         self.last: dict[str, tuple[int, ExecutionEvent | ExecutionRecord]] = {}
         self.on_changes: Callbacks[OnChange] = Callbacks()
@@ -110,11 +111,12 @@ class ClientNews:
     # --- messages of topics --------------------------------------------------------------------------------------------
 
     def _on_states(self, states: ResourceStates) -> None:
-        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns) or states.after <= self.states_after:
+        if self.closed or not self.connection.heard(states.instance_id, states.stamp_ns) or self._is_old(states):
             return
         self.heard += 1
         self.states_after = states.after
         self.resources = {name: value.state for name, value in states.resources.items()}
+        self.reasons = {name: value.reason for name, value in states.resources.items()}
         try:
             for callback in self.on_changes:
                 callback(dict(self.resources))
@@ -122,6 +124,11 @@ class ClientNews:
             for tracker in self._trackers():
                 tracker.settle()
             self.connection.heard_states()
+
+    def _is_old(self, states: ResourceStates) -> bool:
+        """Tell whether these states were known before; without a transition there may be a new reason."""
+        known = states.after == self.states_after and all(self.reasons.get(name) == one.reason for name, one in states.resources.items())
+        return states.after < self.states_after or known
 
     def _on_told(self, told: PublishedEvent) -> None:
         event = told.event

@@ -148,8 +148,9 @@ class ExecutionContext:
     def _changed(self, change: Change) -> TransitionEvent:
         self.sequence += 1
         now_ns = self._clock_ns()
-        self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns)
-        return TransitionEvent(self.sequence, now_ns, change.resource, change.source, change.target, change.cause, self._skillset.name)
+        self.resources[change.resource] = ResourceStatus(change.target, change.source, now_ns, change.reason)
+        states = (change.resource, change.source, change.target)
+        return TransitionEvent(self.sequence, now_ns, *states, change.cause, self._skillset.name, change.reason)
 
     def _entered(self, execution: Execution) -> ExecutionEvent:
         self.sequence += 1

@@ -183,14 +183,14 @@ class SkillsetEngine:
 
     # --- reports of the functional layer -----------------------------------------------------------------------------------
 
-    def transition(self, resource: str, to: str) -> TransitionReply:
-        """Take an extern transition, or say why not."""
+    def transition(self, resource: str, to: str, reason: str = "") -> TransitionReply:
+        """Take an extern transition, or say why not; ``reason``: why the resource changes, in words."""
         self.tick()
         with self._lock:
             situation = self._context.situation
-            reason = semantics.extern_refusal(self.skillset, situation, resource, to)
-            stops = [] if reason else self._context.commit(semantics.transition(self.skillset, situation, resource, to))
-            reply = TransitionReply(not reason, reason, self._context.situation.states.get(resource, ""))
+            refusal = semantics.extern_refusal(self.skillset, situation, resource, to)
+            stops = [] if refusal else self._context.commit(semantics.transition(self.skillset, situation, resource, to, as_text(reason)))
+            reply = TransitionReply(not refusal, refusal, self._context.situation.states.get(resource, ""))
         self._after_step(stops)
         return reply
 

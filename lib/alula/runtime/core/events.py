@@ -52,7 +52,10 @@ class ExecutionEvent:
 
 @dataclass(frozen=True)
 class TransitionEvent:
-    """A resource changed; ``cause`` is ``extern``, ``event <name>`` or ``<skill> <id> <effect>``. ``stamp_ns`` is mission clock."""
+    """A resource changed; ``cause`` is ``extern``, ``event <name>`` or ``<skill> <id> <effect>``. ``stamp_ns`` is mission clock.
+
+    ``reason``: why, in the words of the functional layer's report; empty where it told none.
+    """
 
     sequence: int
     stamp_ns: int
@@ -61,6 +64,7 @@ class TransitionEvent:
     to_state: str
     cause: str
     skillset: str = ""
+    reason: str = ""
 
     @property
     def stamp_s(self) -> float:
@@ -85,7 +89,7 @@ def event_record(event: EngineEvent) -> dict[str, object]:
         record |= {"message": event.message, "inputs": to_plain(event.inputs)}
         return {**record, "outputs": to_plain(event.outputs) if event.state.terminal else {}}
     record |= {"kind": TRANSITION, "resource": event.resource, "from_state": event.from_state, "to_state": event.to_state}
-    return {**record, "cause": event.cause}
+    return {**record, "cause": event.cause, "reason": event.reason}
 
 
 def kind_record(kind: ResultKind | None) -> str:
@@ -164,6 +168,7 @@ def _transition_of(record: Mapping[str, Any], sequence: int, stamp_ns: int, skil
         to_state=str(record["to_state"]),
         cause=str(record.get("cause", "")),
         skillset=skillset,
+        reason=str(record.get("reason", "")),
     )
 
 

@@ -16,11 +16,15 @@ HISTORY = 20
 
 @dataclass(frozen=True)
 class ResourceStatus:
-    """A resource at one moment; before its first transition ``previous`` is empty and ``stamp_ns`` that of the engine's start."""
+    """A resource at one moment; before its first transition ``previous`` is empty and ``stamp_ns`` that of the engine's start.
+
+    ``reason``: why it is in its state, as the functional layer has told; empty where it told nothing.
+    """
 
     state: str
     previous: str
     stamp_ns: int
+    reason: str = ""
 
 
 @dataclass(frozen=True)

@@ -56,9 +56,9 @@ class LocalManagers:
         """Run a job after a delay in seconds; not when the managers have gone by then."""
         return self._middleware.later(delay_s, job)
 
-    def transition(self, resource: str, to: str) -> TransitionReply:
-        """Take an extern transition, or say why not."""
-        return self.engine.transition(resource, to)
+    def transition(self, resource: str, to: str, reason: str = "") -> TransitionReply:
+        """Take an extern transition, or say why not; ``reason``: why the resource is so, in words."""
+        return self._managers.resources.transition(resource, to, reason)
 
     def publish(self, name: str, value: object) -> None:
         """Give a data a new value; raise KeyError when the model has no such data."""

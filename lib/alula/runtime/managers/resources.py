@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from alula.runtime.core.engine import SkillsetEngine
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.core.records import ResourceStatus
+from alula.runtime.core.replies import TransitionReply
+from alula.runtime.core.sanitize import as_text
 from alula.runtime.middleware import RESOURCE_STATES, Middleware, Reply, ResourceStates
 
 
 class ResourceManager:
-    """Publishes ``resource_states`` once a step, and serves ``transition`` and ``trigger``."""
+    """Publishes ``resource_states`` once a step and at each new reason, and serves ``transition`` and ``trigger``."""
 
     def __init__(self, middleware: Middleware, engine: SkillsetEngine, instance_id: str) -> None:
         self._middleware = middleware
@@ -21,7 +25,9 @@ class ResourceManager:
         self._publisher = middleware.advertise(RESOURCE_STATES)
         # Kept apart from the engine's, so that each message is the state after the step that it is sent for.
         self._latest = dict(engine.resources)
-        self._publish(0, middleware.now_ns())
+        self._after = 0
+        self._lock = threading.Lock()
+        self._publish(middleware.now_ns())
 
     def serve(self) -> None:
         """Serve ``transition`` (extern transitions) and ``trigger`` (events of the model)."""
@@ -31,16 +37,38 @@ class ResourceManager:
     def on_events(self, events: Sequence[EngineEvent]) -> None:
         """Follow the transitions of one step."""
         transitions = [event for event in events if isinstance(event, TransitionEvent)]
-        for event in transitions:
-            self._latest[event.resource] = ResourceStatus(event.to_state, event.from_state, event.stamp_ns)
-        if transitions:
-            self._publish(transitions[-1].sequence, transitions[-1].stamp_ns)
+        if not transitions:
+            return
+        with self._lock:
+            for event in transitions:
+                self._latest[event.resource] = ResourceStatus(event.to_state, event.from_state, event.stamp_ns, event.reason)
+            self._after = transitions[-1].sequence
+            self._publish(transitions[-1].stamp_ns)
 
-    def _publish(self, after: int, stamp_ns: int) -> None:
-        self._publisher.publish(ResourceStates(self._instance_id, after, stamp_ns, dict(self._latest)))
+    def transition(self, resource: str, to: str, reason: str = "") -> TransitionReply:
+        """Take an extern transition, or say why not.
+
+        ``reason``: why the resource is so, in words. It is taken also where the resource is in that state already, which is no transition:
+        what it is from the start has a reason, and a reason may change.
+        """
+        reply = self._engine.transition(resource, to, reason)
+        if reason and not reply.accepted and reply.state == to:
+            self._note(resource, to, as_text(reason))
+        return reply
+
+    def _note(self, resource: str, state: str, reason: str) -> None:
+        """Publish another reason for the state that a resource is in."""
+        with self._lock:
+            latest = self._latest[resource]
+            if latest.state == state and latest.reason != reason:
+                self._latest[resource] = replace(latest, reason=reason)
+                self._publish(self._middleware.now_ns())
+
+    def _publish(self, stamp_ns: int) -> None:
+        self._publisher.publish(ResourceStates(self._instance_id, self._after, stamp_ns, dict(self._latest)))
 
     def _transition(self, request: Mapping[str, Any], reply: Reply) -> None:
-        reply(self._engine.transition(request["resource"], request["to"]))
+        reply(self.transition(request["resource"], request["to"], request["reason"]))
 
     def _trigger(self, request: Mapping[str, Any], reply: Reply) -> None:
         reply(self._engine.trigger(request["event"]))

@@ -24,8 +24,8 @@ class MockHost(Protocol):
         """Run a job after a delay of mission clock."""
         ...
 
-    def transition(self, skillset: str, resource: str, to: str) -> str:
-        """Take an extern transition; return "" or why it was refused."""
+    def transition(self, skillset: str, resource: str, to: str, reason: str) -> str:
+        """Take an extern transition for this reason; return "" or why it was refused."""
         ...
 
     def state(self, skillset: str, resource: str) -> str:

@@ -31,12 +31,12 @@ class LocalMockHost:
         """Run a job after a delay."""
         return self._world.clock.after(delay_s, job)
 
-    def transition(self, skillset: str, resource: str, to: str) -> str:
-        """Take an extern transition; return why it was refused, empty where it was taken."""
+    def transition(self, skillset: str, resource: str, to: str, reason: str) -> str:
+        """Take an extern transition for this reason; return why it was refused, empty where it was taken."""
         managers = self._world.managers.get(skillset)
         if managers is None or not managers.alive:
             return f"the managers of {skillset} are not there"
-        return managers.transition(resource, to).reason
+        return managers.transition(resource, to, reason).reason
 
     def state(self, skillset: str, resource: str) -> str:
         """Return the state of a resource."""

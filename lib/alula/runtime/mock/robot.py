@@ -118,18 +118,19 @@ class MockRobot(MockState):
     def _hold(self, name: str, fault: MockFault) -> None:
         self._before.setdefault(name, {place: self.host.state(*place) for place in fault.states})
         self._held |= fault.states
-        self.take(fault.states)
+        reason = f"mock fault {name}"
+        self.take(fault.states, reason)
         for skill in self._skills:
             if skill.place in fault.ends:
                 skill.end(fault.ends[skill.place], f"the fault {name}")
         for change in fault.changes:
-            self._do(self.number(change.after_s, {}), functools.partial(self.take, change.states))
+            self._do(self.number(change.after_s, {}), functools.partial(self.take, change.states, reason))
 
     def _release(self, name: str) -> None:
         before = self._before.pop(name, {})
         for place in before:
             self._held.pop(place, None)
-        self.take(before)
+        self.take(before, f"the mock fault {name} is over")
 
     def _publish(self, place: Place, script: DataScript) -> None:
         self._do(script.period_s, lambda: self._publish(place, script))

@@ -30,13 +30,13 @@ class MockState:
         self._held: dict[Place, str] = {}
         """What faults hold resources at, whatever else is said of them."""
 
-    def take(self, states: Mapping[Place, str]) -> None:
-        """Have resources be in these states, as far as they are not."""
+    def take(self, states: Mapping[Place, str], reason: str = "") -> None:
+        """Have resources be in these states, as far as they are not; ``reason``: why, in words."""
         for (skillset, resource), wanted in states.items():
             state = self._held.get((skillset, resource), wanted)
             if self.host.state(skillset, resource) == state:
                 continue
-            refusal = self.host.transition(skillset, resource, state)
+            refusal = self.host.transition(skillset, resource, state, reason)
             if refusal:
                 self.host.note(f"the mock can't have {skillset}.{resource} be {state}: {refusal}")
 

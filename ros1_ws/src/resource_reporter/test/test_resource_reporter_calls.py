@@ -14,7 +14,11 @@ from resource_reporter.calls import plain
 
 
 def test_requests_become_plain_values_that_json_can_write():
-    assert plain(TransitionRequest("zed_status", "BROKEN")) == {"resource": "zed_status", "to": "BROKEN"}
+    assert plain(TransitionRequest("zed_status", "BROKEN", "it is dark")) == {
+        "resource": "zed_status",
+        "to": "BROKEN",
+        "reason": "it is dark",
+    }
     assert plain(SetBoolRequest(True)) == {"data": True}
     assert plain(Point(1.0, math.nan, -math.inf)) == {"x": 1.0, "y": None, "z": None}
     assert plain([genpy.Time(3, 500_000_000), "text", 7]) == [3.5, "text", 7]

@@ -178,3 +178,32 @@ def test_whatever_happens_the_skillset_ends_with_the_last_reports(events):
         skillset.reply()
         skillset.call()
     assert {name: skillset.actual[name] for name in wanted} == wanted
+
+
+def test_a_reason_is_asked_for_with_its_state_and_again_when_it_changes():
+    ledger = Ledger()
+    ledger.observe({"a": "OK"})
+    assert ledger.want("a", "BROKEN", "it is dark")
+    call = ledger.next_call(0.0)
+    assert call is not None
+    assert (call, call.reason) == (Call("a", "BROKEN"), "it is dark")
+    ledger.observe({"a": "BROKEN"}, {"a": "it is dark"})
+    assert not ledger.want("a", "BROKEN", "it is dark")
+    assert ledger.next_call(10.0) is None
+    assert ledger.want("a", "BROKEN", "it is covered")
+    call = ledger.next_call(10.0)
+    assert call is not None
+    assert call.reason == "it is covered"
+    ledger.reached(call, 10.0)
+    ledger.want("a", "BROKEN", "it is cold")
+    assert ledger.next_call(10.1) is None, "reasons that change often are told no more often than calls are repeated"
+    assert ledger.next_call(10.2) is not None
+
+
+def test_a_reason_without_insistence_asks_for_no_transition():
+    ledger = Ledger()
+    ledger.observe({"a": "OK"})
+    ledger.want("a", "UNKNOWN", "no driver", insist=False)
+    assert ledger.next_call(0.0) is None
+    ledger.observe({"a": "UNKNOWN"})
+    assert ledger.next_call(0.0) == Call("a", "UNKNOWN")

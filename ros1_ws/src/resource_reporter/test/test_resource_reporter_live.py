@@ -24,7 +24,7 @@ class Skillset:
     """A resource manager with one resource."""
 
     def __init__(self) -> None:
-        self.state = "UNKNOWN"
+        self.state, self.reason = "UNKNOWN", ""
         self.calls: list[tuple[float, str]] = []
         self.hangs: threading.Event | None = None
         self._lock = threading.Lock()  # one transition at a time, shown in its order, as a real manager does
@@ -37,12 +37,13 @@ class Skillset:
 
     def restart(self) -> None:
         self._service.shutdown("restart")
-        self.state = "UNKNOWN"
+        self.state, self.reason = "UNKNOWN", ""
         self.serve()
         self.show()
 
     def show(self) -> None:
-        self._publisher.publish(ResourceStates(skillset=SKILLSET, resources=[ResourceState(name="zed_status", state=self.state)]))
+        shown = ResourceState(name="zed_status", state=self.state, reason=self.reason)
+        self._publisher.publish(ResourceStates(skillset=SKILLSET, resources=[shown]))
 
     def close(self) -> None:
         if self._service is not None:
@@ -55,8 +56,11 @@ class Skillset:
             self.hangs.wait(10.0)
         with self._lock:
             if (self.state, request.to) not in ARROWS:
+                if self.state == request.to:
+                    self.reason = request.reason
+                    self.show()
                 return TransitionResponse(False, f"no arrow from {self.state} to {request.to}", self.state)
-            self.state = request.to
+            self.state, self.reason = request.to, request.reason
             self.show()
             return TransitionResponse(True, "", self.state)
 
@@ -125,3 +129,18 @@ def test_a_hanging_service_blocks_no_caller(skillset, reporter):
     wait_until(lambda: len(skillset.calls) >= 2, timeout_s=4.0, what="it is called again after two seconds")
     skillset.hangs.set()
     becomes(skillset, "BROKEN")
+
+
+def test_reasons_travel_with_the_states_and_follow_when_they_change(skillset, reporter):
+    skillset.serve()
+    reporter.report("zed_status", "UNKNOWN", "no images on /left", insist=False)
+    wait_until(lambda: skillset.reason == "no images on /left", timeout_s=5.0, what="the reason of the first state is shown")
+    reporter.report("zed_status", "BROKEN", "the lens is covered")
+    becomes(skillset, "BROKEN")
+    assert skillset.reason == "the lens is covered"
+    reporter.report("zed_status", "BROKEN", "no measurement for 0.35 s")
+    wait_until(lambda: skillset.reason == "no measurement for 0.35 s", timeout_s=5.0, what="the other reason is shown")
+    told = len(skillset.calls)
+    reporter.report("zed_status", "OK")
+    becomes(skillset, "OK")
+    assert (len(skillset.calls), skillset.reason) == (told + 1, "")

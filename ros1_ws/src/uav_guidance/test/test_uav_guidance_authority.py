@@ -61,7 +61,7 @@ def test_a_link_lost_is_told_from_a_take_over(flying, said):
     flying.until(lambda r: r.authority, 2.0)
     flying.cut = True
     flying.until(lambda r: not r.authority, 4.0)
-    assert "the link is lost, nothing was heard of the autopilot for 2." in flying.ask(HoverRequest()).reason
+    assert "the link to the autopilot is lost, nothing was heard of it for 2." in flying.ask(HoverRequest()).reason
     assert [words.split(":")[0] for words in said()] == ["authority lost"] * 2
 
 
@@ -189,3 +189,21 @@ def test_an_autopilot_that_restarts_in_another_mode_is_told_from_the_pilot_and_g
     flying.vehicle.pilot(LOITER)
     flying.until(lambda r: not r.authority, 1.0)
     assert "the pilot or a failsafe has it" in flying.ask(HoverRequest()).reason
+
+
+def test_the_authority_is_reported_with_what_has_the_vehicle(flying):
+    def reason() -> str:
+        return flying.guidance.reasons(flying.now_s).get("SDK_authority", "")
+
+    assert reason() == ""
+    flying.vehicle.pilot(LOITER)
+    flying.until(lambda r: not r.authority, 2.0)
+    assert reason() == "the vehicle is in LOITER: the pilot or a failsafe has it"
+    flying.cut = True
+    flying.until(lambda r: not r.link, 4.0)
+    flying.run(2.0)
+    assert reason() == "the link to the autopilot is lost", "words that stay as long as nothing changes"
+    flying.cut = False
+    flying.vehicle.restart(STABILIZE)
+    flying.until(lambda r: r.vehicle.boots == 2, 4.0)
+    assert reason() == "the autopilot has restarted, in STABILIZE"

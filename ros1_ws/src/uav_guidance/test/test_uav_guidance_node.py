@@ -50,6 +50,7 @@ class Bench:
         self.states: list[GuidanceState] = []
         self.poses: list[PoseStamped] = []
         self.resources = {"SDK_authority": "UNAVAILABLE", "flight_status": "ON_GROUND", "homepoint_status": "INVALID"}
+        self.reasons: dict[str, str] = {}
         self.transitions: list[tuple[str, str]] = []
         self.sees: Callable[[], float | None] | None = None
         """What a sensor tells with each state of the guidance: how far an obstacle is, metres. Time waits for both."""
@@ -117,13 +118,17 @@ class Bench:
         self.states.append(state)
 
     def _take_transition(self, request: TransitionRequest) -> TransitionResponse:
+        self.reasons[request.resource] = request.reason
+        if self.resources[request.resource] == request.to:
+            self._show()
+            return TransitionResponse(False, "it is so already", request.to)
         self.transitions.append((request.resource, request.to))
         self.resources[request.resource] = request.to
         self._show()
         return TransitionResponse(True, "", request.to)
 
     def _show(self) -> None:
-        resources = [ResourceState(name=name, state=state) for name, state in self.resources.items()]
+        resources = [ResourceState(name=name, state=state, reason=self.reasons.get(name, "")) for name, state in self.resources.items()]
         self._shown.publish(ResourceStates(skillset="navigation", resources=resources))
 
 

@@ -60,7 +60,6 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S),
             groot=self._groot(),
         )
-        plan.listen(self, self.driver.blackboard)
         self._view_json = ""
         self._heartbeat: Publisher | None = None
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)

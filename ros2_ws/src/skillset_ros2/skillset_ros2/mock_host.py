@@ -56,10 +56,10 @@ class RosMockHost:
 
         return self._timers.after(delay_s, attempt)
 
-    def transition(self, skillset: str, resource: str, to: str) -> str:
+    def transition(self, skillset: str, resource: str, to: str, reason: str) -> str:
         """Take an extern transition; return why it was refused, empty where it was taken."""
         node = self.nodes.get(skillset)
-        return f"{skillset} is not mocked here" if node is None else node.engine.transition(resource, to).reason
+        return f"{skillset} is not mocked here" if node is None else node.engine.transition(resource, to, reason).reason
 
     def state(self, skillset: str, resource: str) -> str:
         """Return the state of a resource."""

@@ -59,16 +59,14 @@ def test_each_condition_of_the_start_counts(resource, state):
 
 
 def unmet(world: World, **reasons: str) -> list[str]:
-    mission, memory = make_mission(world)
-    memory.reasons.update({name.replace("__", "."): reason for name, reason in reasons.items()})
+    world.reasons.update(reasons)
+    mission, _ = make_mission(world)
     return [one.unmet for one in mission.conditions() if one.unmet]
 
 
 def test_a_missing_driver_is_named():
     world = World(resources={**READY, "zed_status": "UNKNOWN"})
-    assert unmet(world, perception__zed_status="no images on /zed/left/image_raw") == [
-        "nothing is known of the ZED: no images on /zed/left/image_raw"
-    ]
+    assert unmet(world, zed_status="no images on /zed/left/image_raw") == ["nothing is known of the ZED: no images on /zed/left/image_raw"]
 
 
 def test_a_skillset_that_can_not_be_called_keeps_the_mission_from_starting():

@@ -7,13 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from alula.common.scenarios import load_scenario
+from alula.missions.blackboard import Blackboard
 from alula.missions.director import Mission
-from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import MissionPlan, plan_of
 from alula.model.execution_state import ExecutionState as State
 from alula.runtime.handle import SkillHandle
 from alula.runtime.waiting import Pending
-from uav_missions.nodes import DroneMemory
 
 SQUARE = [(0.0, 0.0, 3.0), (10.0, 0.0, 3.0), (10.0, 8.0, 3.0)]
 
@@ -76,6 +75,7 @@ class World:
     """Virtual time, three fake skillsets, a vehicle that is on the ground or in the air."""
 
     now_s: float = 0.0
+    reasons: dict[str, str] = field(default_factory=dict)
     duration_s: float = 1.0
     interrupt_takes_s: float = 0.2
     log: list[tuple] = field(default_factory=list)
@@ -170,6 +170,10 @@ class FakeClient:
     def resources(self) -> dict[str, str]:
         return self.world.resources
 
+    @property
+    def reasons(self) -> dict[str, str]:
+        return self.world.reasons
+
     def start(self, skill: str, **inputs: object) -> FakeHandle:
         return self.world.start(skill, inputs)
 
@@ -183,11 +187,7 @@ def mapping_plan(waypoints: tuple[tuple[float, float, float], ...]) -> MissionPl
     return plan_of(load_scenario("mapping"), {"route": [list(waypoint) for waypoint in waypoints]})
 
 
-def make_mission(world: World, waypoints=SQUARE, **skillsets: FakeClient) -> tuple[Mission, DroneMemory]:
+def make_mission(world: World, waypoints=SQUARE, **skillsets: FakeClient) -> tuple[Mission, Blackboard]:
     """Return the mapping mission of its file, and its memory."""
     plan = mapping_plan(tuple(waypoints))
     return plan.make(clients(world) | skillsets, world.clock_ns, plan.parameters)
-
-
-def make_memory(world: World) -> DroneMemory:
-    return DroneMemory(clock_ns=world.clock_ns, pending=PendingInterrupts(world.clock_ns))

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
-from alula.missions.blackboard import Blackboard
 from alula.missions.filed.part import MissionPart
 from alula.trees.errors import TickError
 from alula.trees.node import Condition, SyncAction
 from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, SUCCESS, Answer
 from alula.trees.values import ANY, DOUBLE, INT
-from uav_missions import reasons
-from uav_missions.reasons import AUTHORITY_INVARIANT, holder_of_the_vehicle
 from uav_missions.route import Route, route_of, wrap_rad
 
 
@@ -76,15 +72,4 @@ class PointsTo(Condition):
         return SUCCESS if abs(wrap_rad(taken - heading)) < tolerance else FAILURE
 
 
-@dataclass(kw_only=True)
-class DroneMemory(Blackboard):
-    """The mission's memory; knows who has a vehicle whose authority was lost."""
-
-    def explained(self) -> str:
-        """Return the reason; where the authority was lost, with its holder."""
-        lost = any(failure.result == AUTHORITY_INVARIANT for failure in self.failures)
-        reason = holder_of_the_vehicle(self) if lost else ""
-        return f"{self.reason} ({reason})" if reason else self.reason
-
-
-PART = MissionPart((("uav.NextWaypoint", NextWaypoint), ("uav.PointsTo", PointsTo)), reasons.listen, DroneMemory, route_of)
+PART = MissionPart((("uav.NextWaypoint", NextWaypoint), ("uav.PointsTo", PointsTo)), check_inputs=route_of)

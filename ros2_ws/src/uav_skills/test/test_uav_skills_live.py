@@ -8,7 +8,6 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from uav_msgs.msg import SensorHealth
 from uav_skills_functional_fake import STEP_M
 from uav_skills_rig import Rig
 
@@ -225,7 +224,7 @@ def test_mapping_that_registers_nothing_more_aborts(rig):
     handle = rig.start("mapping", "lidar_mapping")
     rig.wait(lambda: handle.progress == 1.0)
     rig.functional.mute.add("lidar_mapping")
-    rig.functional.lidar_health.publish(SensorHealth(sensor="lidar", reason="no clouds for 0.4 s", verdict=SensorHealth.BROKEN))
+    rig.functional.report("perception", "lidar_status", "BROKEN", "no clouds for 0.4 s")
     assert rig.ended(handle) == ("TERMINATED", "ABORTED")
     assert handle.message.endswith("; the LiDAR: no clouds for 0.4 s"), handle.message
 

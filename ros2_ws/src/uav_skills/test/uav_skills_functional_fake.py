@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock as ClockMessage
 from skillset_interfaces.srv import Transition
 from std_srvs.srv import SetBool, Trigger
-from uav_msgs.msg import GuidanceState, MappingState, Obstacle, SensorHealth, VideoState
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
 STEP_S = 0.05  # of mission clock
@@ -97,7 +97,6 @@ class FakeFunctional:
         self._state = self.node.create_publisher(GuidanceState, "/uav_guidance/state", 10)
         self._obstacles = {name: self.node.create_publisher(Obstacle, f"/{name}/obstacle", 10) for name in ("zed_depth", "lidar_obstacles")}
         self._mapping = self.node.create_publisher(MappingState, "/lidar_mapping/state", 10)
-        self.lidar_health = self.node.create_publisher(SensorHealth, "/lidar_obstacles/health", 5)
         self._video = self.node.create_publisher(VideoState, "/video_stream/state", 10)
         for name, kind, handler in (
             ("takeoff", Takeoff, self._takeoff),
@@ -134,9 +133,9 @@ class FakeFunctional:
         with self._lock:
             self.vehicle.place, self.vehicle.armed = [x, y, z], True
 
-    def report(self, skillset: str, resource: str, to: str):
+    def report(self, skillset: str, resource: str, to: str, reason: str = ""):
         """Ask for an extern transition; return the future of its response."""
-        return self._transitions[skillset].call_async(Transition.Request(resource=resource, to=to))
+        return self._transitions[skillset].call_async(Transition.Request(resource=resource, to=to, reason=reason))
 
     def names(self) -> list[str]:
         with self._lock:

@@ -12,9 +12,10 @@ from typing import Any
 from geometry_msgs.msg import Point
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from skillset_interfaces.msg import ResourceStates
 from std_srvs.srv import SetBool, Trigger
-from uav_msgs.msg import GuidanceState, MappingState, Obstacle, SensorHealth, VideoState
+from uav_msgs.msg import GuidanceState, MappingState, Obstacle, VideoState
 from uav_msgs.srv import Command, SetHeadingReference, SetPositionReference, Stream, Takeoff
 
 from uav_skills.calls import CallQueue, Reply, ignore_response
@@ -23,6 +24,7 @@ WATCH_PERIOD_S = 0.1
 LONGEST_STEP_S = 0.2
 MOTIONS = ("position", "heading")  # references that move the vehicle, and that may be stopped at any time
 LAST_FEW = QoSProfile(depth=10)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class FunctionalPart:
@@ -59,8 +61,8 @@ class FunctionalPart:
     def _client(self, service_type: Any, name: str) -> Any:
         return self._node.create_client(service_type, name, callback_group=self._group)
 
-    def _subscribe(self, message_type: Any, topic: str, callback: Callable[[Any], None]) -> None:
-        self._node.create_subscription(message_type, topic, callback, LAST_FEW, callback_group=self._group)
+    def _subscribe(self, message_type: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile = LAST_FEW) -> None:
+        self._node.create_subscription(message_type, topic, callback, qos, callback_group=self._group)
 
 
 class GuidanceApi(FunctionalPart):
@@ -149,9 +151,9 @@ class MappingApi(FunctionalPart):
         self._enable = self._client(SetBool, "/lidar_mapping/enable")
         self._save = self._client(Trigger, "/lidar_mapping/save")
         self.lidar_fault = ""
-        """What the LiDAR's health says of it; empty when it is well."""
+        """Why the LiDAR is not believed; empty when it is well."""
         self._subscribe(MappingState, "/lidar_mapping/state", self._on_state)
-        self._subscribe(SensorHealth, "/lidar_obstacles/health", self._on_health)
+        self._subscribe(ResourceStates, "/perception/resource_states", self._on_perception, LATCHED)
 
     def enable(self, *, on: bool, reply: Reply = ignore_response) -> None:
         """Start or stop the registration of scans."""
@@ -166,8 +168,8 @@ class MappingApi(FunctionalPart):
             self.registered_s = self.now_s
         self.state = state
 
-    def _on_health(self, health: SensorHealth) -> None:
-        self.lidar_fault = str(health.reason)
+    def _on_perception(self, states: ResourceStates) -> None:
+        self.lidar_fault = next((str(one.reason) for one in states.resources if one.name == "lidar_status"), "")
 
 
 class VideoApi(FunctionalPart):

@@ -170,7 +170,7 @@ class LidarMappingNode:
         problem = self._slam.problem
         if problem:
             rospy.logwarn_throttle(2.0, f"the map is lost: {problem}")
-        self._reporter.report("slam_status", "LOST" if problem else "OK")
+        self._reporter.report("slam_status", "LOST" if problem else "OK", problem)
 
     def _publish_state(self, stamp_ns: int, registration: Registration | None) -> None:
         count = self._slam.count
@@ -209,7 +209,7 @@ class LidarMappingNode:
             self._slam.stop()
             self._readings.clear()
             self._publish_state(rospy.Time.now().to_nsec(), None)
-        self._reporter.report("slam_status", "UNKNOWN")
+        self._reporter.report("slam_status", "UNKNOWN", "the mapping does not run")
 
     def _publish_map(self, _event: object) -> None:
         if not self._map.get_num_connections():

@@ -68,7 +68,7 @@ class TransitionCaller:
         if self._proxy is None:
             self._proxy = rospy.ServiceProxy(self._name, Transition, persistent=True)
         try:
-            attempt.response = self._proxy(call.resource, call.to)
+            attempt.response = self._proxy(call.resource, call.to, call.reason)
         except Exception as error:  # noqa: BLE001  # rospy lets through all that the sockets below it raise
             attempt.error = f"{self._name}: {error}"
         finally:

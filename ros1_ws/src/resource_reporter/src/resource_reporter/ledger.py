@@ -14,6 +14,8 @@ class Call:
 
     resource: str
     to: str
+    reason: str = field(default="", compare=False)
+    """Why the resource is so, in words."""
 
 
 @dataclass
@@ -21,6 +23,8 @@ class _Entry:
     """What is wanted of one resource, and when it may be asked for."""
 
     state: str
+    reason: str = ""
+    insist: bool = True
     not_before_s: float = 0.0
     retry_s: float = FIRST_RETRY_S
 
@@ -41,23 +45,27 @@ class Ledger:
 
     _wanted: dict[str, _Entry] = field(default_factory=dict)
     _actual: dict[str, str] = field(default_factory=dict)
+    _reasons: dict[str, str] = field(default_factory=dict)
+    """Those that the skillset shows."""
     _told: set[tuple[Call, str]] = field(default_factory=set)
 
-    def want(self, resource: str, state: str) -> bool:
-        """Note the state that the hardware has; return whether this is news."""
+    def want(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> bool:
+        """Note the state that the hardware has, and why; return whether this is news. Without ``insist``, see ``ResourceReporter``."""
         entry = self._wanted.get(resource)
-        if entry is not None and entry.state == state:
-            return False
-        self._wanted[resource] = _Entry(state)
-        return True
+        if entry is None or (entry.state, entry.insist) != (state, insist):
+            self._wanted[resource] = _Entry(state, reason, insist)
+            return True
+        # A reason that changes often must not be told more often than calls are repeated.
+        news, entry.reason = entry.reason != reason, reason
+        return news
 
-    def observe(self, states: dict[str, str]) -> None:
-        """Note the states that the skillset shows (all of its resources). One that changed may be asked for at once."""
+    def observe(self, states: dict[str, str], reasons: dict[str, str] | None = None) -> None:
+        """Note the states that the skillset shows (all of its resources), and the reasons. One that changed may be asked for at once."""
         for resource, entry in self._wanted.items():
             before, after = self._actual.get(resource), states.get(resource)
             if before not in {after, entry.state}:
                 entry.not_before_s = 0.0
-        self._actual = dict(states)
+        self._actual, self._reasons = dict(states), dict(reasons or {})
 
     def next_call(self, now_s: float) -> Call | None:
         """Return the transition to ask for now, the longest waiting first; None if all agree or must wait."""
@@ -65,7 +73,7 @@ class Ledger:
         if not due:
             return None
         name = min(due, key=lambda item: item[0])[1]
-        return Call(name, self._wanted[name].state)
+        return Call(name, self._wanted[name].state, self._wanted[name].reason)
 
     def wait_s(self, now_s: float) -> float | None:
         """Return for how long nothing is due; None if not before the hardware or the skillset says something new."""
@@ -97,4 +105,10 @@ class Ledger:
         return entry if entry is not None and entry.state == call.to else None
 
     def _differs(self, resource: str) -> bool:
-        return resource in self._actual and self._actual[resource] != self._wanted[resource].state
+        """Tell whether the skillset shows another state than the hardware has, or another reason than is known."""
+        if resource not in self._actual:
+            return False
+        wanted = self._wanted[resource]
+        if self._actual[resource] != wanted.state:
+            return wanted.insist
+        return bool(wanted.reason) and self._reasons.get(resource) != wanted.reason

@@ -35,10 +35,13 @@ class ResourceReporter:
         self._worker.start()
         self._subscriber = rospy.Subscriber(f"/{skillset}/resource_states", ResourceStates, self._on_states, tcp_nodelay=True)
 
-    def report(self, resource: str, state: str) -> None:
-        """Say that the hardware's resource has this state."""
+    def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
+        """Say that the hardware's resource has this state, and why, in words, where that is known.
+
+        Without ``insist`` nothing is to change: the reason is told where the skillset has that state already.
+        """
         with self._changed:
-            if self._ledger.want(resource, state):
+            if self._ledger.want(resource, state, reason, insist=insist):
                 self._changed.notify()
 
     def close(self) -> None:
@@ -52,7 +55,8 @@ class ResourceReporter:
 
     def _on_states(self, message: ResourceStates) -> None:
         with self._changed:
-            self._ledger.observe({resource.name: resource.state for resource in message.resources})
+            shown = message.resources
+            self._ledger.observe({one.name: one.state for one in shown}, {one.name: one.reason for one in shown})
             for name in set(self._ledger.unknown()) - self._told_unknown:
                 self._told_unknown.add(name)
                 rospy.logerr("the skillset %s has no resource %s", self._skillset, name)
@@ -76,7 +80,8 @@ class ResourceReporter:
 
     def _make(self, call: Call) -> None:
         """Make one call, outside the lock, and note its answer."""
-        service, request, begin_s = f"/{self._skillset}/transition", TransitionRequest(call.resource, call.to), rospy.get_time()
+        service, begin_s = f"/{self._skillset}/transition", rospy.get_time()
+        request = TransitionRequest(call.resource, call.to, call.reason)
         try:
             answer = self._caller.call(call)
         except CallFailedError as error:

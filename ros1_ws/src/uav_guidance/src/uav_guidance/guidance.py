@@ -193,6 +193,11 @@ class Guidance:
             states["flight_status"] = "ON_GROUND" if self.vehicle.on_ground else "IN_AIR"
         return states
 
+    def reasons(self, now_s: float) -> dict[str, str]:
+        """Return why resources are as they are, where that is no matter of course; words that stay while nothing else changes."""
+        available = self._authority.held and self._readiness.usable
+        return {} if available else {"SDK_authority": self._lost_reason(now_s)}
+
     def report(self, now_s: float) -> Report:
         """Return what the guidance knows and does."""
         return Report(
@@ -273,7 +278,9 @@ class Guidance:
     def _require_authority(self, now_s: float) -> None:
         if self.vehicle.heartbeat_s is None:
             raise Refusal("no authority: nothing was heard of the autopilot")
-        require(self._authority.held, f"no authority: {self._lost_reason(now_s)}")
+        silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
+        silence = "" if self.link(now_s) else f", nothing was heard of it for {silent_s:.1f} s"
+        require(self._authority.held, f"no authority: {self._lost_reason(now_s)}{silence}")
 
     def _to_guided(self) -> list[Command]:
         in_guided = self.vehicle.mode == Mode.GUIDED and not self._authority.landing_unseen
@@ -360,15 +367,16 @@ class Guidance:
         self._follower.take(None, self.vehicle, now_s)
 
     def _lost_reason(self, now_s: float) -> str:
-        """Return why there is no authority: nothing comes over the link, or the vehicle is in another mode than ours."""
+        """Return why there is no authority, or none of use: the link, a restart, the autopilot's own checks, or another mode than ours."""
         if not self.link(now_s):
-            silent_s = 0.0 if self._heard_s is None else now_s - self._heard_s
-            return f"the link is lost, nothing was heard of the autopilot for {silent_s:.1f} s"
+            return "the link to the autopilot is lost"
         if not self._authority.mode_told:
             return "the link is back, the autopilot has not told its mode yet"
         mode = mode_name(self.vehicle.mode)
         if self._readiness.restarted:
             return f"the autopilot has restarted, in {mode}"
+        if self._authority.held or (self.vehicle.on_ground and not self.vehicle.ready):
+            return f"the vehicle stands in {mode}, its own checks are not passed"
         return f"the vehicle is in {mode}: the pilot or a failsafe has it"
 
     def _introduce(self, now_s: float) -> None:

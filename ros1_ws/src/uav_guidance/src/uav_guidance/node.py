@@ -247,8 +247,9 @@ class GuidanceNode:
         self._changed.notify_all()
 
     def _report_resources(self) -> None:
+        reasons = self._guidance.reasons(_now_s())
         for resource, state in self._guidance.resources().items():
-            self._reporter.report(resource, state)
+            self._reporter.report(resource, state, reasons.get(resource, ""))
 
 
 def _on_garbage(reason: str) -> None:

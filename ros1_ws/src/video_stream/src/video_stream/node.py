@@ -159,7 +159,7 @@ class VideoStreamNode:
     def _tell_link(self, state: str) -> None:
         if state and state != self._link:
             self._link = state
-            self._reporter.report("link", state)
+            self._reporter.report("link", state, "" if state == "UP" else "the ground station has not been heard for 1 s")
 
     def _publish_state(self, now_ns: int, *, up: bool) -> None:
         report, watch, sender = self._sender.report, self._watch, self._sender

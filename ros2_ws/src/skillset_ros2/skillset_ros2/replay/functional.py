@@ -245,12 +245,12 @@ class RecordedFunctions(Vehicle):
             callback(message)
 
     def _take_transition(self, call: Mapping[str, Any]) -> None:
-        """Have the functional layer ask for an extern transition, as it did."""
+        """Have the functional layer ask for an extern transition, as it did; records of before reasons were told have none."""
         _, skillset, *service = str(call["service"]).split("/")
         if service == ["transition"] and skillset in self.world.managers and (call["response"] or {}).get("accepted"):
             place = (skillset, str(call["request"]["resource"]))
             if not self._diverged or place not in self.caused:
-                self.robot.take({place: str(call["request"]["to"])})
+                self.robot.take({place: str(call["request"]["to"])}, str(call["request"].get("reason", "")))
 
     def _on_data(self, managers: LocalManagers, data: str, message: object) -> None:
         if self.robot.holds(managers.skillset.name):

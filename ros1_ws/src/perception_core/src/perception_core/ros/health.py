@@ -33,6 +33,8 @@ class HealthReporter:
         self._stamps = StampJudge(stamps)
         self._lock = Lock()
         self._told = Verdict.UNKNOWN
+        self._judged = False
+        self._reported: tuple[Verdict, str] | None = None
         self._published_ns = 0
         self._reporter = ResourceReporter("perception")
         self._publisher = rospy.Publisher("~health", SensorHealth, queue_size=1)
@@ -80,11 +82,22 @@ class HealthReporter:
         self._told = verdict
         if changed:
             rospy.loginfo(f"{self._sensor} is {verdict.value} {message.reason}")
-            self._reporter.report(self._resource, verdict.value)
+        self._judged |= changed
+        self._report(verdict, message)
         # Half a tick of tolerance, or the clock's grain would turn 10 Hz into 8.
         if changed or not 0 <= now_ns - self._published_ns < (PUBLISH_S - TICK_S / 2) * NS:
             self._published_ns = now_ns
             self._publisher.publish(message)
+
+    def _report(self, verdict: Verdict, message: SensorHealth) -> None:
+        """Tell the skillset a new verdict or a new kind of fault, with its reason; the figures in a reason change all the time.
+
+        Before its first verdict a node that was started again knows nothing against what the one before it has said.
+        """
+        news = (verdict, message.fault if self._judged else message.reason)
+        if news != self._reported:
+            self._reported = news
+            self._reporter.report(self._resource, verdict.value, message.reason, insist=self._judged)
 
     def _message(self, now_ns: int) -> SensorHealth:
         watch = self._watch

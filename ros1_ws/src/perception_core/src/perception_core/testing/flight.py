@@ -65,6 +65,7 @@ class FakeFlight:
         self.reports: list[Report] = []
         self.health: list[SensorHealth] = []
         self._states = {"zed_status": "UNKNOWN", "lidar_status": "UNKNOWN"}
+        self.reasons: dict[str, str] = {}
         self._steps = 0
         self._done = threading.Event()
         self._heard = threading.Event()
@@ -212,13 +213,17 @@ class FakeFlight:
         send_raw(self._cloud, framed(buffer.getvalue()[:-100]))
 
     def _on_transition(self, request: TransitionRequest) -> TransitionResponse:
+        if self._states.get(request.resource) == request.to:  # no transition: a reason
+            self.reasons[request.resource] = request.reason
+            self._publish_resources()
+            return TransitionResponse(accepted=False, reason="it is so already", state=request.to)
         self.reports.append(Report(self.now_ns, request.resource, request.to))
-        self._states[request.resource] = request.to
+        self._states[request.resource], self.reasons[request.resource] = request.to, request.reason
         self._publish_resources()
         return TransitionResponse(accepted=True, reason="", state=request.to)
 
     def _publish_resources(self) -> None:
-        resources = [ResourceState(name=name, state=state) for name, state in self._states.items()]
+        resources = [ResourceState(name=name, state=state, reason=self.reasons.get(name, "")) for name, state in self._states.items()]
         self._resources.publish(ResourceStates(skillset="perception", resources=resources))
 
 
