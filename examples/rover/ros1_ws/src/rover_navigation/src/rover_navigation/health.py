@@ -20,7 +20,7 @@ WINDOW_S = 2.0
 MOVED_M = 0.25  # least way by odometry within the window that can be judged
 SLIP = 0.75  # part of that way that scan matching has to confirm
 MISSING_RAD = 0.35  # a weak motor: the turn within the window differs so much from what was commanded
-LOST, GOOD, LOST_SCANS = 0.45, 0.6, 10
+LOST, GOOD, LOST_SCANS = 0.5, 0.65, 10
 STUCK_M = 0.3  # the bumper stays pressed though the rover has moved so far
 
 OK = "OK"

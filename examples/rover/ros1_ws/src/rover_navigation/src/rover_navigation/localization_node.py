@@ -19,7 +19,7 @@ from rover_navigation.matching import match, search
 from rover_navigation.ros import Done, points_of_scan, pose_message, pose_of, transform, wait_for_map
 
 BELIEVED = 0.5  # a match of a smaller quality corrects nothing
-FOUND = 0.7  # a search that finds less has found nothing
+FOUND = 0.75  # a search that finds less has found nothing
 TURN_RAD_S = 0.8
 EVERY_RAD = math.radians(40.0)  # a scan is kept for the search
 SEARCH_LIMIT_S = 25.0  # wall clock

@@ -21,6 +21,8 @@ from rover_navigation.grid_map import GridMap
 MATCHES_M = 0.1  # a beam matches that ends so near to something that the map has
 BEAMS = 90  # of a scan that are used
 SOFT_M = 0.05  # residuals above count less and less: people and doors are not on the map
+GATE_M = 0.3  # what is farther from the map at the guess is not on it
+PRIOR = np.array([2.0, 2.0, 2.0])  # residual (metres) of leaving the guess by a metre or radian: along a bare corridor odometry decides
 SEARCH_M, SEARCH_RAD, SEARCH_BEAMS = 0.4, math.radians(15.0), 45
 REFINED = 12  # of the search's best poses
 CLEARANCE_M = 0.25  # the rover's radius: it is nowhere nearer to a wall
@@ -47,14 +49,15 @@ def quality_at(grid: GridMap, pose: Pose, points: Points) -> float:
 
 def match(grid: GridMap, guess: Pose, points: Points) -> Match:
     """Return the pose near the guess at which the points, in base_link, fit best."""
-    used = thinned(points, BEAMS)
+    used = thinned(points[grid.distance_m[grid.cells(transformed(guess, points))] < GATE_M], BEAMS)
     if not len(used):
         return Match(guess, 0.0)
 
     def residuals(change: NDArray[np.float64]) -> NDArray[np.float64]:
         pose = (guess[0] + change[0], guess[1] + change[1], guess[2] + change[2])
         cells = (transformed(pose, used) - np.array(grid.origin_m)) / grid.resolution_m - 0.5
-        return np.asarray(map_coordinates(grid.distance_m, cells[:, ::-1].T, order=1, mode="nearest"))
+        misses = map_coordinates(grid.distance_m, cells[:, ::-1].T, order=1, mode="nearest")
+        return np.concatenate((misses, PRIOR * change))
 
     change = least_squares(residuals, np.zeros(3), loss="cauchy", f_scale=SOFT_M, max_nfev=12).x
     pose = (guess[0] + float(change[0]), guess[1] + float(change[1]), wrapped(guess[2] + float(change[2])))

@@ -18,7 +18,7 @@ from std_msgs.msg import Bool, Header
 from rover_navigation.geometry import Pose, compose, inverse
 from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended, Job, Situation
 from rover_navigation.planning import Surroundings
-from rover_navigation.ros import Done, points_of_scan, pose_message, pose_of, wait_for_map
+from rover_navigation.ros import Done, free_of_scan, points_of_scan, pose_message, pose_of, wait_for_map
 
 FEEDBACK_STEPS = 4  # odometries
 REMEMBERED = 20  # odometries, for the poses of localisation that belong to them
@@ -45,7 +45,7 @@ class NavigationNode:
         self._T_map_odom: Pose | None = None
         self._odom: Pose | None = None
         self._odoms: dict[int, Pose] = {}  # by their stamps, in nanoseconds
-        self._points, self._scan_s = np.zeros((0, 2)), -np.inf
+        self._points, self._scan_s = np.zeros((0, 2)), np.inf  # until the first odometry
         self._bumped = self._charging = False
         self._commands = rospy.Publisher("/cmd_vel", Twist, queue_size=5)
         self._way = rospy.Publisher("/move_base/plan", Path, queue_size=2, latch=True)
@@ -110,7 +110,7 @@ class NavigationNode:
         with self._lock:
             self._points, self._scan_s = points_of_scan(scan), scan.header.stamp.to_sec()
             if self._pose is not None:
-                self._around.look(self._pose, self._points)
+                self._around.look(self._pose, self._points, free_of_scan(scan))
 
     def _on_bumper(self, message: Bool) -> None:
         self._bumped = message.data
@@ -130,6 +130,7 @@ class NavigationNode:
                 del self._odoms[next(iter(self._odoms))]
             self._steps += 1
             now_s = message.header.stamp.to_sec()
+            self._scan_s = min(self._scan_s, now_s)  # a scan that has never come is missing from the beginning on
             if self._job is not None and self._ended is None and self._pose is not None:
                 age_s = now_s - self._scan_s
                 situation = Situation(now_s, self._pose, self._odom, self._points, age_s, self._bumped, self._charging)

@@ -15,7 +15,6 @@ MARGIN_M = 0.06  # at least so far from everything
 KEEP_M = 0.5  # ways nearer to something than this cost more
 COARSE = 2  # planning's cells are so many of the map's
 SEEN_M = 0.15  # what the laser hits so near to something of the map is no news
-CLEARED_M = 4.0  # how far beams clear what was seen before
 LEAVE_M = 0.4  # around the rover itself ways are allowed that are too narrow: it stands there
 
 
@@ -30,9 +29,9 @@ class Surroundings:
         self.grid = grid
         self.seen = np.zeros_like(grid.occupied)
 
-    def look(self, pose: Pose, points: Points) -> None:
-        """Take in what the laser hit, in base_link, from a pose in map."""
-        self._clear(pose, points)
+    def look(self, pose: Pose, points: Points, free: Points) -> None:
+        """Take in what the laser hit, and how far the beams came that hit nothing; both in base_link, from a pose in map."""
+        self._clear(pose, np.vstack((points, free)))
         cells = self.grid.cells(transformed(pose, points))
         news = self.grid.distance_m[cells] > SEEN_M
         self.seen[cells[0][news], cells[1][news]] = True
@@ -45,10 +44,10 @@ class Surroundings:
         """Return how far each cell is from the next occupied one; ``seen``: also from what was seen."""
         return np.asarray(distance_transform_edt(~(self.grid.occupied | self.seen))) * self.grid.resolution_m if seen else self.grid.distance_m
 
-    def _clear(self, pose: Pose, points: Points) -> None:
-        far = np.linalg.norm(points, axis=1)
-        steps = np.arange(RADIUS_M, CLEARED_M, self.grid.resolution_m)
-        rays = points[:, None, :] / far[:, None, None] * steps[None, :, None]
+    def _clear(self, pose: Pose, ends: Points) -> None:
+        far = np.linalg.norm(ends, axis=1)
+        steps = np.arange(RADIUS_M, far.max(initial=RADIUS_M), self.grid.resolution_m)
+        rays = ends[:, None, :] / far[:, None, None] * steps[None, :, None]
         before = steps[None, :] < far[:, None] - 2.0 * self.grid.resolution_m
         self.seen[self.grid.cells(transformed(pose, rays[before]))] = False
 

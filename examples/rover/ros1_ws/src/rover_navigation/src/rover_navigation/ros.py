@@ -15,6 +15,7 @@ from std_msgs.msg import Header
 
 from rover_navigation.geometry import Points, Pose, points_of
 from rover_navigation.grid_map import GridMap
+from rover_navigation.planning import RADIUS_M
 
 WAIT_FOR_MAP_S = 60.0
 
@@ -43,10 +44,16 @@ def transform(stamp: rospy.Time, parent: str, child: str, pose: Pose) -> Transfo
 
 
 def points_of_scan(scan: LaserScan) -> Points:
-    """Return what a scan hit, in base_link: the laser is in its middle."""
+    """Return what a scan hit, in base_link: the laser is in its middle, so what is nearer than its rim is itself."""
     ranges = np.asarray(scan.ranges, dtype=np.float64)
-    ranges[(ranges < scan.range_min) | (ranges > scan.range_max)] = np.inf
+    ranges[(ranges < max(scan.range_min, RADIUS_M)) | (ranges > scan.range_max)] = np.inf
     return points_of(ranges, scan.angle_min, scan.angle_increment)
+
+
+def free_of_scan(scan: LaserScan) -> Points:
+    """Return how far the beams came that hit nothing, in base_link."""
+    ranges = np.asarray(scan.ranges, dtype=np.float64)
+    return points_of(np.where(np.isinf(ranges), scan.range_max, np.inf), scan.angle_min, scan.angle_increment)
 
 
 def grid_message(grid: GridMap, stamp: rospy.Time) -> OccupancyGrid:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -33,6 +34,14 @@ SCAN_STEPS, BATTERY_STEPS, STATE_STEPS = 2, 20, 20  # of 50 ms
 WAIT_S = 0.001  # wall clock, while time stands still
 START_CLOCK_S = 0.05
 HANGS_S = 15.0  # wall clock: a node that hangs is waited for so long, one that has died is not
+
+
+def unconnected() -> list[str]:
+    """Return the topics of this node that more nodes have subscribed to, as the master knows, than are connected to it."""
+    _, subscribed, _ = rosgraph.Master(rospy.get_name()).getSystemState()
+    nodes = {topic: len(names) for topic, names in subscribed}
+    published = rospy.topics.get_topic_manager().pubs
+    return [topic for topic, publication in published.items() if publication.get_num_connections() < nodes.get(topic, 0)]
 
 
 class SimulatorNode:
@@ -93,7 +102,7 @@ class SimulatorNode:
     def _begin(self) -> None:
         """Hold time at its beginning until all that work for it are there: how long nodes take to start changes no drive."""
         end_s = time.monotonic() + self._start_timeout_s
-        while (missing := self._absent()) and time.monotonic() < end_s and not self._ended:
+        while (missing := [*self._absent(), *unconnected()]) and time.monotonic() < end_s and not self._ended:
             self._clock.publish(Clock(clock=messages.ros_time(self._simulation.now_ns)))
             self._stopping.wait(START_CLOCK_S)
         if missing and not self._ended:

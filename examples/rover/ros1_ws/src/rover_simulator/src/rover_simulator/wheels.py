@@ -12,7 +12,7 @@ ACCELERATION_M_S2 = 1.5  # of each wheel
 COMMAND_TIMEOUT_S = 0.5  # a base stops by itself when no command comes any more
 WEAK = 0.55  # part of its speed that a weak motor reaches
 SLIP = 0.5  # part of the way that wheels lose which slip
-SCALE_ERROR = 0.008  # of each wheel's odometry, standard deviation over rovers
+SCALE_ERROR = 0.002  # of each wheel's odometry, standard deviation over rovers
 NOISE = 0.02  # of each step's, standard deviation
 
 Pose = tuple[float, float, float]

@@ -1,0 +1,115 @@
+"""Drives without ROS: planner, follower, localisation and monitors over the simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rover_navigation_rig import Rig
+
+from rover_navigation.geometry import compose, points_of
+from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended
+from rover_navigation.matching import match, search
+from rover_navigation.planning import NoWayError, plan
+
+KITCHEN, OFFICE, WORKSHOP = (2.6, 8.6, math.pi), (13.4, 8.8, 0.0), (13.6, 1.6, 0.0)
+ARRIVED = Ended(arrived=True, text="arrived")
+
+
+def off_m(rig):
+    return math.dist(rig.pose[:2], rig.simulation.floor.pose[:2])
+
+
+def test_it_drives_to_a_room_along_the_corridor_and_onto_the_dock():
+    rig = Rig()
+    assert rig.run(Drive(rig.around, KITCHEN)) == ARRIVED
+    assert math.dist(rig.simulation.floor.pose[:2], KITCHEN[:2]) < 0.2
+    assert off_m(rig) < 0.1
+    assert rig.run(Drive(rig.around, (5.0, 5.4, 0.0))) == ARRIVED
+    assert rig.run(Corridor((10.0, 5.4, 0.0))) == ARRIVED
+    assert rig.run(Dock(rig.around, rig.world.dock)) == Ended(arrived=True, text="charging")
+    assert rig.simulation.truth.collisions == 0
+    assert set(rig.heard) == {"OK", "GOOD"}
+
+
+def test_a_door_that_is_shut_is_seen_and_the_other_way_taken():
+    rig = Rig(doors=("office", "side"))
+    assert rig.run(Drive(rig.around, KITCHEN), 150.0) == ARRIVED
+    assert rig.simulation.truth.distance_m > 20.0  # through the office
+    assert rig.simulation.truth.collisions == 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "verdict"),
+    [
+        ("laser:dead@3", "SILENT"),
+        ("laser:frozen@3", "FROZEN"),
+        ("laser:covered@3", "COVERED"),
+        ("wheels:slip@3", "SLIPPING"),
+        ("wheels:weak@3", "WEAK"),
+        ("bumper:stuck@3", "STUCK"),
+        ("pose:lost@3", "LOST"),
+    ],
+)
+def test_each_fault_is_noticed_by_what_is_measured_and_by_nothing_else(fault, verdict):
+    rig = Rig(fault)
+    rig.run(Drive(rig.around, OFFICE), 6.0)
+    assert verdict not in rig.heard
+    rig.run(Drive(rig.around, OFFICE), 5.0)
+    assert verdict in rig.heard
+    assert set(rig.heard) <= {"OK", "GOOD", verdict}
+
+
+def test_without_the_laser_it_refuses_to_drive_but_creeps_and_stops_at_what_it_touches():
+    rig = Rig("laser:dead@3", doors=())
+    assert rig.run(Drive(rig.around, OFFICE)).text.startswith("no scan")
+    assert rig.run(Creep(rig.around, (5.0, 5.4, 0.0))) == ARRIVED
+    assert off_m(rig) < 0.3
+    # Into the kitchen, whose door is shut: that is not on the map.
+    assert rig.run(Creep(rig.around, KITCHEN)) == Ended(arrived=False, text="touched something 3 times")
+
+
+def test_a_person_who_stays_in_the_door_is_given_up_with_a_reason():
+    rig = Rig("person:stays")
+    ended = rig.run(Drive(rig.around, WORKSHOP))
+    assert not ended.arrived
+    assert "way" in ended.text
+    assert rig.simulation.truth.collisions == 0
+
+
+def test_a_rover_that_turns_is_found_on_the_whole_map():
+    rig = Rig("pose:lost@3")
+    rig.run(Drive(rig.around, OFFICE), 8.0)
+    scans = []
+    for step in range(100):
+        rig.simulation.wheels.command(0.0, 0.8, rig.simulation.now_s)
+        rig.simulation.step()
+        if step % 17 == 0:
+            sweep = rig.simulation.sweep()
+            scans.append((rig.simulation.wheels.odometry, points_of(sweep.ranges_m, sweep.angle_min_rad, sweep.angle_step_rad)))
+            true = rig.simulation.floor.pose
+    found = search(rig.grid, scans)
+    assert found.quality > 0.9
+    assert math.dist(found.pose[:2], true[:2]) < 0.05
+    assert abs(math.remainder(found.pose[2] - true[2], math.tau)) < 0.03
+
+
+def test_a_scan_is_matched_from_a_guess_that_is_off():
+    rig = Rig()
+    sweep = rig.simulation.sweep()
+    points = points_of(sweep.ranges_m, sweep.angle_min_rad, sweep.angle_step_rad)
+    found = match(rig.grid, compose(rig.simulation.floor.pose, (0.1, -0.08, 0.05)), points)
+    assert math.dist(found.pose[:2], rig.simulation.floor.pose[:2]) < 0.05
+    assert match(rig.grid, (9.0, 2.0, 1.0), points).quality < 0.5
+
+
+def test_plans_keep_away_from_walls_and_say_why_there_is_none():
+    rig = Rig()
+    way = plan(rig.around, rig.pose, OFFICE)
+    assert rig.grid.distance_m[rig.grid.cells(way[10:])].min() > 0.25
+    with pytest.raises(NoWayError, match=r"\(8.00, 2.00\) is taken"):
+        plan(rig.around, rig.pose, (8.0, 2.0, 0.0))
+    rig.around.seen[rig.grid.cells(np.column_stack((np.full(40, 2.0), np.linspace(4.4, 6.4, 40))))] = True
+    with pytest.raises(NoWayError, match="too narrow"):
+        plan(rig.around, rig.pose, OFFICE)

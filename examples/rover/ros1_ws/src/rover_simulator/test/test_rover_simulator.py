@@ -1,0 +1,115 @@
+"""The simulation without ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alula.common.faults import FaultError, parse_faults
+from rover_simulator.drawing import draw
+from rover_simulator.errors import WorldError
+from rover_simulator.faults import FAULTS
+from rover_simulator.lockstep import Lockstep
+from rover_simulator.simulation import Simulation
+from rover_simulator.world import load_world
+
+WORLD = Path(__file__).parents[4] / "worlds/office.yaml"
+
+
+def driven(faults="", seconds=10.0, v=-0.3, w=0.2):
+    simulation = Simulation(load_world(WORLD), seed=4, faults=parse_faults(faults, FAULTS))
+    while simulation.now_s < seconds:
+        simulation.wheels.command(v, w, simulation.now_s)
+        simulation.step()
+    return simulation
+
+
+def test_the_same_seed_and_commands_give_the_same_drive():
+    one, other = driven(), driven()
+    assert one.state == other.state
+    assert one.wheels.odometry == other.wheels.odometry
+    assert np.array_equal(one.sweep().ranges_m, other.sweep().ranges_m)
+
+
+def test_the_map_that_comes_with_the_world_is_drawn_of_it():
+    picture = WORLD.with_name("office_map.pgm").read_bytes()
+    assert picture.endswith(draw(load_world(WORLD)).tobytes())
+
+
+def test_it_charges_in_the_dock_and_empties_outside():
+    docked = driven(v=0.0, w=0.0, seconds=3.0)
+    assert docked.truth.charging
+    assert docked.battery.percent == pytest.approx(86.0, abs=0.5)
+    assert driven().battery.percent < driven(seconds=2.0).battery.percent
+    assert driven("battery@1").battery.percent < driven().battery.percent - 4.0
+
+
+def test_a_wall_stops_it_and_is_felt():
+    simulation = driven(v=0.5, w=0.0)
+    assert simulation.bumper
+    assert simulation.floor.touched == ("dock",)
+    assert simulation.truth.collisions == 0  # the dock is there to be touched
+    assert driven(v=-0.5, w=0.5, seconds=25.0).truth.collisions > 0
+
+
+def test_a_command_that_is_not_repeated_ends():
+    simulation = Simulation(load_world(WORLD), seed=4)
+    simulation.wheels.command(-0.5, 0.0, 0.0)
+    for _ in range(40):
+        simulation.step()
+    assert simulation.wheels.odometry_speed == (0.0, 0.0)
+
+
+def test_doors_open_unless_they_fail():
+    simulation = driven("door:kitchen")
+    assert simulation.open_door("store", wide=True) == ""
+    assert simulation.open_door("kitchen", wide=True) == "the door 'kitchen' does not answer"
+    assert simulation.truth.doors_open == []
+    simulation.step()
+    assert simulation.truth.doors_open == ["store"]
+
+
+def test_times_of_faults_count_from_the_departure_and_changes_are_told():
+    simulation = driven("laser@2-4")
+    changes = [(change["sensor"], change["mode"], change["t_s"]) for change in simulation.state["faults"]]
+    departed_s = simulation.truth.departed_s
+    assert changes == [
+        ("laser", "dead", pytest.approx(departed_s + 2.0, abs=0.06)),
+        ("laser", "ok", pytest.approx(departed_s + 4.0, abs=0.06)),
+    ]
+
+
+def test_a_person_answers_after_a_while_unless_silent():
+    for silent in (False, True):
+        simulation = Simulation(load_world(WORLD), seed=0)
+        simulation.person.ask("load parcel", 1.0)
+        assert simulation.person.answer(2.0, silent=silent) == ""
+        assert simulation.person.answer(6.0, silent=silent) == ("" if silent else "done load parcel")
+        assert simulation.person.answer(7.0, silent=silent) == ""
+
+
+def test_what_can_not_be_read_is_refused(tmp_path):
+    with pytest.raises(FaultError, match="laser can't be 'purple'"):
+        parse_faults("laser:purple", FAULTS)
+    with pytest.raises(WorldError, match="No such file"):
+        load_world(tmp_path / "no.yaml")
+    (tmp_path / "bad.yaml").write_text(WORLD.read_text(encoding="utf-8").replace("dock: [0.57, 5.4, 3.14]", "dock: [0.57]"))
+    with pytest.raises(WorldError, match="should be 3 numbers"):
+        load_world(tmp_path / "bad.yaml")
+
+
+def test_time_waits_for_those_that_lag_and_not_for_the_dead():
+    lockstep = Lockstep(["/a", "/b=0.3"], 10.0)
+    assert lockstep.lagging(5.0, 0.0) == []  # nobody has been heard yet
+    lockstep.heard("/a", 5.0)
+    lockstep.heard("/b", 5.0)
+    assert lockstep.lagging(5.1, 0.0) == []
+    assert lockstep.lagging(5.15, 0.0) == ["/a"]
+    assert lockstep.lagging(5.35, 0.0) == ["/a", "/b"]
+    lockstep.gone("/b")
+    assert lockstep.lagging(5.35, 9.0) == ["/a"]
+    assert lockstep.lagging(5.35, 11.0) == []  # it hangs
+    lockstep.heard("/a", 5.3)
+    assert lockstep.lagging(5.45, 11.0) == ["/a"]
