@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from alula.common.faults import parse_faults
 from rover_navigation.geometry import compose, inverse, points_of
 from rover_navigation.grid_map import load_map
 from rover_navigation.health import BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
@@ -15,6 +13,8 @@ from rover_navigation.matching import match
 from rover_navigation.planning import RADIUS_M, Surroundings
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
+
+from alula.common.faults import parse_faults
 
 WORLDS = Path(__file__).parents[4] / "worlds"
 
@@ -51,9 +51,7 @@ class Rig:
         self._hear(now_s)
         if job is None:
             return None
-        done = job.step(
-            Situation(now_s, pose, odom, self._points, now_s - self._scan_s, simulation.bumper, simulation.battery.charging)
-        )
+        done = job.step(Situation(now_s, pose, odom, self._points, now_s - self._scan_s, simulation.bumper, simulation.battery.charging))
         twist = (0.0, 0.0) if isinstance(done, Ended) else done
         simulation.wheels.command(*twist, now_s)
         self._told = twist[1]

@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from rover_navigation_rig import Rig
-
 from rover_navigation.geometry import compose, points_of
 from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended
 from rover_navigation.matching import match, search
 from rover_navigation.planning import NoWayError, plan
+from rover_navigation_rig import Rig
 
 KITCHEN, OFFICE, WORKSHOP = (2.6, 8.6, math.pi), (13.4, 8.8, 0.0), (13.6, 1.6, 0.0)
 ARRIVED = Ended(arrived=True, text="arrived")

@@ -25,7 +25,8 @@ def carrot(way: Points, pose: Pose) -> Points:
     far = np.linalg.norm(local, axis=1)
     nearest = int(np.argmin(far))
     beyond = np.nonzero(far[nearest:] > AHEAD_M)[0]
-    return local[nearest + int(beyond[0])] if len(beyond) else local[-1]
+    point: Points = local[nearest + int(beyond[0])] if len(beyond) else local[-1]
+    return point
 
 
 def towards(point: Points, speed_m_s: float) -> Twist:

@@ -46,7 +46,8 @@ class GridMap:
 
     def middles(self, cells: NDArray[np.intp]) -> Points:
         """Return the middles of cells (N, 2), each row and column, in map."""
-        return (cells[:, ::-1] + 0.5) * self.resolution_m + np.array(self.origin_m)
+        steps: Points = (cells[:, ::-1] + 0.5) * self.resolution_m
+        return steps + np.array(self.origin_m)
 
 
 def load_map(path: Path) -> GridMap:

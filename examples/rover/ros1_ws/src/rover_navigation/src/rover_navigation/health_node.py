@@ -11,10 +11,10 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
-from resource_reporter import ResourceReporter
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, Float32, String
 
+from resource_reporter import ResourceReporter
 from rover_navigation.health import OK, BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
 from rover_navigation.ros import Done, pose_of
 

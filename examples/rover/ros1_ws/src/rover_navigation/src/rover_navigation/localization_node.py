@@ -9,11 +9,11 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
-from resource_reporter import ToldService
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
+from resource_reporter import ToldService
 from rover_navigation.geometry import Points, Pose, compose, inverse, wrapped
 from rover_navigation.matching import match, search
 from rover_navigation.ros import Done, points_of_scan, pose_message, pose_of, transform, wait_for_map

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.optimize import least_squares
 
-from rover_navigation.geometry import Points, Pose, compose, transformed, wrapped
+from rover_navigation.geometry import Points, Pose, compose, inverse, transformed, wrapped
 from rover_navigation.grid_map import GridMap
 
 MATCHES_M = 0.1  # a beam matches that ends so near to something that the map has
@@ -72,7 +72,7 @@ def search(grid: GridMap, scans: Sequence[tuple[Pose, Points]]) -> Match:
         scans: of a rover that turns, each with its pose in odom; their points in base_link. The pose is that of the last scan.
     """
     last = scans[-1][0]
-    here = np.concatenate([transformed(_between(last, odom), thinned(points, SEARCH_BEAMS)) for odom, points in scans])
+    here = np.concatenate([transformed(compose(inverse(last), odom), thinned(points, SEARCH_BEAMS)) for odom, points in scans])
     step = round(SEARCH_M / grid.resolution_m)
     rows, columns = np.nonzero(grid.distance_m[::step, ::step] > CLEARANCE_M)
     positions = grid.middles(np.column_stack((rows, columns)) * step)
@@ -84,9 +84,3 @@ def search(grid: GridMap, scans: Sequence[tuple[Pose, Points]]) -> Match:
         found += [(float(misses[i]), (*positions[i].tolist(), float(yaw))) for i in np.argsort(misses)[:3]]
     best = sorted(found)[:REFINED]
     return max((match(grid, pose, here) for _, pose in best), key=lambda candidate: candidate.quality)
-
-
-def _between(T_odom_a: Pose, T_odom_b: Pose) -> Pose:
-    """Return T_a_b."""
-    dx, dy = T_odom_b[0] - T_odom_a[0], T_odom_b[1] - T_odom_a[1]
-    return compose((0.0, 0.0, -T_odom_a[2]), (dx, dy, T_odom_b[2]))

@@ -15,7 +15,7 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, Header
 
-from rover_navigation.geometry import Pose, compose, inverse
+from rover_navigation.geometry import Points, Pose, compose, inverse
 from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended, Job, Situation
 from rover_navigation.planning import Surroundings
 from rover_navigation.ros import Done, free_of_scan, points_of_scan, pose_message, pose_of, wait_for_map
@@ -45,7 +45,8 @@ class NavigationNode:
         self._T_map_odom: Pose | None = None
         self._odom: Pose | None = None
         self._odoms: dict[int, Pose] = {}  # by their stamps, in nanoseconds
-        self._points, self._scan_s = np.zeros((0, 2)), np.inf  # until the first odometry
+        self._points: Points = np.zeros((0, 2))
+        self._scan_s = np.inf  # until the first odometry
         self._bumped = self._charging = False
         self._commands = rospy.Publisher("/cmd_vel", Twist, queue_size=5)
         self._way = rospy.Publisher("/move_base/plan", Path, queue_size=2, latch=True)

@@ -42,7 +42,9 @@ class Surroundings:
 
     def distance_m(self, *, seen: bool) -> NDArray[np.float64]:
         """Return how far each cell is from the next occupied one; ``seen``: also from what was seen."""
-        return np.asarray(distance_transform_edt(~(self.grid.occupied | self.seen))) * self.grid.resolution_m if seen else self.grid.distance_m
+        return (
+            np.asarray(distance_transform_edt(~(self.grid.occupied | self.seen))) * self.grid.resolution_m if seen else self.grid.distance_m
+        )
 
     def _clear(self, pose: Pose, ends: Points) -> None:
         far = np.linalg.norm(ends, axis=1)

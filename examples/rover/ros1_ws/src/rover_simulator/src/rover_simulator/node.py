@@ -14,7 +14,6 @@ import rosgraph
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from resource_reporter import ToldService
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, String
@@ -23,6 +22,7 @@ from tf2_msgs.msg import TFMessage
 
 from alula.common.faults import FaultError, parse_faults
 from alula.common.signals import StopEvent
+from resource_reporter import ToldService
 from rover_simulator import messages
 from rover_simulator.errors import WorldError
 from rover_simulator.faults import FAULTS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 TRACK_M = 0.36
 MAX_WHEEL_M_S = 0.8
@@ -17,6 +18,8 @@ NOISE = 0.02  # of each step's, standard deviation
 
 Pose = tuple[float, float, float]
 """x, y in metres, yaw in radians."""
+Speeds = NDArray[np.float64]
+"""Of the left and the right wheel, m/s."""
 
 
 def moved(pose: Pose, forward_m: float, turn_rad: float) -> Pose:
@@ -32,9 +35,9 @@ class Wheels:
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
         self._scale = 1.0 + rng.normal(0.0, SCALE_ERROR, 2)
-        self._wanted = np.zeros(2)
+        self._wanted: Speeds = np.zeros(2)
         self._wanted_at_s = -math.inf
-        self._turning = np.zeros(2)  # speeds of the left and the right wheel, m/s
+        self._turning: Speeds = np.zeros(2)
         self.odometry: Pose = (0.0, 0.0, 0.0)
         self.odometry_speed = (0.0, 0.0)
 
@@ -58,5 +61,5 @@ class Wheels:
         return (v * (1.0 - SLIP), w * (1.0 - SLIP)) if slip else (v, w)
 
 
-def _twist(wheels: np.ndarray) -> tuple[float, float]:
+def _twist(wheels: Speeds) -> tuple[float, float]:
     return float(wheels.mean()), float(wheels[1] - wheels[0]) / TRACK_M
