@@ -53,7 +53,9 @@ class NextParcel(Next):
         MANY,
         output_port("parcel", STRING),
         output_port("from", ANY, doc="a room"),
+        output_port("sender", STRING, doc="its name"),
         output_port("to", ANY, doc="a room"),
+        output_port("receiver", STRING, doc="its name"),
     )
 
     def listed(self) -> list[Any]:
@@ -64,8 +66,9 @@ class NextParcel(Next):
     def write(self, entry: Any) -> str:
         """Write it."""
         self.put("parcel", entry["name"])
-        self.put("from", entry["from"])
-        self.put("to", entry["to"])
+        for room, name in (("from", "sender"), ("to", "receiver")):
+            self.put(room, entry[room])
+            self.put(name, entry[room]["name"])
         return str(entry["name"])
 
 

@@ -1,0 +1,106 @@
+"""The hooks of the skillset `base`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from base_managers.hooks import (
+    AbstractCreepSkill,
+    AbstractDockSkill,
+    AbstractDriveToSkill,
+    AbstractFollowCorridorSkill,
+    AbstractLocaliseSkill,
+    AbstractStopHereSkill,
+)
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Trigger
+
+from rover_robot.hooks.clock import Watch
+from rover_robot.hooks.journey import Journey
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from alula.runtime.core.execution import Execution
+    from alula.runtime.hooks import SkillHooks
+
+STANDS_M_S, STANDS_RAD_S = 0.01, 0.02
+
+
+class DriveTo(Journey, AbstractDriveToSkill):
+    """By the navigation's plan."""
+
+
+class FollowCorridor(Journey, AbstractFollowCorridorSkill):
+    """Between two walls."""
+
+
+class Creep(Journey, AbstractCreepSkill):
+    """Without the laser."""
+
+
+class Dock(Journey, AbstractDockSkill):
+    """Into the dock."""
+
+    arrived = "DOCKED"
+
+
+class Localise(AbstractLocaliseSkill):
+    """Has the localisation search: it turns the rover by itself."""
+
+    def __init__(self, node: Node) -> None:
+        self._service = node.create_client(Trigger, "/localize")
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Ask for the search; the bridge answers also where nobody serves it."""
+        self._service.call_async(Trigger.Request()).add_done_callback(lambda future: self._on_answer(execution, future.result()))
+
+    def on_interrupt(self, execution: Execution) -> None:
+        """Let it: a search ends by itself after a turn on the spot, and nothing can be hit by that."""
+
+    def _on_answer(self, execution: Execution, answer: Trigger.Response) -> None:
+        end = self.terminated_FOUND if answer.success else self.terminated_LOST
+        end(execution, answer.message)
+
+
+class StopHere(AbstractStopHereSkill):
+    """Commands no speed until the wheels stand."""
+
+    def __init__(self, node: Node, watch: Watch) -> None:
+        self._execution: Execution | None = None
+        self._commands = node.create_publisher(Twist, "/cmd_vel", 5)
+        node.create_subscription(Odometry, "/odom", self._on_odometry, 5)
+        watch.every(self._command)
+
+    def on_dispatch(self, execution: Execution) -> None:
+        """Begin."""
+        self._execution = execution
+        self._command()
+
+    def on_interrupt(self, execution: Execution) -> None:
+        """Command nothing any more."""
+        self._execution = None
+
+    def _command(self) -> None:
+        if self._execution is not None:
+            self._commands.publish(Twist())
+
+    def _on_odometry(self, message: Odometry) -> None:
+        speed, execution = message.twist.twist, self._execution
+        if execution is not None and abs(speed.linear.x) < STANDS_M_S and abs(speed.angular.z) < STANDS_RAD_S:
+            self._execution = None
+            self.terminated_STANDING(execution)
+
+
+def make_hooks(node: Node) -> dict[str, SkillHooks]:
+    """Make the hooks of all skills."""
+    watch = Watch(node)
+    return {
+        "drive_to": DriveTo(node, watch, "/move_base"),
+        "follow_corridor": FollowCorridor(node, watch, "/follow_corridor"),
+        "creep": Creep(node, watch, "/creep"),
+        "dock": Dock(node, watch, "/dock"),
+        "localise": Localise(node),
+        "stop_here": StopHere(node, watch),
+    }

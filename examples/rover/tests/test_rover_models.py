@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from alula.commands import check
+
+ROOT = Path(__file__).resolve().parents[1]
+BASE = (ROOT / "skillsets/base.skill").read_text(encoding="utf-8")
+
+
+def test_models_and_missions_have_no_findings():
+    files = [*ROOT.glob("skillsets/*.skill"), *ROOT.glob("skillsets/*.rl"), ROOT / "missions/deliver.xml", ROOT / "missions/patrol.xml"]
+    assert check.main(["--strict", *map(str, files)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("invariant", "property_"),
+    [
+        ("keeps_pose: resource = (pose_status == GOOD) violation = release", "never_lost_at_speed"),
+        ("keeps_authority: resource = (authority == MISSION) violation = release", "never_against_the_operator"),
+    ],
+)
+def test_a_property_fails_without_its_invariant(invariant, property_, tmp_path, capsys):
+    changed = tmp_path / "base.skill"
+    changed.write_text(BASE.replace(invariant, ""), encoding="utf-8")
+    assert check.main([str(changed)]) == 1
+    assert property_ in capsys.readouterr().out
