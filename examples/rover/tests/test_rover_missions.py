@@ -85,11 +85,18 @@ def test_below_15_percent_it_charges(monkeypatch, tmp_path):
 
 
 def test_lost_it_stops_and_turns_until_it_knows(monkeypatch):
-    _, end, ended, facts = drive(monkeypatch, "deliver", "pose@20")
+    _, end, ended, facts = drive(monkeypatch, "deliver", "pose@20-25")
     at = ended.index(("drive_to", "keeps_pose"))
     order = [one for one in ended[at:] if one[0] in {"stop_here", "localise"}]
     assert order == [("stop_here", "STANDING"), ("localise", "FOUND")]
     assert (end.outcome, facts["delivered"]) == (Outcome.DEGRADED, 3)
+
+
+def test_when_turning_does_not_help_it_calls_for_help(monkeypatch):
+    _, end, ended, _ = drive(monkeypatch, "deliver", "pose@20")
+    at = ended.index(("drive_to", "keeps_pose"))
+    assert [one[0] for one in ended[at:] if one[0] in {"localise", "ask"}] == ["localise"] * 3 + ["ask", "localise", "ask"]
+    assert end.outcome is Outcome.GIVEN_UP
 
 
 def test_a_door_that_stays_shut_has_it_take_the_other_way(monkeypatch, tmp_path):
