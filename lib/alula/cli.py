@@ -13,6 +13,7 @@ from alula.common.suggestions import nearest
 
 COMMANDS = {
     "check": ("alula.commands.check", "check skill models: errors and warnings, then proofs"),
+    "odds": ("alula.commands.odds", "tell how likely a mission is accomplished, degraded, given up, or neither: alula odds FILE"),
     "tree": ("alula.commands.tree", "draw a mission, or tick it without any robot: alula tree FILE [--svg FILE] [--answers FILE]"),
     "palette": ("alula.commands.palette", "write a robot's skills as a palette for Groot2: alula palette FOLDER"),
     "new": ("alula.scaffold.__main__", "make a robot: alula new robot FOLDER"),

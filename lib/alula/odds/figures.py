@@ -140,12 +140,19 @@ class Figures:
     skills: Mapping[str, SkillFigures] = field(default_factory=dict)
 
     def fault(self, name: str) -> FaultFigures:
-        """Return those of a fault; one of which nothing is said may come at any time."""
-        return self.faults.get(name, FaultFigures())
+        """Return those of a fault, or of an end ``skillset.skill END``; one of which nothing is said may come at any time."""
+        skill, _, end = name.partition(" ")
+        fails = self.skill(skill).fails
+        return self.faults.get(name) or (FaultFigures(rate=fails[end], lasts=None) if end in fails else FaultFigures())
 
     def skill(self, name: str) -> SkillFigures:
         """Return those of a skill; one of which nothing is said may end at any time, in any way."""
         return self.skills.get(name, SkillFigures())
+
+    @property
+    def at_use(self) -> frozenset[str]:
+        """The faults that come at a use of something."""
+        return frozenset(name for name, fault in self.faults.items() if fault.chances)
 
     def with_fault(self, name: str, **changed: object) -> Figures:
         """Return the figures with some of a fault's changed."""

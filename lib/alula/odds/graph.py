@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -21,7 +21,7 @@ class Graph:
 
     Attributes:
         initial: where it can begin.
-        steps: from each situation, by its number; a tick that changes nothing is no step.
+        steps: from each situation, by its number; what changes nothing is no step.
         outcomes: of each situation.
         open: situations that were found but not looked at, because there were too many.
     """
@@ -32,8 +32,15 @@ class Graph:
     open: frozenset[int] = frozenset()
 
 
-def explore(system: LabelledSystem[State], *, most: int = MOST_SITUATIONS, tell: Tell | None = None) -> Graph:
-    """Look at the situations that a system can come into, the nearest first, up to ``most`` of them."""
+def explore(system: LabelledSystem[State], *, at_use: Collection[str] = (), most: int = MOST_SITUATIONS, tell: Tell | None = None) -> Graph:
+    """Look at the situations that a system can come into, the nearest first.
+
+    Args:
+        system: what is looked at.
+        at_use: faults that come at a use of something, so also while the software is at work; nothing else happens then.
+        most: of the situations that are looked at.
+        tell: how far it is, every so often.
+    """
     numbers: dict[State, int] = {}
     for state in system.initial():
         numbers.setdefault(state, len(numbers))
@@ -45,6 +52,8 @@ def explore(system: LabelledSystem[State], *, most: int = MOST_SITUATIONS, tell:
         state = states[len(steps)]
         outcomes.append(system.outcome(state))
         found = [] if outcomes[-1] is not None else [step for step in system.steps(state) if _moves(step, state)]
+        if any(step.kind is Kind.NOW for step in found):
+            found = [step for step in found if step.kind is Kind.NOW or (step.kind is Kind.FAULT and step.name in at_use)]
         for step in found:
             if step.target not in numbers:
                 numbers[step.target] = len(states)
@@ -61,4 +70,4 @@ def _numbered(step: Step[State], numbers: Mapping[State, int]) -> Step[int]:
 
 
 def _moves(step: Step[State], state: State) -> bool:
-    return step.kind not in {Kind.NOW, Kind.ANY} or step.target != state
+    return step.kind not in {Kind.NOW, Kind.SOON, Kind.ANY} or step.target != state

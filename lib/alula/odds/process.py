@@ -159,7 +159,7 @@ class _Quantifier:
         place, clocks, _ = key
         steps = self._graph.steps[place]
         racers = list(self._racers(key))
-        yield from (({self._after(step, clocks): ONE}, ZERO, {}) for step in steps if step.kind is Kind.ANY)
+        yield from (({self._after(step, clocks): ONE}, ZERO, {}) for step in steps if step.kind in {Kind.ANY, Kind.SOON})
         yield from ((way, ZERO, {}) for racer in racers if racer.rate.high is None for way in racer.ways)
         running = [racer for racer in racers if racer.rate != NEVER]
         for rates in itertools.product(*(racer.rate.corners for racer in running)):
@@ -168,7 +168,7 @@ class _Quantifier:
                 timed = [(racer, rate) for racer, rate in zip(running, rates, strict=True) if rate]
                 for ways in itertools.product(*(racer.ways for racer, _ in timed)):
                     yield _race(timed, ways, total)
-            elif not any(racer.surely for racer in running):
+            elif not any(racer.surely for racer in running) and not any(step.kind is Kind.SOON for step in steps):
                 yield {key: ONE}, ZERO, {}  # it waits for ever
 
     def _racers(self, key: Key) -> Iterator[_Racer]:

@@ -104,7 +104,8 @@ def _skill(part: Located, name: str, skill: Skill) -> SkillFigures:
     results = {end: _likelihood(one) for end, one in _ends(said, "results", name, ends).items()}
     if results and not corners([results.get(end, Range(Fraction(0), Fraction(1))) for end in ends]):
         raise said["results"].wrong(f"the likelihoods of the results of `{name}` can't add up to 1; a result that is left out has the rest")
-    fails = {end: _failing(one) for end, one in _ends(said, "fails", name, ends).items()}
+    breaking = (*ends, *(invariant.name for invariant in skill.invariants))
+    fails = {end: _failing(one) for end, one in _ends(said, "fails", name, breaking).items()}
     lasts, stages = _time(said["lasts"]) if "lasts" in said else (ANY_RATE, 1)
     return SkillFigures(results, lasts, stages, fails, _source(said))
 

@@ -24,6 +24,8 @@ class Kind(Enum):
     """A fault comes."""
     MENDED = "mended"
     """A fault is over."""
+    SOON = "soon"
+    """It comes some time, if nothing else does; no figure says when."""
     ANY = "any"
     """It may come at any time, or never; no figure is for it."""
 

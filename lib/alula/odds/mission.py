@@ -1,0 +1,170 @@
+"""The transition system of a mission, told as what odds need: what the software does at once, what takes time, and which faults come.
+
+The system takes each step that only an unlucky robot takes. Here a step is taken by whatever the robot's files say takes it:
+
+- a state that a fault of ``faults.yaml`` shows comes with that fault alone, and goes when it is mended;
+- a state that a skill brings about (``then`` of its mock) comes with a success of that skill alone;
+- any other arrow of the functional layer comes some time, or, if it breaks an invariant, is a fault of its own,
+  ``skillset.resource STATE``;
+- a broken invariant over data is a fault of its own, ``skillset.skill INVARIANT``, where no fault of ``faults.yaml`` brings it about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from alula.missions.director import Outcome as Ended
+from alula.odds.system import TAKE_OFF, Kind, Outcome, Step
+from alula.prove.mission.oracle import Asked
+from alula.prove.mission.state import Event, State
+from alula.prove.mission.state import Kind as Happens
+from alula.prove.mission.system import System
+from alula.records.causes.effects import FaultEffects
+
+Brought = Mapping[str, Collection[tuple[str, str]]]
+"""By a skill, the states that its success brings about: resource and state."""
+OUTCOMES = {Ended.ACCOMPLISHED: Outcome.ACCOMPLISHED, Ended.DEGRADED: Outcome.DEGRADED, Ended.GIVEN_UP: Outcome.GIVEN_UP}
+
+
+class Place(NamedTuple):
+    """A situation of the system, the faults that are there, and the one that comes just now."""
+
+    state: State
+    faults: frozenset[str] = frozenset()
+    coming: str = ""
+
+
+class MissionSteps:
+    """A mission with its models and faults, as a `LabelledSystem`.
+
+    Args:
+        system: of the mission.
+        faults: what each brings about, by its name.
+        brought: what skills bring about.
+        departure: the resource and state that the robot leaves at its departure.
+    """
+
+    def __init__(
+        self, system: System, faults: Mapping[str, FaultEffects], brought: Brought, departure: tuple[str, str] | None = None
+    ) -> None:
+        self._system = system
+        self._faults = faults
+        self._brought = brought
+        self._departure = departure
+        self._states = {pair for several in brought.values() for pair in several}
+
+    def initial(self) -> list[Place]:
+        """Return the situation at power-up."""
+        return [Place(self._system.initial())]
+
+    def outcome(self, state: Place) -> Outcome | None:
+        """Return how the mission has ended in order."""
+        ended = self._system.outcome(state.state)
+        return None if ended is None else OUTCOMES.get(ended)
+
+    def steps(self, state: Place) -> Iterator[Step[Place]]:
+        """Yield what can happen; nothing where the mission was aborted."""
+        if self._system.outcome(state.state) is not None:
+            return
+        steps = list(self._system.steps(state.state))
+        if state.coming:
+            yield from self._strikes(state, steps)
+            return
+        waits = not _complete([event.choices for event, _ in steps if event.kind is Happens.TICK])
+        for event, after in steps:
+            yield from self._step(state, event, after, waits=waits)
+        yield from (Step(Kind.FAULT, name, Place(state.state, state.faults, name)) for name in self._faults if name not in state.faults)
+
+    def _step(self, state: Place, event: Event, after: State, *, waits: bool) -> Iterator[Step[Place]]:
+        target = state._replace(state=after)
+        match event.kind:
+            case Happens.TICK:
+                yield Step(Kind.SOON if waits and event.choices else Kind.NOW, "tick", target)
+            case Happens.START:
+                yield Step(Kind.NOW, event.skill, target, uses=(event.skill,))
+            case Happens.REFUSE | Happens.INTERRUPT:
+                yield Step(Kind.NOW, event.skill, target)
+            case Happens.RESULT:
+                brought = target if event.failure else target._replace(state=self._with_brought(event.skill, after))
+                yield Step(Kind.END, event.skill, brought, event.result, self._left(state.state, brought.state))
+                if event.failure and self._is_there(state, f"{event.skill} {event.result}"):
+                    yield Step(Kind.ANY, f"{event.skill} {event.result}", target)
+            case Happens.EXTERN:
+                yield from self._extern(state, event, target)
+            case Happens.BREAK | Happens.FAIL:
+                end = f"{event.skill} {event.result or Happens.FAIL.value}"
+                if not any(_any(one.ends, end) for one in self._faults.values()):
+                    yield Step(Kind.FAULT, end, target)
+                elif self._is_there(state, end):
+                    yield Step(Kind.ANY, end, target)
+            case Happens.EVENT:
+                yield Step(Kind.ANY, event.skill, target)
+            case _:
+                pass  # deaths are faults of processes; nobody aborts
+
+    def _is_there(self, state: Place, end: str) -> bool:
+        """Tell whether a fault is there that can bring about this end of an execution."""
+        return any(_any(self._faults[name].ends, end) for name in state.faults)
+
+    def _extern(self, state: Place, event: Event, target: Place) -> Iterator[Step[Place]]:
+        resource = event.skill
+        shown = f"{resource} {event.result}"
+        uses = self._left(state.state, target.state)
+        showing = [name for name in state.faults if _any(self._faults[name].states, f"{resource} {event.source}")]
+        if any(_any((*one.states, *one.later), shown) for one in self._faults.values()):
+            if any(_any((*self._faults[name].states, *self._faults[name].later), shown) for name in state.faults):
+                yield Step(Kind.ANY, shown, target, uses=uses)
+        elif showing:
+            yield from (Step(Kind.MENDED, name, target._replace(faults=state.faults - {name}), uses=uses) for name in showing)
+        elif (resource, event.result) not in self._states:
+            yield Step(Kind.FAULT if event.failure else Kind.SOON, shown, target, uses=uses)
+
+    def _strikes(self, state: Place, steps: Iterable[tuple[Event, State]]) -> Iterator[Step[Place]]:
+        """Yield what the fault that comes may bring about first; the rest may follow, at any time while it is there."""
+        there = Place(state.state, state.faults | {state.coming})
+        effects = self._faults[state.coming]
+        found = [after for event, after in steps if _shows(effects, event)]
+        yield from (Step(Kind.NOW, state.coming, there._replace(state=after)) for after in found or [state.state])
+
+    def _with_brought(self, skill: str, state: State) -> State:
+        """Return a situation with what a success of the skill brings about, where the models have an arrow for it."""
+        for resource, wanted in self._brought.get(skill, ()):
+            found = [after for event, after in self._system.steps(state) if _is_extern(event, resource, wanted)]
+            state = found[0] if found else state
+        return state
+
+    def _left(self, before: State, after: State) -> tuple[str, ...]:
+        if self._departure is None:
+            return ()
+        resource, state = self._departure
+        left = self._system.resource(before, resource) == state != self._system.resource(after, resource)
+        return (TAKE_OFF,) if left else ()
+
+
+def _is_extern(event: Event, resource: str, state: str) -> bool:
+    return event.kind is Happens.EXTERN and event.skill == resource and event.result == state
+
+
+def _shows(effects: FaultEffects, event: Event) -> bool:
+    word = event.result or event.kind.value
+    if event.kind is Happens.EXTERN:
+        return _any(effects.states, f"{event.skill} {word}")
+    return event.kind in {Happens.RESULT, Happens.BREAK, Happens.FAIL} and _any(effects.ends, f"{event.skill} {word}")
+
+
+def _any(patterns: Iterable[str], text: str) -> bool:
+    return any(fnmatchcase(text, pattern) for pattern in patterns)
+
+
+def _complete(several: Sequence[Sequence[Asked]]) -> bool:
+    """Tell whether these ways of a tick are all of them; else one is missing, for it changes nothing: the tree waits."""
+    if not several or any(not asked for asked in several):
+        return bool(several)
+    first = {asked[0].question: asked[0].options for asked in several}
+    if len(first) > 1:
+        return True  # choices are asked for one after another: this can't be
+    (options,) = first.values()
+    rests = [[asked[1:] for asked in several if asked[0].answer == option] for option in options]
+    return all(_complete(rest) for rest in rests)
