@@ -17,6 +17,7 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent, event_record
 from alula.runtime.handle import SkillHandle
 from alula.runtime.plain import to_plain
 from alula.trees.groot.watching import Watch
+from alula.trees.view import NodeView
 
 TREE_LOG = "mission.btlog"
 """Of a mission that is a file."""
@@ -38,7 +39,7 @@ class MissionRecord:
         self._departure_s: float | None = None
         self._unended: set[str] = set()
         self._decisions = 0
-        self._view: Mapping[str, object] = {}
+        self._view: NodeView | None = None
         self._blackboard: dict[str, object] = {}
         self._writer = RecordWriter(out / FILE)
         # So that a mission that is killed leaves one that says `running`.
@@ -111,10 +112,10 @@ class MissionRecord:
 
     def outcome_of_tick(self, director: Director) -> None:
         """Write what a tick has changed in the tree and on the blackboard."""
-        view = director.view().as_dict()
+        view = director.view()
         if view != self._view:
             self._view = view
-            self._write(TREE, view)
+            self._write(TREE, view.as_dict())
         values = {name: to_plain(value) for name, value in director.blackboard.values().items()}
         changed = {name: value for name, value in values.items() if name not in self._blackboard or self._blackboard[name] != value}
         if changed:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Parallel, Selector, Sequence
@@ -38,16 +40,19 @@ def path_of(node: Behaviour) -> tuple[str, ...]:
 
 
 class _Memory:
-    """What one node last was; ``left``: while it was running, by a tick that did not come to it."""
+    """What one node last was; ``left``: while it was running, by a tick that did not come to it. ``view``: as it was looked at last."""
 
-    __slots__ = ("kind", "left", "message", "node", "status")
+    __slots__ = ("kind", "left", "message", "node", "skill", "source", "status", "view")
 
     def __init__(self, node: Behaviour) -> None:
         self.node = node
-        self.kind = kind_of(node)
+        leaf = skill_leaf(node)
+        self.kind, self.skill = kind_of(node), "" if leaf is None else leaf.skill_name
+        self.source = source_of(node) if isinstance(node, Node) else None
         self.status = Status.INVALID
         self.left = False
         self.message = ""
+        self.view: NodeView | None = None
 
 
 class TreeWatch:
@@ -84,15 +89,15 @@ class TreeWatch:
             memory.left, memory.message = True, node.feedback_message
 
     def look(self) -> NodeView:
-        """Return a view of the whole tree as it is now."""
+        """Return a view of the whole tree as it is now; the last one, itself, where nothing has changed since."""
         self.remember()
         return self._view(self._root)
 
     def _view(self, node: Behaviour) -> NodeView:
         memory = self._memories[node]
         status = INTERRUPTED if memory.left else memory.status.value
-        leaf = skill_leaf(node)
-        skill = "" if leaf is None else leaf.skill_name
         children = tuple(self._view(child) for child in node.children)
-        source = source_of(node) if isinstance(node, Node) else None
-        return NodeView(node.name, memory.kind, status, memory.message, skill, children, source)
+        last = memory.view
+        if last is None or last.status != status or last.message != memory.message or any(map(operator.is_not, last.children, children)):
+            last = memory.view = NodeView(node.name, memory.kind, status, memory.message, memory.skill, children, memory.source)
+        return last

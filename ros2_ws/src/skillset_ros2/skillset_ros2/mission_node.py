@@ -32,6 +32,7 @@ from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient
 from alula.runtime.codecs import event_of
 from alula.trees.groot.address import ServerError
+from alula.trees.view import NodeView
 from skillset_ros2 import NodeExecutor, SkillsetClient
 
 TURN_S = 0.1  # wall clock; how soon a signal is seen when nothing else happens
@@ -60,7 +61,7 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
             start_timeout_s=self._parameter("start_timeout_s", START_TIMEOUT_S),
             groot=self._groot(),
         )
-        self._view_json = ""
+        self._view: NodeView | None = None
         self._heartbeat: Publisher | None = None
         self._tree = self.create_publisher(String, "/mission/tree", LATCHED)
         for name in plan.skillsets:
@@ -112,10 +113,10 @@ class MissionNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return str(self.declare_parameter("groot", "", ParameterDescriptor(dynamic_typing=True)).value)
 
     def _publish_tree(self) -> None:
-        view_json = json.dumps(self.driver.director.view().as_dict())
-        if view_json != self._view_json:
-            self._view_json = view_json
-            self._tree.publish(String(data=view_json))
+        view = self.driver.director.view()
+        if view != self._view:
+            self._view = view
+            self._tree.publish(String(data=json.dumps(view.as_dict())))
 
     def _on_abort(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.message = self.driver.abort("aborted by the operator")
