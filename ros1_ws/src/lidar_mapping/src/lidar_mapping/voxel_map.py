@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import open3d as o3d
+
+from alula.common.open3d_core import o3d
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -14,10 +14,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from alula.common.open3d_core import o3d
 from alula.report.files import Problems, ReportError, finite, read_json, sequence
 from uav_report.world import TrueSurfaces
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
+from alula.common.open3d_core import o3d
 from alula.report.files import ReportError
 
 Floats = NDArray[np.float64]
@@ -85,5 +86,5 @@ class TrueSurfaces:
         return np.asarray(self.vertices[place[first[(faces != 2) | bends]]], dtype=np.float64)
 
 
-def _tensor(values: Floats) -> o3d.core.Tensor:
+def _tensor(values: Floats) -> Any:
     return o3d.core.Tensor(np.ascontiguousarray(values, dtype=np.float32))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import open3d as o3d
 
+from alula.common.open3d_core import o3d
 from uav_simulator.errors import ConfigError
 from uav_simulator.frames import Vec3
 from uav_simulator.world.config import Obstacle, Scatter, WorldConfig

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
+from alula.common.open3d_core import o3d
 from uav_simulator.frames import Vec3
 from uav_simulator.world.parts import Part
 from uav_simulator.world.shapes import Floats, merged
@@ -64,13 +65,13 @@ class Scene:
         return Nearest(math.inf, position) if self._obstacles is None else _nearest(self._obstacles, position)
 
 
-def _scene(vertices: Floats, triangles: NDArray[np.int64]) -> o3d.t.geometry.RaycastingScene:
+def _scene(vertices: Floats, triangles: NDArray[np.int64]) -> Any:
     scene = o3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(triangles.astype(np.uint32)))
     return scene
 
 
-def _nearest(scene: o3d.t.geometry.RaycastingScene, position: Vec3) -> Nearest:
+def _nearest(scene: Any, position: Vec3) -> Nearest:
     query = o3d.core.Tensor.from_numpy(np.array([position], dtype=np.float32))
     x, y, z = scene.compute_closest_points(query, nthreads=1)["points"].numpy()[0].tolist()
     distance = ((x - position[0]) ** 2 + (y - position[1]) ** 2 + (z - position[2]) ** 2) ** 0.5
