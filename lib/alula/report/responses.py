@@ -30,15 +30,16 @@ class FaultResponse:
 
 
 class ResponseSummary(TypedDict):
-    """A fault, a process that died, or the radio that ended the video, and what followed from it (``alula.records.causes``).
+    """A fault, a process that died, or what else ended what the mission was for, and what followed from it (``alula.records.causes``).
 
-    ``injected``: it was made to fail. ``until_s`` None: it stayed. ``detected_by``: the change of a resource, or the end of a skill, that
-    told of it first. ``failed``: the executions that failed because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table
-    of a campaign.
+    ``told``: what happened to ``sensor``, in the robot's word, such as "lost". ``injected``: it was made to fail. ``until_s`` None: it
+    stayed. ``detected_by``: the change of a resource, or the end of a skill, that told of it first. ``failed``: the executions that failed
+    because of it. ``answered_by``, ``skill`` and ``after_s`` are as in the table of a campaign.
     """
 
     sensor: str
     mode: str
+    told: str
     injected: bool
     t_s: float | None
     until_s: float | None
@@ -108,6 +109,7 @@ def summarise_response(one: FaultResponse, phases: Phases) -> ResponseSummary:
     return ResponseSummary(
         sensor=one.what,
         mode=one.mode,
+        told=DIED if one.mode == DIED else fault.effects.told,
         injected=fault.injected,
         t_s=phases.since(fault.at_s),
         until_s=phases.since(fault.until_s) if math.isfinite(fault.until_s) else None,

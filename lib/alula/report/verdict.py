@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from alula.common.faults import DIED
 from alula.report.deaths import Death
 from alula.report.ends import SIGNAL, Ended, read_end
 from alula.report.run_log import read_waits
@@ -108,8 +107,7 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
 def what_failed(summary: Mapping[str, Any]) -> str:
     """Return what the vehicle had to recover from."""
     failure_s = summary["recovery"]["failure_s"]
-    sensor, mode = next(((one["sensor"], one["mode"]) for one in summary["answers"] if one["t_s"] == failure_s), ("sensor", ""))
-    return f"{sensor} {DIED if mode == DIED else 'lost' if sensor == 'radio' else 'failed'}"
+    return next((f"{one['sensor']} {one['told']}" for one in summary["answers"] if one["t_s"] == failure_s), "sensor failed")
 
 
 def conformance_lines(found: Mapping[str, Any]) -> list[str]:

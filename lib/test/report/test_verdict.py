@@ -19,14 +19,14 @@ MOCK = {"wall_s": 1.0, "factor": 100.0, "notes": []}
 @pytest.mark.parametrize(
     ("responses", "told"),
     [
-        ([("zed", "dead", 12.0), ("encoder", "killed", 40.0)], "encoder failed at 40.00 s"),
+        ([("zed", "failed", 12.0), ("encoder", "failed", 40.0)], "encoder failed at 40.00 s"),
         ([("perception", "died", 40.0)], "perception died at 40.00 s"),
-        ([("zed", "dead", 12.0), ("radio", "", 40.0)], "radio lost at 40.00 s"),
+        ([("zed", "failed", 12.0), ("uplink", "lost", 40.0)], "uplink lost at 40.00 s"),
         ([], "sensor failed at 40.00 s"),
     ],
 )
 def test_what_failed_is_named(responses, told, tmp_path: Path):
-    found = [{"sensor": sensor, "mode": mode, "t_s": t_s} for sensor, mode, t_s in responses]
+    found = [{"sensor": sensor, "told": word, "t_s": t_s} for sensor, word, t_s in responses]
     summary = {"outcome": "degraded", "mock": MOCK, "answers": found, "recovery": {"failure_s": 40.0, **LATER}}
     lines = verdict_lines(summary, [], tmp_path)
     assert f"  recovery: {told}, detected 0.50 s later" in lines

@@ -24,11 +24,13 @@ class FaultEffects:
         later: states that the reaction to it can bring about, such as the landing of a failsafe.
         ends: ``skillset.skill END`` of executions that no change of a resource explains: the name of the result or the invariant, else
             the state.
+        told: what happened to what the fault is named after, in a word.
     """
 
     states: frozenset[str] = field(default_factory=frozenset)
     later: frozenset[str] = field(default_factory=frozenset)
     ends: frozenset[str] = field(default_factory=frozenset)
+    told: str = "failed"
 
     def shows(self, change: TransitionEvent) -> bool:
         """Tell whether the functional layer can have reported the fault by this change of a resource."""
@@ -75,7 +77,7 @@ class EffectsByFault:
         if fault is None:
             return found
         later = [_named(change.states) for change in fault.changes]
-        return FaultEffects(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends))
+        return FaultEffects(_named(fault.states), frozenset().union(*later), found.ends | _named(fault.ends), found.told)
 
     def _of_name(self, what: str) -> frozenset[str]:
         return frozenset(one for one in (*self.alarms.always, *self.alarms.away) if fnmatchcase(one, f"*.{what}_status *"))

@@ -17,7 +17,7 @@ from alula.records.models import robot_skillsets
 
 EFFECTS, FIGURES = ("faults", "processes"), "skills"
 SECTIONS = (*EFFECTS, FIGURES)
-PARTS = ("states", "later", "ends")
+PARTS = ("states", "later", "ends", "told")
 ODDS = ("happens", "lasts", "source")
 """What an entry says besides about how often it comes: `alula.odds.reading` reads it, and the section of figures."""
 BAD_ENDS = (S.FAILED.value, S.INTERRUPTED.value, S.NOT_VALIDATED.value)
@@ -79,6 +79,7 @@ def load_effects(path: Path, skillsets: Sequence[Skillset]) -> EffectsByFault:
                 states=_read(said.get("states"), "resource", "state", states),
                 later=_read(said.get("later"), "resource", "state", states),
                 ends=_read(said.get("ends"), "skill", "end", ends),
+                told=said["told"].text("a word") if "told" in said else FaultEffects.told,
             )
     return EffectsByFault(known, alarms_of(skillsets, (state for one in known.values() for state in one.states)))
 
