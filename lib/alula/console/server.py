@@ -10,6 +10,7 @@ import contextlib
 import json
 import secrets
 import sys
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
@@ -22,6 +23,7 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
+from websockets.protocol import State
 
 from alula.common.runs import runs_folder
 from alula.common.scenarios import scenario_names
@@ -38,6 +40,8 @@ STATUS_S = 0.3
 """A viewer that hears nothing for longer than a second knows that what it shows is old."""
 STUCK_S = 5.0
 """A viewer that takes nothing for so long is dropped; it comes back by itself and is sent what it lacks."""
+OPEN_S = 3.0
+"""So long (wall clock) a connection may ask for nothing: browsers open some ahead of need."""
 HELLO_S = 5.0
 MAX_VIEWERS = 64
 MAX_MESSAGE_BYTES = 1 << 14
@@ -96,6 +100,15 @@ class Console:
     async def open(self) -> Any:
         """Serve as long as the context lasts."""
         server: Server
+        connections: weakref.WeakSet[ServerConnection] = weakref.WeakSet()
+
+        class Known(ServerConnection):
+            """A connection that is found at the end whether it has asked for something or not."""
+
+            def __init__(self, *given: Any, **named: Any) -> None:
+                super().__init__(*given, **named)
+                connections.add(self)
+
         looking = [
             asyncio.create_task(job)
             for job in (self._learn_options(), self._look_for_runs(), self._look_at_skills(), self._stay_connected())
@@ -108,7 +121,8 @@ class Console:
             process_request=self._answer,
             max_size=MAX_MESSAGE_BYTES,
             write_limit=1 << 18,
-            open_timeout=3,  # browsers open connections ahead of need
+            open_timeout=OPEN_S,
+            create_connection=Known,
             close_timeout=1,
             compression=None,  # it would take the event loop's time, and most viewers are on this machine
             server_header=None,
@@ -121,6 +135,9 @@ class Console:
                 await asyncio.to_thread(self._commands.keep, set(), set())
                 for threads in self._threads.values():
                     threads.shutdown(wait=False, cancel_futures=True)
+                for connection in list(connections):
+                    if connection.state is State.CONNECTING:  # the server would wait for what it asks for
+                        connection.transport.abort()
 
     # --- pages ---------------------------------------------------------------------------------------------------------
 

@@ -486,3 +486,23 @@ def test_a_viewer_that_hangs_is_dropped_and_the_others_go_on(make_run: Callable[
 def test_what_can_not_be_served_ends_with_2(words: list[str], why: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(words) == 2
     assert why in capsys.readouterr().err
+
+
+def test_a_server_that_ends_waits_for_no_connection_that_asks_for_nothing(
+    make_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Browsers open connections ahead of need."""
+    make_run()
+    monkeypatch.setattr(server, "OPEN_S", 100 * WAIT_S)
+    opened: list[tuple[asyncio.StreamReader, asyncio.StreamWriter]] = []
+
+    async def play(bench: Bench) -> None:
+        host, _, port = bench.base.rpartition(":")
+        opened.append(await asyncio.open_connection(host, int(port)))
+        assert (await bench.get("/"))[0] == 200  # so the server has taken the connection before this one
+
+    ended = threading.Thread(target=serve, args=(play,), daemon=True)
+    ended.start()
+    ended.join(WAIT_S)
+    assert opened
+    assert not ended.is_alive()
