@@ -32,8 +32,7 @@ def inverse(T_a_b: Pose) -> Pose:  # noqa: N803
 def transformed(T_a_b: Pose, points_b: Points) -> Points:  # noqa: N803
     """Return points of frame b in frame a."""
     cos, sin = math.cos(T_a_b[2]), math.sin(T_a_b[2])
-    turned: Points = points_b @ np.array([[cos, sin], [-sin, cos]])
-    return turned + np.array(T_a_b[:2])
+    return np.asarray(points_b @ np.array([[cos, sin], [-sin, cos]]) + np.array(T_a_b[:2]), dtype=np.float64)
 
 
 def points_of(ranges_m: NDArray[np.float64], angle_min_rad: float, angle_step_rad: float) -> Points:

@@ -46,8 +46,7 @@ class GridMap:
 
     def middles(self, cells: NDArray[np.intp]) -> Points:
         """Return the middles of cells (N, 2), each row and column, in map."""
-        steps: Points = (cells[:, ::-1] + 0.5) * self.resolution_m
-        return steps + np.array(self.origin_m)
+        return np.asarray((cells[:, ::-1] + 0.5) * self.resolution_m + np.array(self.origin_m), dtype=np.float64)
 
 
 def load_map(path: Path) -> GridMap:

@@ -37,6 +37,8 @@ class Floor:
         self._person = self._named("person")
         # The laser is stepped when a sweep is due, not with every tick: it takes most of the time.
         self._laser = self._rover.sensors.pop()
+        # Its noise is drawn here: IR-SIM's generator is one for all simulations of a process.
+        self._laser.noise, self._rng = False, np.random.default_rng([seed, 2])
         self.doors = {obj.name.removeprefix(DOOR): obj for obj in self._env.obstacle_list if obj.name.startswith(DOOR)}
 
     def _named(self, name: str) -> irsim.world.ObjectBase:
@@ -79,5 +81,6 @@ class Floor:
         """Measure all around."""
         laser = self._laser
         laser.step(self._rover.state)
-        ranges = np.where(laser.valid, laser.range_data, np.inf)
+        noisy = laser.range_data + self._rng.normal(0.0, laser.std, laser.number)
+        ranges = np.where(laser.valid, np.clip(noisy, laser.range_min, laser.range_max), np.inf)
         return Sweep(ranges, laser.angle_min, laser.angle_inc, laser.range_min, laser.range_max)
