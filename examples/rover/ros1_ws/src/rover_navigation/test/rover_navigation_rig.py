@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from alula.common.faults import parse_faults
+
 from rover_navigation.geometry import compose, inverse, points_of
 from rover_navigation.grid_map import load_map
 from rover_navigation.health import BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
@@ -13,8 +15,6 @@ from rover_navigation.matching import match
 from rover_navigation.planning import RADIUS_M, Surroundings
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
-
-from alula.common.faults import parse_faults
 
 WORLDS = Path(__file__).parents[4] / "worlds"
 
@@ -46,7 +46,8 @@ class Rig:
         if simulation.now_ns // 50_000_000 % 2 == 0 and (sweep := simulation.sweep()) is not None:
             self._scan(sweep, odom, now_s)
         pose = self.pose
-        self.wheels.step(WheelReading(now_s, odom[:2], pose[:2], self._told, simulation.wheels.odometry_speed[1]))
+        if self.laser.verdict(now_s) == "OK":
+            self.wheels.step(WheelReading(now_s, odom[:2], pose[:2], self._told, simulation.wheels.odometry_speed[1]))
         self.bumper.step(odom[:2], pressed=simulation.bumper)
         self._hear(now_s)
         if job is None:

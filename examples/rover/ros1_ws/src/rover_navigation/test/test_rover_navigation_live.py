@@ -11,12 +11,11 @@ import actionlib
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalStatus
+from alula_testing.ros1 import wait_until
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
-
-from alula_testing.ros1 import wait_until
 
 WORLD = Path(__file__).parents[4] / "worlds/office.yaml"
 LAUNCH = Path(__file__).parents[1] / "launch/functional.launch"

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from alula.common.faults import FaultError, parse_faults
+
 from rover_simulator.drawing import draw
 from rover_simulator.errors import WorldError
 from rover_simulator.faults import FAULTS
 from rover_simulator.lockstep import Lockstep
 from rover_simulator.simulation import Simulation
 from rover_simulator.world import load_world
-
-from alula.common.faults import FaultError, parse_faults
 
 WORLD = Path(__file__).parents[4] / "worlds/office.yaml"
 

@@ -17,19 +17,19 @@ def wrapped(angle_rad: float) -> float:
     return math.remainder(angle_rad, math.tau)
 
 
-def compose(T_a_b: Pose, T_b_c: Pose) -> Pose:  # noqa: N803
+def compose(T_a_b: Pose, T_b_c: Pose) -> Pose:
     """Return T_a_c."""
     cos, sin = math.cos(T_a_b[2]), math.sin(T_a_b[2])
     return T_a_b[0] + cos * T_b_c[0] - sin * T_b_c[1], T_a_b[1] + sin * T_b_c[0] + cos * T_b_c[1], wrapped(T_a_b[2] + T_b_c[2])
 
 
-def inverse(T_a_b: Pose) -> Pose:  # noqa: N803
+def inverse(T_a_b: Pose) -> Pose:
     """Return T_b_a."""
     cos, sin = math.cos(T_a_b[2]), math.sin(T_a_b[2])
     return -cos * T_a_b[0] - sin * T_a_b[1], sin * T_a_b[0] - cos * T_a_b[1], -T_a_b[2]
 
 
-def transformed(T_a_b: Pose, points_b: Points) -> Points:  # noqa: N803
+def transformed(T_a_b: Pose, points_b: Points) -> Points:
     """Return points of frame b in frame a."""
     cos, sin = math.cos(T_a_b[2]), math.sin(T_a_b[2])
     return np.asarray(points_b @ np.array([[cos, sin], [-sin, cos]]) + np.array(T_a_b[:2]), dtype=np.float64)

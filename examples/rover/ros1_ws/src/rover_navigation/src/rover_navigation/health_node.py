@@ -11,10 +11,10 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
+from resource_reporter import ResourceReporter
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, Float32, String
 
-from resource_reporter import ResourceReporter
 from rover_navigation.health import OK, BumperMonitor, LaserMonitor, PoseMonitor, WheelMonitor, WheelReading
 from rover_navigation.ros import Done, pose_of
 
@@ -69,7 +69,7 @@ class HealthNode:
         """Judge, and report."""
         now_s, pose = message.header.stamp.to_sec(), pose_of(message.pose.pose)
         told_rad_s = self._told[0] if now_s - self._told[1] < COMMAND_TIMEOUT_S else 0.0
-        if self._matched is not None:
+        if self._matched is not None and self._laser.verdict(now_s) == OK:  # old scans say that it stands
             self._wheels.step(WheelReading(now_s, pose[:2], self._matched, told_rad_s, message.twist.twist.angular.z))
         self._bumper.step(pose[:2], pressed=self._pressed)
         self._report(now_s)

@@ -9,11 +9,11 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry
+from resource_reporter import ToldService
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from resource_reporter import ToldService
 from rover_navigation.geometry import Points, Pose, compose, inverse, wrapped
 from rover_navigation.matching import match, search
 from rover_navigation.ros import Done, points_of_scan, pose_message, pose_of, transform, wait_for_map
@@ -63,7 +63,7 @@ class LocalizationNode:
         self._tell(message.header.stamp)
 
     def _match(self, points: Points) -> None:
-        assert self._T_map_odom is not None  # noqa: S101 - set with the first odometry
+        assert self._T_map_odom is not None
         found = match(self._grid, compose(self._T_map_odom, self._odom), points)
         self._quality = found.quality
         if found.quality >= BELIEVED:
@@ -72,7 +72,7 @@ class LocalizationNode:
 
     def _search_on(self, points: Points | None, turned_rad: float) -> None:
         """Turn on and keep scans; after a whole turn look for the pose."""
-        assert self._turned_rad is not None  # noqa: S101 - a search runs
+        assert self._turned_rad is not None
         self._turned_rad += turned_rad
         command = Twist()
         if points is not None and len(self._kept) * EVERY_RAD <= self._turned_rad:
@@ -102,7 +102,7 @@ class LocalizationNode:
         return TriggerResponse(success=self._quality >= FOUND, message=share)
 
     def _tell(self, stamp: rospy.Time) -> None:
-        assert self._T_map_odom is not None  # noqa: S101 - set with the first odometry
+        assert self._T_map_odom is not None
         self._tf.sendTransform(transform(stamp, "map", "odom", self._T_map_odom))
         message = PoseWithCovarianceStamped()
         message.header.stamp, message.header.frame_id = stamp, "map"

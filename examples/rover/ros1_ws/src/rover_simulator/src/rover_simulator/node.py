@@ -12,17 +12,17 @@ from pathlib import Path
 
 import rosgraph
 import rospy
+from alula.common.faults import FaultError, parse_faults
+from alula.common.signals import StopEvent
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from resource_reporter import ToldService
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, LaserScan
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 from tf2_msgs.msg import TFMessage
 
-from alula.common.faults import FaultError, parse_faults
-from alula.common.signals import StopEvent
-from resource_reporter import ToldService
 from rover_simulator import messages
 from rover_simulator.errors import WorldError
 from rover_simulator.faults import FAULTS
@@ -163,7 +163,7 @@ class SimulatorNode:
         return SetBoolResponse(success=not reason, message=reason)
 
     def _on_done(self, message: rospy.AnyMsg, topic: str) -> None:
-        self._lockstep.heard(topic, stamp_s(message._buff))  # noqa: SLF001 - AnyMsg has no other access to its bytes
+        self._lockstep.heard(topic, stamp_s(message._buff))
 
 
 def main() -> None:

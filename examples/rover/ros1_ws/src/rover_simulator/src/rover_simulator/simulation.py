@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
-
 from alula.common.faults import FaultRequest
+
 from rover_simulator.battery import Battery
 from rover_simulator.faults import FaultBoard
 from rover_simulator.floor import Floor, Sweep
