@@ -78,7 +78,7 @@ class StopHere(AbstractStopHereSkill):
         self._execution = execution
         self._command()
 
-    def on_interrupt(self, execution: Execution) -> None:
+    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
         """Command nothing any more."""
         self._execution = None
 

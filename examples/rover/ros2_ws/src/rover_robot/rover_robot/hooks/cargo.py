@@ -101,7 +101,7 @@ class OpenDoor(AbstractOpenDoorSkill):
         service = self._node.create_client(SetBool, f"/door/{execution.inputs.door}/open")  # type: ignore[attr-defined]
         service.call_async(SetBool.Request(data=True)).add_done_callback(lambda future: self._on_answer(execution, future.result()))
 
-    def on_interrupt(self, execution: Execution) -> None:
+    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
         """A door may be open."""
         self._execution = None
 

@@ -11,8 +11,8 @@ from sensor_msgs.msg import BatteryState
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
     from power_managers.inputs import ChargeInputs
+    from rclpy.node import Node
 
     from alula.runtime.core.execution import Execution
     from alula.runtime.hooks import SkillHooks
@@ -62,7 +62,7 @@ class Supply(AbstractSupplySkill):
         """Begin."""
         self._since_s, self._execution = self._battery.watch.now_s, execution
 
-    def on_interrupt(self, execution: Execution) -> None:
+    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
         """End."""
         self._execution = None
 
@@ -95,7 +95,7 @@ class Charge(AbstractChargeSkill):
         self._best, self._best_s = self._battery.level or 0.0, self._battery.watch.now_s
         self._execution = execution
 
-    def on_interrupt(self, execution: Execution) -> None:
+    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
         """End."""
         self._execution = None
 
