@@ -25,7 +25,11 @@ BEHAVIOUR, FAULTS = "mock.yaml", "faults.yaml"
 PARTS = ("inputs", "missions", "hooks", "report", "run", "depths")
 """What a robot may add to the general commands, as ``module`` or ``module:name``; ``docs/robots.md`` says what each has to be."""
 WORLD_KEYS = ("packages", "python", "debian", "underlays")
-KEYS = ("name", "about", "skillsets", "scenarios", "worlds", "departure", "taken", "python", "parts", "ros1", "ros2")
+KEYS = ("name", "about", "skillsets", "scenarios", "worlds", "departure", "taken", "page", "python", "parts", "ros1", "ros2")
+PAGE_WORDS = {"departure": "departure", "away": "under way", "back": "back", "moved": "travelled"}
+"""What a report calls the departure, being away, having come back, and the way covered, where the robot has no words of its own."""
+PAGE_TABLES = ("live", "modes", "glossary")
+PAGE_FENCE = "fence"
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -60,6 +64,7 @@ class RobotFolder:
         scenarios: the folder of its scenarios; ``worlds`` that of the files which scenarios name as their ``world``.
         departure: resource and state; times of a run count from when this state is left first, and a run that ends in it has come back.
         taken: resource and state; a robot that enters this state while it is away is not the mission's to bring back.
+        page: words and facts of its reports and of the operator's page, see `read_page`.
         python: folders of plain Python packages, which missions and the parts import.
         parts: what it adds to the general commands.
     """
@@ -72,6 +77,7 @@ class RobotFolder:
     about: str = ""
     departure: tuple[str, str] | None = None
     taken: tuple[str, str] | None = None
+    page: Mapping[str, Any] = field(default_factory=lambda: dict(PAGE_WORDS))
     python: tuple[Path, ...] = ()
     parts: Mapping[str, str] = field(default_factory=dict)
     ros1: RosPart = RosPart()
@@ -138,6 +144,14 @@ def find_robot(start: Path | None = None) -> RobotFolder:
     raise RobotError(f"there is no {FILE} in {here} or above; name the robot's folder with --robot DIR, or make one: alula new robot DIR")
 
 
+def page_words() -> Mapping[str, Any]:
+    """Return the robot's words for its reports; the usual ones where there is no robot, as for a run from elsewhere."""
+    try:
+        return find_robot().page
+    except RobotError:
+        return PAGE_WORDS
+
+
 def load_robot_folder(root: Path) -> RobotFolder:
     """Read a robot's file; raises RobotError."""
     path = root / FILE
@@ -169,6 +183,7 @@ def _load(root: Path, _written_ns: int) -> RobotFolder:
         worlds=folder("worlds", "worlds"),
         departure=_state(said, "departure"),
         taken=_state(said, "taken"),
+        page=read_page(said.get("page")),
         python=tuple(root / one for one in _texts(said.get("python"), "`python`")),
         parts=_parts(said.get("parts")),
         ros1=_ros_part(root, said.get("ros1"), "ros1_ws/src"),
@@ -195,6 +210,24 @@ def _state(said: Mapping[str, Located], key: str) -> tuple[str, str] | None:
     if not resource or not state.isidentifier():
         raise said[key].wrong(f"`{key}` should be skillset.resource STATE, such as base.base_status DOCKED")
     return resource, state
+
+
+def read_page(part: Located | None) -> dict[str, Any]:
+    """Return the words of ``page``, its tables, and the fence as ``{radius_m, z: [floor, ceiling]}`` where there is one, metres.
+
+    ``live`` says what a live run is on: of each option of the run that is set, and under ``default``. ``modes`` are those in which the
+    mission does not command, and what the robot does in them; ``glossary`` explains words of the robot's field.
+    """
+    said = {} if part is None else part.record("`page`", (*PAGE_WORDS, *PAGE_TABLES, PAGE_FENCE))
+    words: dict[str, Any] = {name: said[name].text(f"`{name}`") if name in said else usual for name, usual in PAGE_WORDS.items()}
+    tables = {name: said[name].entries(f"`{name}`") if name in said else {} for name in PAGE_TABLES}
+    words |= {name: {key: one.text(f"`{key}`") for key, one in table.items()} for name, table in tables.items()}
+    if PAGE_FENCE in said:
+        numbers = [one.number("a number of `fence`", -1e6) for one in said[PAGE_FENCE].elements()]
+        if len(numbers) != 3:
+            raise said[PAGE_FENCE].wrong("`fence` should be [radius, floor, ceiling] in metres")
+        words[PAGE_FENCE] = {"radius_m": numbers[0], "z": numbers[1:]}
+    return words
 
 
 def _parts(part: Located | None) -> dict[str, str]:

@@ -91,8 +91,8 @@ def _check_world(world: str) -> None:
     """
     if not world or world in world_names():
         return
-    of_all: list[set[str]] = [_keys(path) for path in find_robot().worlds.glob("*.yaml")]
-    if not of_all or not _keys(Path(world)) & set.intersection(*of_all):
+    of_all = [_keys(path) for path in find_robot().worlds.glob("*.yaml")]
+    if not of_all or not _keys(Path(world)).intersection(*of_all):
         raise ActError(
             f"{world} is no world: give one of {', '.join(world_names())}, or a YAML file on the robot's computer that is like them"
         )

@@ -8,16 +8,16 @@ from typing import Any
 
 import yaml
 
-from alula.common.flight_limits import FLIGHT_LIMITS
+from alula.common.robots import RobotError, find_robot
 
 QUALITIES = ("good", "degraded", "critical")
-FENCE = {"radius_m": FLIGHT_LIMITS.fence_radius_m, "z": [FLIGHT_LIMITS.fence_floor_m, FLIGHT_LIMITS.fence_height_m]}
-"""Where the guidance takes targets: an upright cylinder about home, heights above home."""
 MAX_ZONES = 100
 
 
 def areas_of(world: str) -> dict[str, Any]:
-    """Return the zones of a world file and the fence: ``{fence, radio: [{name, quality, box|cylinder|sphere}]}``; frame map, metres.
+    """Return the zones of a world file and the robot's fence: ``{fence, radio: [{name, quality, box|cylinder|sphere}]}``.
+
+    Frame map, metres; a robot without a fence has None there.
 
     A world that is not there, as in a run that was flown elsewhere, has no zones.
 
@@ -26,7 +26,15 @@ def areas_of(world: str) -> dict[str, Any]:
         OSError: it can't be read.
     """
     path = Path(world)
-    return {"fence": FENCE, "radio": list(_zones(path)) if world and path.is_file() else []}
+    return {"fence": _fence(), "radio": list(_zones(path)) if world and path.is_file() else []}
+
+
+def _fence() -> Any:
+    """Return the upright cylinder about home in which the robot stays, heights above home."""
+    try:
+        return find_robot().page.get("fence")
+    except RobotError:
+        return None
 
 
 def _zones(path: Path) -> Iterator[dict[str, Any]]:

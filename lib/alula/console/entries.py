@@ -25,7 +25,7 @@ from alula.records.kinds import with_kind
 from alula.runtime.core.events import TRANSITION
 
 RUN = "/run"
-"""What was asked for: the values of ``run.json``, and the ``name`` of its folder."""
+"""What was asked for: the values of ``run.json``, the ``name`` of its folder, and the robot's ``words`` (`read_page`)."""
 ROUTE = "/route"
 """The waypoints that the mission means to reach: ``[[x, y, z], ...]``, frame map, metres."""
 AREAS = "/areas"

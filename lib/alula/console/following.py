@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from alula.common.record import FILE, OPERATOR, Entry, RecordError, RecordFollower
+from alula.common.robots import page_words
 from alula.console import journal
 from alula.console.areas import areas_of
 from alula.console.causes import Causes
 from alula.console.clouds import CloudError, packed, read_points
 from alula.console.entries import AREAS, CAUSES, MAP, PICTURE, PICTURES_FILE, RECORDINGS_FILE, ROUTE, RUN, SUMMARY, Converter, Wire
 from alula.console.lines import LinesFollower
+
+OF_THE_MACHINE = ("out_dir", "run_id")
+"""Of ``run.json``, what a reader of the page can't use."""
 
 
 class RunFollower:
@@ -91,10 +95,14 @@ class RunFollower:
             self.problems.append(sentence)
 
     def _run(self, path: Path) -> dict[str, Any]:
-        keep = ("scenario", "seed", "faults", "world", "mock", "rate", "autopilot", "imperfections")
         values = _json(path)
         world = Path(str(values.get("world") or "")).stem
-        return {**{key: values.get(key) for key in keep}, "world": world, "name": self.folder.name}
+        return {
+            **{key: value for key, value in values.items() if key not in OF_THE_MACHINE},
+            "world": world,
+            "name": self.folder.name,
+            "words": page_words(),
+        }
 
     def _route(self, path: Path) -> list[list[float]]:
         return [[float(number) for number in waypoint[:3]] for waypoint in _json(path).get("route", [])]  # not every mission has one

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, TypedDict
 
 from alula.common.faults import parse_fault
+from alula.common.robots import page_words
 from alula.common.scenarios import load_scenario
 from alula.report.facts import Death, RunFacts
 from alula.report.files import Problems, ReportError, mapping, read_json, sequence
@@ -100,7 +101,7 @@ def duration_s(history: History, observed: Observed, phases: Phases) -> float | 
 def note_doubts(facts: RunFacts, observed: Observed, phases: Phases, problems: Problems) -> None:
     """Say what the numbers alone would hide: a run without a departure, faults that never came."""
     if not phases.departed and home() is not None:
-        problems.note(f"no lift-off is known: times count from {phases.zero_from}")
+        problems.note(f"no {page_words()['departure']} is known: times count from {phases.zero_from}")
     broken = {fault.sensor for fault in injected(observed)}
     scenario = load_scenario(facts.scenario)
     others = dict(scenario.faults).keys() - dict(scenario.processes).keys()  # the radio's: nothing of them is in the bag

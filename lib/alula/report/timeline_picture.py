@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from alula.common.robots import page_words
 from alula.report.timeline import Bar, Mark, ResourceRow, SkillRow, Timeline
 
 # After Okabe and Ito (2008): told apart by the colour-blind and, with the hatching of a violation, in grey print too.
@@ -136,7 +137,7 @@ def _paper(axes: Axes, timeline: Timeline, rows: Rows) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(nbins=12, steps=[1, 2, 5, 10]))
     axes.grid(axis="x", color="#d9d9d9", linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.set_xlabel("time since lift-off (s)", fontsize=9)
+    axes.set_xlabel(f"time since {page_words()['departure']} (s)", fontsize=9)
     for label in axes.get_yticklabels()[len(rows.skills) :]:
         label.set(fontsize=7, color="#44546a", style="italic")
     for skillset in dict.fromkeys(row["skillset"] for row in timeline["skills"]):

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from alula.common.robots import page_words
 from alula.report.deaths import Death
 from alula.report.ends import SIGNAL, Ended, read_end
 from alula.report.run_log import read_waits
@@ -33,7 +34,7 @@ def landed(summary: Mapping[str, Any]) -> str:
     """Return whether it came down well, in words; nothing is said of what is not known to have flown."""
     if summary.get("crash"):
         return f"no, it crashed: {summary['crash']}"
-    return {True: "yes", False: "no", None: "no lift-off is known"}[summary.get("landed")]
+    return {True: "yes", False: "no", None: f"no {page_words()['departure']} is known"}[summary.get("landed")]
 
 
 def was_ended(summary: Mapping[str, Any]) -> bool:
@@ -68,17 +69,18 @@ def death_lines(died: Sequence[Death]) -> list[str]:
 
 def flight_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight through a world was."""
-    chart = summary.get("map") or {}
+    chart, words = summary.get("map") or {}, page_words()
     coverage, collisions = chart.get("coverage"), summary.get("collisions")
     lines = [
-        f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}, "
-        f"flown {number(summary.get('distance_m'), 'm', 1)}, collisions {'unknown' if collisions is None else collisions}, "
-        f"nearest surface {number(summary.get('min_clearance_m'), 'm')}"
+        f"  {words['back']}: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}"
+        + (f", {words['moved']} {number(summary['distance_m'], 'm', 1)}" if "distance_m" in summary else "")
+        + (f", collisions {'unknown' if collisions is None else collisions}" if "collisions" in summary else "")
+        + (f", nearest surface {number(summary['min_clearance_m'], 'm')}" if "min_clearance_m" in summary else "")
     ]
     if summary.get("video"):
         return [*lines, video_line(summary["video"])]
     if chart.get("points") is None:
-        return [*lines, "  map: none"]
+        return [*lines, "  map: none"] if "map" in summary else lines
     return [
         *lines,
         f"  map: {chart.get('points')} points, rmse {number(chart.get('rmse_m'), 'm', 3)}, "
@@ -99,8 +101,8 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight over mocks was; there is no world to collide with or to map."""
     mock = summary["mock"]
     return [
-        f"  landed: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}; "
-        f"flown over mocks in {number(mock.get('wall_s'), 's')}, {number(mock.get('factor'), 'times faster than the clock', 0)}"
+        f"  {page_words()['back']}: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}; "
+        f"over mocks in {number(mock.get('wall_s'), 's')}, {number(mock.get('factor'), 'times faster than the clock', 0)}"
     ]
 
 

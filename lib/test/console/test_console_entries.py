@@ -29,8 +29,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
+from alula.common.flight_limits import FLIGHT_LIMITS
 from alula.common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
-from alula.console.areas import FENCE, areas_of
+from alula.common.robots import RobotError, load_robot_folder
+from alula.console.areas import areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
 from alula.console.entries import AREAS, CAUSES, MAP, NODES, PICTURE, PICTURES_FILE, ROUTE, RUN, Converter
 from alula.console.feed import CHUNK_BYTES, Feed, Place, place_of
@@ -254,7 +256,9 @@ def test_zones_of_every_shape_and_the_fence_are_told(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps({"scenario": "mapping", "world": world}), encoding="utf-8")
     follower = RunFollower(tmp_path)
     areas = {wire[0]: wire[2] for wire in follower.poll()}[AREAS]
-    assert areas == {"fence": FENCE, "radio": [box, cylinder, sphere]}
+    limits = FLIGHT_LIMITS  # the guidance enforces what the page shows
+    assert areas["radio"] == [box, cylinder, sphere]
+    assert areas["fence"] == {"radius_m": limits.fence_radius_m, "z": [limits.fence_floor_m, limits.fence_height_m]}
     assert follower.poll() == []
     assert areas_of("")["radio"] == areas_of("/not/here.yaml")["radio"] == []
 
@@ -367,3 +371,16 @@ def test_a_long_run_comes_in_pieces(tmp_path: Path) -> None:
 @pytest.mark.parametrize("hello", [{}, {"session": 3, "entries": 1}, {"session": "a", "entries": -1}, {"session": "a", "entries": True}])
 def test_a_place_that_makes_no_sense_is_the_beginning(hello: dict[str, object]) -> None:
     assert place_of(hello) == Place()
+
+
+def test_a_robot_that_says_nothing_of_its_page_has_no_fence_and_usual_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    assert areas_of("") == {"fence": None, "radio": []}
+    (tmp_path / "run.json").write_text("{}", encoding="utf-8")
+    words = next(value["words"] for topic, _, value in RunFollower(tmp_path).poll() if topic == RUN)
+    assert [words[name] for name in ("departure", "away", "back", "moved")] == ["departure", "under way", "back", "travelled"]
+    assert words["modes"] == words["live"] == words["glossary"] == {}
+    (tmp_path / "robot.yaml").write_text("name: rover\npage:\n  away: out\n  fence: [5, 0]\n", encoding="utf-8")
+    with pytest.raises(RobotError, match=r"robot.yaml:4.*radius, floor, ceiling"):
+        load_robot_folder(tmp_path)

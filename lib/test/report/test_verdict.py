@@ -54,11 +54,15 @@ def test_a_mission_that_could_not_start_tells_no_figures() -> None:
 
 
 def test_what_is_not_known_of_a_flight_is_said_so() -> None:
-    lines = verdict_lines({"outcome": "given_up", "landed": True, "duration_s": 9.0, "collisions": None}, [], OUT)
+    of_every_robot = {"outcome": "given_up", "landed": True, "duration_s": 9.0}
+    lines = verdict_lines({**of_every_robot, "collisions": None, "distance_m": None, "min_clearance_m": None, "map": None}, [], OUT)
     assert lines[2:] == [
         "  landed: yes, duration 9.0 s, flown unknown, collisions unknown, nearest surface unknown",
         "  map: none",
     ]
+    assert verdict_lines(of_every_robot, [], OUT)[2:] == ["  landed: yes, duration 9.0 s"], (
+        "nothing is said of what a robot does not measure"
+    )
 
 
 def test_a_crash_is_no_landing() -> None:

@@ -50,9 +50,9 @@ function keyFigures(run) {
   };
   const landed = summary.landed ?? (landing(run) === null ? null : true);
   const crash = summary.crash && ["no, it crashed", landedWhere(run), summary.crash].filter(Boolean).join(": ");
-  add("landed", crash || (landed ? landedWhere(run) || "yes" : landed === false ? "no" : null));
-  add("in the air", summary.duration_s, "s");
-  add("flown", summary.distance_m, "m");
+  add(robotWords(run).back, crash || (landed ? landedWhere(run) || "yes" : landed === false ? "no" : null));
+  add(robotWords(run).away, summary.duration_s, "s");
+  add(robotWords(run).moved, summary.distance_m, "m");
   const reached = last(run.blackboard.get("waypoints_reached")?.v ?? []) ?? mission.waypoints_reached;
   if (mission.waypoints) add("waypoints reached", `${reached} of ${mission.waypoints}`);
   add("collisions", summary.collisions, "", 0);
@@ -105,7 +105,7 @@ function account(run) {
   const where = landedWhere(run);
   const crash = run.facts["/summary"]?.crash;
   if (landed !== null && crash) say(landed, `Crashed${where && `, ${where}`}: ${crash}.`, "bad");
-  else if (landed !== null) say(landed, `Landed${where && `, ${where}`}.`);
+  else if (landed !== null) say(landed, `${sentence(robotWords(run).back)}${where && `, ${where}`}.`);
   const mission = last(run.mission.v);
   if (mission && mission.outcome !== "running") say(mission.end_s ?? last(run.mission.t), `${OUTCOMES[mission.outcome]?.[0] ?? words(mission.outcome)}.`);
   return lines.sort(byTime);
@@ -203,7 +203,7 @@ function wholeDone(run) {
   const outcome = run.facts["/summary"]?.outcome ?? last(run.mission.v)?.outcome;
   if (!outcome || outcome === "running") return "";
   const { landed: on, crash } = run.facts["/summary"] ?? {};
-  const down = crash ? "crashed" : on === true ? "landed" : on === false ? "not landed" : "";
+  const down = crash ? "crashed" : on === true ? robotWords(run).back : on === false ? `not ${robotWords(run).back}` : "";
   return [(OUTCOMES[outcome]?.[0] ?? words(outcome)).toLowerCase(), down].filter(Boolean).join("; ");
 }
 

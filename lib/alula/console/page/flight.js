@@ -1,8 +1,25 @@
 // The flight itself, in words: when and where it landed, what took the vehicle from the mission, how long a fallback held.
 
 const AT_PLACE_M = 1; // so near counts as at home, or at a waypoint
-// What ArduPilot's modes besides GUIDED and LAND mean for the flight; in these the mission does not command.
-const MODES = { RTL: "flies home and lands by itself", BRAKE: "brakes and hovers by itself", LOITER: "obeys the pilot", ALT_HOLD: "obeys the pilot", STABILIZE: "obeys the pilot" };
+// What a robot that says nothing about it calls its departure and its way.
+const WORDS = { departure: "departure", away: "under way", back: "back", moved: "travelled", live: {}, modes: {}, glossary: {} };
+
+/** The robot's words: those of `page` in its robot.yaml. */
+const robotWords = (run) => ({ ...WORDS, ...run.facts["/run"]?.words });
+
+/** The modes of the robot in which the mission does not command, and what it does in them. */
+const modesOf = (run) => robotWords(run).modes;
+
+/** What a run is on: mocks, or what the robot says of the options that are set. */
+function onWhat(run) {
+  const asked = run.facts["/run"] ?? {};
+  if (asked.mock) return "over mocks";
+  const { default: usual, ...options } = robotWords(run).live;
+  const set = Object.keys(options).filter((name) => asked[name]);
+  return set.length ? set.map((name) => options[name]).join(", ") : usual;
+}
+
+const sentence = (text) => text && text[0].toUpperCase() + text.slice(1);
 
 /** When the vehicle came to stand on the ground for the last time; null: it has not. */
 const landing = (run) => run.back;
@@ -16,7 +33,7 @@ function places(run) {
 
 /** How the vehicle came to the ground, as a word for it: what met the ground too fast, leaning, or something else has not landed. */
 function cameDown(run) {
-  return run.facts["/summary"]?.crash ? "crashed" : "landed";
+  return run.facts["/summary"]?.crash ? "crashed" : robotWords(run).back;
 }
 
 /** Where the vehicle landed, as "12.0 m east, 0.0 m north of home, at waypoint 3"; empty where the record does not tell. */
@@ -38,8 +55,8 @@ function autopilotActs(run) {
   const [begin, end] = [run.departure ?? Infinity, landing(run) ?? Infinity];
   for (const { t, columns } of run.data.values()) {
     (columns.get("mode") ?? []).forEach((mode, index, modes) => {
-      if (!index || mode === modes[index - 1] || !MODES[mode] || t[index] <= begin || t[index] >= end) return;
-      acts.push({ t: toldBetween(run, t[index - 1], t[index]) ?? t[index], mode, text: `changed to ${mode}: it ${MODES[mode]}` });
+      if (!index || mode === modes[index - 1] || !modesOf(run)[mode] || t[index] <= begin || t[index] >= end) return;
+      acts.push({ t: toldBetween(run, t[index - 1], t[index]) ?? t[index], mode, text: `changed to ${mode}: it ${modesOf(run)[mode]}` });
     });
   }
   return acts;

@@ -42,8 +42,11 @@ function showAccount() {
   setText(byId("reason"), reason);
   byId("state").style.setProperty("--tone", `var(--${tone})`);
   const asked = run.facts["/run"] ?? {};
-  const parts = [asked.scenario, asked.world && `world ${asked.world}`, asked.seed != null && `seed ${asked.seed}`, asked.faults?.length && `failing ${asked.faults.join(", ")}`, asked.mock ? "over mocks" : asked.autopilot ? "a real autopilot" : "in the simulator"];
+  const parts = [asked.scenario, asked.world && `world ${asked.world}`, asked.seed != null && `seed ${asked.seed}`, asked.faults?.length && `failing ${asked.faults.join(", ")}`, onWhat(run)];
   setText(byId("title"), asked.name ? `Alula · ${asked.name}` : "Alula");
+  for (const node of document.querySelectorAll("[data-word]")) setText(node, run.departure === null ? "the first event" : robotWords(run)[node.dataset.word]);
+  byId("slider").setAttribute("aria-label", `moment of the run, seconds since ${robotWords(run).departure}`);
+  rewrite(byId("own-words"), Object.entries(robotWords(run).glossary), ([word, meaning]) => el("div", {}, el("dt", {}, word), el("dd", {}, meaning)));
   setText(byId("subtitle"), parts.filter(Boolean).join(" · "));
   rewrite(byId("figures-row"), keyFigures(run), ([label, value]) => el("div", {}, el("dt", {}, label), el("dd", {}, value)));
   const zero = origin(run);

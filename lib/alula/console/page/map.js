@@ -33,7 +33,7 @@ class MapView {
     const line = (colour, dashes = "") => svg("svg", { width: 22, height: 10 }, svg("line", { x2: 22, y1: 5, y2: 5, stroke: colour, "stroke-width": 2.5, "stroke-dasharray": dashes }));
     const dot = (colour) => svg("svg", { width: 10, height: 10 }, svg("circle", { cx: 5, cy: 5, r: 4.5, fill: colour }));
     const place = (letter) => svg("svg", { width: 16, height: 16 }, svg("circle", { cx: 8, cy: 8, r: 7, fill: "var(--card)", stroke: "var(--ink)", "stroke-width": 1.5 }), svg("text", { x: 8, y: 12, "text-anchor": "middle", "font-size": 10, "font-weight": 700, fill: "var(--ink)" }, letter));
-    byId("map-legend").append(...[[line("var(--path)"), "flown"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [place("H"), "home: where it lifted off"], [place("L"), "where it came down"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
+    byId("map-legend").append(...[[line("var(--path)"), "way"], [line("var(--route)", "5 4"), "route"], [dot("var(--place)"), "vehicle"], [place("H"), "home: where it departed"], [place("L"), "where it came to rest"], [line("var(--bad)", "2 2"), "obstacle ahead"], [line("var(--edge)"), "true surfaces"], [line("var(--fair)", "7 4"), "radio degraded"], [line("var(--bad)", "7 3 2 3"), "radio critical"], [line("var(--ink)", "1 4"), "fence"], [dot("rgb(33,145,140)"), "map, coloured by height"]].map(([sign, text]) => el("li", {}, sign, text)));
   }
 
   turn(view) {
@@ -73,6 +73,8 @@ class MapView {
 
   draw(run, t, redrawn = false) {
     [this.run, this.t] = [run, t];
+    const { radio = [], fence } = run.facts["/areas"] ?? {};
+    byId("map-card").hidden = !run.path.t.length && !radio.length && !fence && !["/map", "/world", "/route"].some((topic) => run.facts[topic]?.length !== 0 && run.facts[topic]);
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.size ??= [this.canvas.clientWidth, this.canvas.clientHeight]; // asking at each drawing would have the browser lay out the page each time
     const [width, height] = this.size;
@@ -347,7 +349,7 @@ class MapView {
     const parts = [index < 0 ? "Nothing is recorded of the vehicle's place." : `${old}Vehicle at east ${fixed(path.v[index][0], 1)} m, north ${fixed(path.v[index][1], 1)} m, height ${fixed(path.v[index][2], 1)} m.`];
     if (ahead) parts.push(`Obstacle ${Number.isFinite(ahead.distance) ? `${fixed(ahead.distance, 1)} m ` : ""}ahead (${ahead.name}).`);
     const [landed, where] = [landing(this.run), landedWhere(this.run)];
-    if (where && this.t >= landed) parts.push(`${cameDown(this.run) === "crashed" ? "Crashed" : "Landed"} ${where}.`);
+    if (where && this.t >= landed) parts.push(`${sentence(cameDown(this.run))} ${where}.`);
     const place = index < 0 ? null : path.v[index];
     const { radio = [], fence } = this.run.facts["/areas"] ?? {};
     const zone = place && radio.find((one) => holds(one, place)); // the first that is listed counts

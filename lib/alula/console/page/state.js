@@ -19,7 +19,7 @@ function fieldAt(run, t, pattern) {
 function readings(run, t) {
   const numbers = (patterns) => patterns.map((pattern) => fieldAt(run, t, pattern));
   const told = (label, fields, write) => {
-    if (fields.some((field) => field === undefined)) return { label, text: "not measured", tone: "soft" };
+    if (fields.some((field) => field === undefined)) return null; // the robot has no such data
     const { value, since } = fields.find((one) => one.value === null) ?? fields[0];
     if (value !== null && value !== undefined) return { label, ...write(...fields.map((one) => one.value)) };
     return { label, text: since === null ? "not measured yet" : `no data since ${seconds(since - origin(run))}`, tone: since === null ? "soft" : "fair" };
@@ -29,16 +29,17 @@ function readings(run, t) {
   const [battery] = numbers([/battery/]);
   const reached = valueAt(run.blackboard.get("waypoints_reached") ?? newTrack(), t) ?? 0;
   const of = last(run.mission.v)?.waypoints;
-  return [
+  const shown = [
     told("height", [height], (z) => ({ text: `${fixed(z, 1)} m` })),
     told("speed", numbers([/velocity_enu_m_s\.x$/, /velocity_enu_m_s\.y$/, /velocity_enu_m_s\.z$/]), (...v) => ({ text: `${fixed(Math.hypot(...v), 1)} m/s` })),
     told("battery", [battery], (value) => batteryTold(battery.name, value)),
     linkAt(run, t, told),
     told("east, north of home", position, (x, y) => ({ text: `${fixed(x, 1)} m, ${fixed(y, 1)} m` })),
-    { label: "in the air", text: inTheAir(run, t) },
+    { label: robotWords(run).away, text: inTheAir(run, t) },
     ...(of ? [{ label: "waypoints", text: `${reached} of ${of}` }] : []),
-    told("autopilot's mode", numbers([/(^|\.)mode$/]), (mode) => ({ text: String(mode), tone: MODES[mode] ? "fair" : "" })),
+    told("autopilot's mode", numbers([/(^|\.)mode$/]), (mode) => ({ text: String(mode), tone: modesOf(run)[mode] ? "fair" : "" })),
   ];
+  return shown.filter(Boolean);
 }
 
 function inTheAir(run, t) {
@@ -66,7 +67,7 @@ function linkAt(run, t, told) {
     parts.push({ text: `${name.split(".")[0]} ${state.toLowerCase()}`, tone: isAlarm(run, alarm, t) ? "bad" : "" });
   }
   const tone = ["bad", "fair", "soft"].find((one) => parts.some((part) => part.tone === one));
-  return { label: "link", text: parts.map(({ text }) => text).join(", ") || "not measured", tone: parts.length ? tone : "soft" };
+  return parts.length ? { label: "link", text: parts.map(({ text }) => text).join(", "), tone } : null;
 }
 
 /** What is wrong at t: [{text, tone, since}]. */

@@ -119,7 +119,7 @@ class TimelineView {
       const x = this.x(zero + tick);
       parts.push(svg("line", { class: "grid", x1: x, x2: x, y1: top, y2: bottom }), svg("text", { x, y: bottom + 15, "text-anchor": "middle", class: "soft" }, String(Number(tick.toPrecision(10)))));
     }
-    parts.push(svg("text", { x: this.left, y: bottom + 31, class: "soft" }, this.run.departure === null ? "time since the first event (s)" : "time since lift-off (s)"));
+    parts.push(svg("text", { x: this.left, y: bottom + 31, class: "soft" }, this.run.departure === null ? "time since the first event (s)" : `time since ${robotWords(this.run).departure} (s)`));
     return parts;
   }
 
