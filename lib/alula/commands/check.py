@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 from time import monotonic
 
-from alula.commands.check_missions import SUFFIX, check_missions
+from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
 from alula.common.robots import RobotError, find_robot
 from alula.language.errors import Diagnostic, Severity, has_errors, render
 from alula.language.models import ModelFile, check_files, models_in
@@ -47,9 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     missions = [place for place in dict.fromkeys(given) if place.endswith(SUFFIX)]
     paths = dict.fromkeys(path for place in given if place not in missions for path in models_in(place))
-    files = [*check_files(list(paths), sys.stdin.buffer), *check_missions(missions, options.palette)]
+    models, trees = check_files(list(paths), sys.stdin.buffer), check_missions(missions, options.palette)
+    files = [*models, *trees]
     if options.proofs and options.to is None:
-        _prove(files, options.time, closed_world=options.closed_world)
+        _prove(models, options.time, closed_world=options.closed_world)
+        prove_missions(trees, options.time)
     for file in files:
         file.findings = [_strict(finding) for finding in file.findings] if options.strict else file.findings
     findings = [finding for file in files for finding in file.findings]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.robots import RobotError, find_robot
-from alula.language.errors import Diagnostic, Severity
+from alula.language.errors import Diagnostic, Severity, has_errors
 from alula.language.models import ModelFile
 from alula.missions.check.findings import findings_of
 from alula.missions.filed.part import NO_PART, MissionPart
@@ -27,6 +28,23 @@ def check_missions(paths: Sequence[str], palettes: Sequence[str]) -> list[ModelF
         return []
     skillsets, part = _robot()
     return [_checked(path, skillsets, [Path(palette) for palette in palettes], part) for path in paths]
+
+
+def prove_missions(files: Sequence[ModelFile], timeout_s: float) -> None:
+    """Look at all runs of the missions that are free of errors and use skills, and add what is found."""
+    sound = [file for file in files if not has_errors(file.findings)]
+    if not sound:
+        return
+    from alula.prove.mission.prover import prove_mission  # which brings its solvers along
+
+    skillsets, part = _robot()
+    for file in sound if skillsets else []:
+        tell = partial(_tell, file.path)
+        file.findings += prove_mission(Path(file.path), skillsets, part, timeout_s=timeout_s, tell=tell).findings
+
+
+def _tell(path: str, progress: str) -> None:
+    sys.stderr.write(f"{COMMAND}: {path}: looking at its runs: {progress}\n")
 
 
 def _robot() -> tuple[tuple[Skillset, ...], MissionPart]:

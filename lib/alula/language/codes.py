@@ -106,6 +106,11 @@ CODES: Mapping[str, str] = {
     "ALU616": "a script that not every version of BehaviorTree.CPP 4 reads alike",
     "ALU617": "an unknown subtree",
     "ALU618": "a result that the skill doesn't have",
+    "ALU701": "a mission that can end so that a skill can't start any more",
+    "ALU702": "a failure that nothing answers",
+    "ALU703": "a node that no run ticks",
+    "ALU710": "runs that were not looked at in the time given",
+    "ALU711": "a mission whose runs can't be looked at",
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}
@@ -115,3 +120,6 @@ MISSION_CODES: Mapping[str, str] = {
     code: meaning for code, meaning in CODES.items() if code.startswith("ALU6") or code in {"ALU004", "ALU007", "ALU008", "ALU009"}
 }
 """Those of missions, told in docs/mission-checks.md."""
+
+RUN_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU7")}
+"""Those of all runs of a mission, told in docs/mission-proofs.md."""

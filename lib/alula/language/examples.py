@@ -31,4 +31,5 @@ def examples(package: str) -> Mapping[str, Example]:
 LANGUAGE = "alula.language"
 PROOFS = "alula.prove"
 MISSIONS = "alula.missions.check"
+RUNS = "alula.prove.mission"
 """The packages that have examples. Proofs and missions are named only: nothing here imports them."""

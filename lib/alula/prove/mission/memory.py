@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +19,12 @@ from alula.trees.status import IDLE, RUNNING, Skipped, Status
 from alula.trees.tree import Tree
 
 SEEN = "_seen"
+LEFT = "_left"
+COUNTS = {LEFT: "the attempts left", "_count": "the rounds", "_retries": "the retries"}
+"""Attributes of nodes that count: what is left of a number of attempts, or what there was."""
+FEW = 2
+PLAIN = frozenset({type(None), bool, int, float, str, Status, Skipped, Unknown})
+"""Types whose values are kept as they are."""
 
 
 class TreeMemory(NamedTuple):
@@ -82,7 +88,7 @@ class Keeper:
             director.start_s is not None,
             waits,
             director.stops,
-            tuple(value for one in self._nodes for value in self._of(*one)),
+            tuple(self._values()),
             tuple(self._entries(number) for number in range(len(self._boards))),
             tuple(leaves),
             tuple(sorted(one.leaf for one in board.pending.handles if isinstance(one, Handle) and not one.done)),
@@ -90,12 +96,24 @@ class Keeper:
             ends,
         )
 
-    def _of(self, node: Node, names: tuple[str, ...], of_run: tuple[str, ...]) -> Iterable[Hashable]:
-        yield node.status
-        for name in names:
-            yield self._seen(node) if name == SEEN else _frozen(getattr(node, name))
-        for name in of_run:
-            yield None if node.status is IDLE else _frozen(getattr(node, name))
+    def _values(self) -> Iterator[Hashable]:
+        for node, names, while_running in self._nodes:
+            yield node.status
+            for name in names:
+                yield self._seen(node) if name == SEEN else self._kept(node, name)
+            for name in while_running:
+                yield None if node.status is IDLE else self._kept(node, name)
+
+    def _kept(self, node: Node, name: str) -> Hashable:
+        """Return an attribute; counts of attempts and rounds are kept up to a few: from then on there may be more, or not."""
+        value = getattr(node, name)
+        if name not in COUNTS or not isinstance(value, int | float):
+            return _frozen(value)
+        if not isinstance(value, UnknownNumber) and value <= FEW:
+            return _frozen(value)
+        least = value.low if isinstance(value, UnknownNumber) else float(value)
+        low = max(1.0, min(least, FEW - 1.0)) if name == LEFT else FEW + 1.0
+        return _frozen(UnknownNumber(self._body.robot.oracle, f"{COUNTS[name]} of '{node.name}'", low))
 
     @staticmethod
     def _seen(node: Node) -> bool:
@@ -154,6 +172,8 @@ class Keeper:
         return Handle(self._body.robot, leaf, self._body.skillsets[node.skillset], node.model.name)
 
     def _thawed(self, value: Hashable) -> object:
+        if type(value) is not tuple:
+            return value
         match value:
             case ("list", tuple(items)):
                 return [self._thawed(one) for one in items]
@@ -169,13 +189,13 @@ class Keeper:
 
 
 def _frozen(value: object) -> Hashable:
+    if type(value) in PLAIN:  # nearly all are, and each tick asks of each node
+        return value
     match value:
         case UnknownNumber():
             return ("number", value.frozen)
         case Moment() | Later():
             return value.frozen
-        case None | bool() | int() | float() | str() | Status() | Skipped() | Unknown():
-            return value
         case list():
             return ("list", tuple(_frozen(one) for one in value))
         case tuple():

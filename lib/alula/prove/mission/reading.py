@@ -42,8 +42,9 @@ class Read:
         """Return what is kept of an entry's value."""
         if value is None:
             return None
-        if name not in self.names:
-            return UNKNOWN
+        if name not in self.names:  # of its kind all the same, so that scripts can go on to write it
+            number = isinstance(value, int | float)
+            return UnknownNumber(self.oracle, f"`{name}`") if number else ANOTHER if isinstance(value, str) else UNKNOWN
         if name in self.whole or (isinstance(value, str) and name in self.ordered):
             return value
         if isinstance(value, str):

@@ -100,17 +100,17 @@ class System:
 
     def initial(self) -> State:
         """Return the situation at power-up."""
-        return State(self.ticker.initial, tuple(self._number(one.initial()) for one in self._steps))
+        return State(self.ticker.initial, tuple(self.number(one.initial()) for one in self._steps))
 
     def steps(self, state: State) -> Iterator[tuple[Event, State]]:
         """Yield each step out of a state."""
         over = self.outcome(state) is not None
         if not over:
             yield from self._ticks(state, TICK, Kind.TICK)
-            if self.failures.aborts and self._may_abort(state):
+            if self.failures.aborts and self.may_abort(state.memory):
                 yield from self._ticks(state, ABORT, Kind.ABORT)
         for place, number in enumerate(state.managers):
-            for event, after in self._moves_of(place, number):
+            for event, after in self.moves_of(place, number):
                 if over and event.leaf < 0:
                     continue
                 spent = state.spent + (event.failure and self.failures.most is not None)
@@ -125,38 +125,43 @@ class System:
                 started, interrupted, choices, touched = ticked[1:]
                 yield Event(kind, started=started, interrupted=interrupted, choices=choices, touched=touched), after
 
-    def _may_abort(self, state: State) -> bool:
-        memory = self.memory(state)
+    def may_abort(self, number: int) -> bool:
+        """Tell whether an abort changes what the tree of this memory does."""
+        memory = self.ticker.memories[number]
         return memory.started and not memory.stops and len(self.trees) > 1 and memory.phase == "_run"
 
-    def _moves_of(self, place: int, number: int) -> tuple[tuple[Event, int], ...]:
+    def moves_of(self, place: int, number: int) -> tuple[tuple[Event, int], ...]:
+        """Return what can happen in the managers of one skillset, by its place in ``skillsets``: no other skillset has a part in it."""
         key = (place, number)
         if key not in self._moves:
             found = self._steps[place].moves(self._managers[number])
-            self._moves[key] = tuple((event, self._number(after)) for event, after in found if after != self._managers[number])
+            self._moves[key] = tuple((event, self.number(after)) for event, after in found if after != self._managers[number])
         return self._moves[key]
 
-    def _commanded(self, state: State, ticked: Ticked) -> tuple[int, ...]:
-        """Return the managers with what a tick has asked for under way, without ends that the tree hangs on no more."""
+    def commanded(self, place: int, number: int, ticked: Ticked) -> int:
+        """Return managers with what a tick has asked for under way, without ends that the tree hangs on no more."""
         held = self.ticker.memories[ticked.memory].held
-        found: list[int] = []
-        for place, number in enumerate(state.managers):
-            managers = self._managers[number]
-            skills = self._steps[place].skills
-            kept = [one for one in managers.executions if one.phase != ENDED or one.leaf in held]
-            kept = [one._replace(asked=True) if one.leaf in ticked.interrupted and one.phase != ENDED else one for one in kept]
-            new = [Execution(leaf, SENT, asked=leaf in ticked.interrupted) for leaf in ticked.started if leaf in skills]
-            kept = [one for one in kept if one.leaf not in ticked.started]
-            running = [one for one in kept if one.phase == RUNNING]
-            others = sorted(one for one in (*kept, *new) if one.phase != RUNNING)
-            found.append(self._number(Managers(managers.states, (*running, *others))))
-        return tuple(found)
+        managers = self._managers[number]
+        skills = self._steps[place].skills
+        kept = [one for one in managers.executions if one.leaf not in ticked.started and (one.phase != ENDED or one.leaf in held)]
+        kept = [one._replace(asked=True) if one.leaf in ticked.interrupted and one.phase != ENDED else one for one in kept]
+        new = [Execution(leaf, SENT, asked=leaf in ticked.interrupted) for leaf in ticked.started if leaf in skills]
+        running = [one for one in kept if one.phase == RUNNING]
+        others = sorted(one for one in (*kept, *new) if one.phase != RUNNING)
+        return self.number(Managers(managers.states, (*running, *others)))
+
+    def _commanded(self, state: State, ticked: Ticked) -> tuple[int, ...]:
+        return tuple(self.commanded(place, number, ticked) for place, number in enumerate(state.managers))
 
     # --- observers ---------------------------------------------------------------------------------------------------
 
     def memory(self, state: State) -> TreeMemory:
         """Return what the tree remembers."""
         return self.ticker.memories[state.memory]
+
+    def managers_of(self, number: int) -> Managers:
+        """Return managers by their number."""
+        return self._managers[number]
 
     def managers(self, state: State, skillset: str) -> Managers:
         """Return the managers of a skillset."""
@@ -195,16 +200,26 @@ class System:
             at += 1 + len(node.remembers) + len(node.remembers_running)
         return found
 
-    def _observed(self, state: State, question: Question) -> Answer:
+    def place_of(self, question: Question) -> int:
+        """Return the place of the skillset that a tick's observation is of."""
+        leaf = question[1]
+        return self._place[self.leaves[leaf].skillset if isinstance(leaf, int) else str(leaf)]
+
+    def answer(self, number: int, question: Question) -> Answer:
+        """Answer an observation by the managers that it is of."""
+        managers = self._managers[number]
         match question:
             case ("resource", str(skillset), str(name)):
-                return self.resource(state, f"{skillset}.{name}")
-            case ("alive", str(skillset)):
-                return bool(self.managers(state, skillset).states)
+                return self._steps[self._place[skillset]].resource(managers, name)
+            case ("alive", _):
+                return bool(managers.states)
             case ("execution", int(leaf)):
-                known = next(one for one in self.managers(state, self.leaves[leaf].skillset).executions if one.leaf == leaf)
+                known = next(one for one in managers.executions if one.leaf == leaf)
                 return (known.phase, known.state, known.result) if known.phase == ENDED else (known.phase,)
         raise KeyError(question)
+
+    def _observed(self, state: State, question: Question) -> Answer:
+        return self.answer(state.managers[self.place_of(question)], question)
 
     def _told_end(self, leaf: int, end: End) -> End:
         """Return an end that is the same to the tree: of those that nothing tells apart always the same one."""
@@ -220,7 +235,8 @@ class System:
     def _skills_of(self, skillset: Skillset) -> Mapping[int, str]:
         return {number: leaf.model.name for number, leaf in enumerate(self.leaves) if leaf.skillset == skillset.name}
 
-    def _number(self, managers: Managers) -> int:
+    def number(self, managers: Managers) -> int:
+        """Return the number of managers."""
         number = self._numbers.setdefault(managers, len(self._managers))
         if number == len(self._managers):
             self._managers.append(managers)

@@ -32,12 +32,12 @@ class Outcome(NamedTuple):
 
 
 @dataclass
-class _Decision:
+class Decision:
     """A question, and what follows from each answer; ``options`` are empty for an observation."""
 
     question: Question
     options: tuple[Answer, ...]
-    next: dict[Answer, _Decision | Outcome] = field(default_factory=dict)
+    next: dict[Answer, Decision | Outcome] = field(default_factory=dict)
 
 
 class OneStop:
@@ -79,7 +79,7 @@ class Ticker:
         self.runs = 0
         """How many ticks were done by the engine."""
         self._numbers: dict[TreeMemory, int] = {}
-        self._known: dict[tuple[int, str], _Decision | Outcome] = {}
+        self._known: dict[tuple[int, str], Decision | Outcome] = {}
         self._touched: set[tuple[int, str]] = set()
         self._of = {id(node): number for number, node in enumerate(self.nodes)}
         oracle.begin(lambda _: None)
@@ -87,30 +87,35 @@ class Ticker:
 
     def outcomes(self, memory: int, view: View, act: str = TICK) -> Iterator[Outcome]:
         """Yield all that a tick (or an abort) can come to where observations are as ``view`` answers."""
-        todo: list[tuple[_Decision | Outcome | None, tuple[Answer, ...]]] = [(self._known.get((memory, act)), ())]
+        todo: list[tuple[Answer, ...]] = [()]
         while todo:
-            known, answers = todo.pop()
-            if known is None:
-                self._run(memory, act, view, answers)
-                known = self._at(memory, act, answers)
-            while isinstance(known, _Decision):
+            answers = todo.pop()
+            known = self.known(memory, act, view, answers)
+            while isinstance(known, Decision):
                 if known.options:
-                    todo += [(known.next.get(option), (*answers, option)) for option in known.options[1:]]
-                    answer = known.options[0]
+                    todo += [(*answers, option) for option in known.options[1:]]
+                    answers = (*answers, known.options[0])
                 else:
-                    answer = view(known.question)
-                answers = (*answers, answer)
-                if answer not in known.next:
-                    self._run(memory, act, view, answers)
-                known = known.next[answer]
+                    answers = (*answers, view(known.question))
+                known = known.next.get(answers[-1]) or self.known(memory, act, view, answers)
             yield known
 
-    def _at(self, memory: int, act: str, answers: Sequence[Answer]) -> _Decision | Outcome:
-        known = self._known[memory, act]
+    def known(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> Decision | Outcome:
+        """Return what follows from the first answers of a tick; where that is not known yet, it is done with ``view``."""
+        found = self._at(memory, act, answers)
+        if found is None:
+            self._run(memory, act, view, answers)
+            found = self._at(memory, act, answers)
+        assert found is not None  # noqa: S101 - the tick was done with these answers
+        return found
+
+    def _at(self, memory: int, act: str, answers: Sequence[Answer]) -> Decision | Outcome | None:
+        found = self._known.get((memory, act))
         for answer in answers:
-            assert isinstance(known, _Decision)  # noqa: S101 - the answers are those of its decisions
-            known = known.next[answer]
-        return known
+            if not isinstance(found, Decision):
+                return None
+            found = found.next.get(answer)
+        return found
 
     def _run(self, memory: int, act: str, view: View, answers: Sequence[Answer]) -> None:
         """Do a tick by the engine, and keep what it came to."""
@@ -144,15 +149,15 @@ class Ticker:
         if not asked:
             self._known[memory, act] = outcome
             return
-        known = self._known.setdefault((memory, act), _Decision(asked[0].question, asked[0].options))
+        known = self._known.setdefault((memory, act), Decision(asked[0].question, asked[0].options))
         for number, one in enumerate(asked):
-            assert isinstance(known, _Decision)  # noqa: S101
+            assert isinstance(known, Decision)  # noqa: S101
             assert known.question == one.question, (known.question, one.question)  # noqa: S101 - a tick hangs on nothing else
             if number + 1 == len(asked):
                 known.next[one.answer] = outcome
             else:
                 following = asked[number + 1]
-                known = known.next.setdefault(one.answer, _Decision(following.question, following.options))
+                known = known.next.setdefault(one.answer, Decision(following.question, following.options))
 
     def _watch(self) -> None:
         """Have only this watch the nodes: views of the tree are made of them elsewhere."""

@@ -1,0 +1,124 @@
+"""What a mission does about each failure: the coverage of its failures, from all its runs.
+
+A row is a skill that fails in some way, at a moment: the leaves whose skills are asked for or run then. Its answer is what the tree asks
+for next; its outcomes are all ways in which the mission can end from there, whatever else happens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from alula.prove.mission.regions import Regions, Ticked
+
+NOTHING = "nothing"
+
+
+@dataclass
+class Row:
+    """A failure at a moment, and what comes of it; ``node`` is the name of the leaf that failed, ``region`` where it was first seen."""
+
+    skill: str
+    end: str
+    node: str
+    leaf: int
+    moment: tuple[str, ...]
+    region: int
+    starts: set[str] = field(default_factory=set)
+    outcomes: set[str] = field(default_factory=set)
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the row as JSON has it."""
+        return {
+            "skill": self.skill,
+            "end": self.end,
+            "node": self.node,
+            "while": list(self.moment),
+            "starts": sorted(self.starts),
+            "outcomes": sorted(self.outcomes),
+        }
+
+
+class Answers:
+    """The rows of all failures that the regions show."""
+
+    def __init__(self, regions: Regions) -> None:
+        self._regions = regions
+        self._system = regions.system
+        self._leads = self._leading()
+        self._starting: dict[int, frozenset[str]] = {}
+        rows: dict[tuple[str, str, int, tuple[str, ...]], Row] = {}
+        for number, region in enumerate(regions.regions):
+            for target, ticked in region.next:
+                for leaf, end in self._failures(ticked):
+                    self._add(rows, number, target, ticked, leaf, end)
+        self.rows = sorted(rows.values(), key=lambda one: (one.skill, one.leaf, one.end, one.moment))
+
+    def _add(
+        self, rows: dict[tuple[str, str, int, tuple[str, ...]], Row], number: int, target: int, ticked: Ticked, leaf: int, end: str
+    ) -> None:
+        node = self._system.leaves[leaf]
+        skill = f"{node.skillset}.{node.model.name}"
+        moment = self._moment(number, leaf)
+        row = rows.setdefault((skill, end, leaf, moment), Row(skill, end, node.name, leaf, moment, number))
+        started = frozenset(self._name(one) for one in ticked.outcome.started)
+        row.starts |= started or self._started_from(target)
+        row.outcomes |= self._leads[target]
+
+    def _failures(self, ticked: Ticked) -> Iterator[tuple[int, str]]:
+        """Yield the leaves that fail in a tick, each with how it ended as far as the tree can tell."""
+        found: set[tuple[int, str]] = set()
+        place_of = {id(node): number for number, node in enumerate(self._system.nodes)}
+        for outcome, sets in ticked.ways:
+            failed = {number for number, status in outcome.touched if status == "FAILURE"}
+            for leaf, node in enumerate(self._system.leaves):
+                if place_of[id(node)] in failed:
+                    place = self._system.place_of(("execution", leaf))
+                    known = self._system.managers_of(next(iter(sets[place])))
+                    ended = [one for one in known.executions if one.leaf == leaf and one.phase == "ended"]
+                    found |= {(leaf, (one.result or one.state)) for one in ended}
+        yield from sorted(found)
+
+    def _moment(self, region: int, but: int) -> tuple[str, ...]:
+        """Return the other leaves whose executions the tree hangs on."""
+        held = self._system.ticker.memories[self._regions.regions[region].memory].held
+        return tuple(sorted({self._name(leaf) for leaf in held if leaf != but}))
+
+    def _name(self, leaf: int) -> str:
+        node = self._system.leaves[leaf]
+        return f"{node.skillset}.{node.model.name}"
+
+    def _started_from(self, region: int) -> frozenset[str]:
+        """Return what the next ticks that ask for anything ask for."""
+        if region not in self._starting:
+            found: set[str] = set()
+            seen, todo = {region}, [region]
+            while todo:
+                for target, ticked in self._regions.regions[todo.pop()].next:
+                    if ticked.outcome.started:
+                        found |= {self._name(leaf) for leaf in ticked.outcome.started}
+                    elif target not in seen:
+                        seen.add(target)
+                        todo.append(target)
+            self._starting[region] = frozenset(found)
+        return self._starting[region]
+
+    def _leading(self) -> list[frozenset[str]]:
+        """Return for each region how the mission can end from there."""
+        regions = self._regions.regions
+        found: list[set[str]] = [set() for _ in regions]
+        before: list[list[int]] = [[] for _ in regions]
+        for number, region in enumerate(regions):
+            for target, _ in region.next:
+                before[target].append(number)
+        for number, region in enumerate(regions):
+            end = self._system.ticker.memories[region.memory].end
+            if end is None:
+                continue
+            todo = [number]
+            while todo:
+                one = todo.pop()
+                if end.value not in found[one]:
+                    found[one].add(end.value)
+                    todo += before[one]
+        return [frozenset(one) for one in found]

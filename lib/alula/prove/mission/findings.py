@@ -1,0 +1,106 @@
+"""What is looked at in all runs of a mission without being asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from alula.language.errors import Diagnostic, Severity
+from alula.model import semantics
+from alula.model.span import Span
+from alula.prove.mission.answers import Answers
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.state import Managers
+from alula.prove.mission.system import FAILED
+from alula.prove.mission.words import told
+from alula.trees.node import Node
+
+
+def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
+    """Return what is wrong, or can go wrong, each thing with a run that shows it."""
+    found = [*_left_taken(regions), *_unanswered(regions, answers)]
+    return found + (list(_never_ticked(regions)) if regions.complete else [])
+
+
+def _ends(regions: Regions) -> Iterator[tuple[int, str]]:
+    for number, region in enumerate(regions.regions):
+        end = regions.system.ticker.memories[region.memory].end
+        if end is not None:
+            yield number, end.value
+
+
+def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
+    """Yield ALU701 for skills that nothing but a restart makes ready again after the mission."""
+    system = regions.system
+    told_already: set[tuple[int, tuple[str, ...]]] = set()
+    for number, end in _ends(regions):
+        for place, closure in enumerate(regions.regions[number].closures):
+            for one in sorted(closure.all, key=closure.depth.__getitem__):
+                managers = system.managers_of(one)
+                if any(execution.phase != "ended" for execution in managers.executions) or not managers.states:
+                    continue
+                lost = _lost(regions, place, one)
+                if not lost or (place, lost) in told_already:
+                    continue
+                told_already.add((place, lost))
+                skillset = system.skillsets[place]
+                first = {resource.name: resource.initial for resource in skillset.resources}
+                states = dict(zip(first, managers.states, strict=True))
+                held = [f"{skillset.name}.{name} == {state}" for name, state in states.items() if state != first[name]]
+                names = ", ".join(f"`{skillset.name}.{skill}`" for skill in lost)
+                message = f"the mission can end ({end}) so that {names} can't start any more ({', '.join(held)})"
+                cure = "have the skill give back what it holds however it ends, or argue in the file why the robot is not used again"
+                run = told(system, regions.run(number, {place: one}))
+                yield _finding("ALU701", message, system.nodes[0], cure, run)
+
+
+def _lost(regions: Regions, place: int, number: int) -> tuple[str, ...]:
+    """Return the skills of the mission that could start after power-up and can't after this, whatever the functional layer does."""
+    system = regions.system
+    first = system.initial().managers[place]
+    ready = [_startable(regions, place, one) for one in (first, number)]
+    return tuple(sorted(ready[0] - ready[1]))
+
+
+def _startable(regions: Regions, place: int, number: int) -> set[str]:
+    system = regions.system
+    skillset = system.skillsets[place]
+    bare = system.number(Managers(system.managers_of(number).states))
+    closure = regions.closure(place, frozenset({bare}), over=False)
+    names = [resource.name for resource in skillset.resources]
+    found: set[str] = set()
+    for one in closure.all:
+        states = dict(zip(names, system.managers_of(one).states, strict=False))
+        if states:
+            found |= {skill.name for skill in skillset.skills if not any(semantics.unmet_preconditions(skill, states, {}))}
+    return found
+
+
+def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
+    """Yield ALU702 for failures after which the tree asks for nothing any more, and the mission is not accomplished."""
+    seen: set[int] = set()
+    for row in answers.rows:
+        good = row.outcomes & {"accomplished", "degraded"}
+        if row.starts or good or row.leaf in seen or not row.outcomes:
+            continue
+        seen.add(row.leaf)
+        how = "fails" if row.end == FAILED else f"ends with {row.end}"
+        message = f"nothing answers when `{row.skill}` {how}: the mission ends ({', '.join(sorted(row.outcomes))})"
+        cure = "put a Fallback around it with what is to be done then"
+        run = told(regions.system, regions.run(row.region, {}))
+        yield _finding("ALU702", message, regions.system.leaves[row.leaf], cure, run)
+
+
+def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
+    """Yield ALU703 for nodes that no run ticks; below one of them the others are not told."""
+    ticked = {number for region in regions.regions for _, one in region.next for outcome, _ in one.ways for number, _ in outcome.touched}
+    nodes = regions.system.nodes
+    never = {id(node) for number, node in enumerate(nodes) if number not in ticked and node in regions.system.trees[0].nodes}
+    for node in nodes:
+        if id(node) in never and id(node.parent) not in never:
+            yield _finding("ALU703", f"'{node.name}' is never ticked", node, "take it away, or put it where it is reached")
+
+
+def _finding(code: str, message: str, node: Node, cure: str, run: tuple[str, ...] = ()) -> Diagnostic:
+    place = node.wiring.element.place
+    span = Span(place.path, place.line, place.column, place.column + 1)
+    return Diagnostic(code, message, span, Severity.WARNING, cure, example=run)

@@ -1,0 +1,78 @@
+"""Looks at all runs of a mission's file, within a time: what is found, and what was not looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from alula.language.errors import Diagnostic, Severity
+from alula.missions.filed.part import MissionPart
+from alula.missions.plan import InputError
+from alula.model.model import Skillset
+from alula.model.span import Span
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.answers import Answers, Row
+from alula.prove.mission.findings import findings
+from alula.prove.mission.managers import Failures
+from alula.prove.mission.oracle import UndecidedError
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.system import System
+
+LOOKED_AT = Failures(refusals=False, hooks=False, aborts=False)
+"""What the models say can fail; hooks that raise or refuse, processes that die and aborts are not looked at by default."""
+
+
+@dataclass(frozen=True)
+class Proved:
+    """The findings about a mission, and what answers each of its failures; ``complete``: all runs were looked at."""
+
+    findings: list[Diagnostic]
+    rows: list[Row]
+    complete: bool
+
+
+def prove_mission(
+    path: Path,
+    models: Sequence[Skillset],
+    part: MissionPart,
+    *,
+    failures: Failures = LOOKED_AT,
+    timeout_s: float = 30.0,
+    tell: Callable[[str], None] | None = None,
+) -> Proved:
+    """Return what is wrong with the runs of a mission that ``check_mission`` finds no error in.
+
+    ``tell`` hears now and then how far a long search is. Ctrl-C ends the search as the end of the time does: what was found by then is
+    returned.
+    """
+    deadline = Deadline.after(timeout_s, tell)
+    try:
+        regions = Regions(System.read(path, models, part, failures, deadline), deadline)
+        _explore(regions)
+    except (UndecidedError, InputError) as error:
+        message = f"its runs can't be looked at: {error}"
+        return Proved([Diagnostic("ALU711", message, _whole(path), Severity.WARNING)], [], complete=False)
+    except OutOfTimeError:
+        return Proved([_bound(path, 0, timeout_s)], [], complete=False)
+    answers = Answers(regions)
+    found = findings(regions, answers)
+    if not regions.complete:
+        found.append(_bound(path, len(regions.regions), timeout_s))
+    return Proved(found, answers.rows, regions.complete)
+
+
+def _explore(regions: Regions) -> None:
+    try:
+        regions.explore()
+    except (OutOfTimeError, KeyboardInterrupt):
+        return
+
+
+def _bound(path: Path, regions: int, timeout_s: float) -> Diagnostic:
+    message = f"not all runs were looked at: {regions} groups of situations, those that fewest ticks lead to, in {timeout_s:.3g} s"
+    return Diagnostic("ALU710", message, _whole(path), Severity.WARNING, "allow more with `--time`")
+
+
+def _whole(path: Path) -> Span:
+    return Span(str(path), 1, 1, 2)

@@ -1,0 +1,239 @@
+"""All runs of a mission, many at once.
+
+Between two ticks the managers of different skillsets have nothing to do with one another: what can have come of each is a set, and a
+situation before the next tick is any choice of one of each set. A tick tells managers apart by what it observes, which divides these sets
+and leaves a product again. So a region, a memory of the tree with one set a skillset, stands for all its situations exactly.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from alula.prove.limits import Deadline
+from alula.prove.mission.oracle import Answer, Question
+from alula.prove.mission.state import Event, Kind
+from alula.prove.mission.system import System
+from alula.prove.mission.ticking import ABORT, TICK, Decision, Outcome
+
+Sets = tuple[frozenset[int], ...]
+"""For each skillset the numbers of managers."""
+KINDS = {TICK: Kind.TICK, ABORT: Kind.ABORT}
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Managers that can come of others; ``before`` has for each the one before it and what happened, None for where it began."""
+
+    before: Mapping[int, tuple[int, Event] | None]
+    depth: Mapping[int, int]
+
+    @property
+    def all(self) -> frozenset[int]:
+        """All of them."""
+        return frozenset(self.before)
+
+    def way(self, number: int) -> tuple[int, list[Event]]:
+        """Return where a shortest way to managers begins, and what happens on it."""
+        events: list[Event] = []
+        while (step := self.before[number]) is not None:
+            number, event = step
+            events.append(event)
+        return number, events[::-1]
+
+
+@dataclass(frozen=True)
+class Ticked:
+    """A tick, or an abort, out of a region: the ways in which it comes to one memory and asks for the same.
+
+    ``sets`` are the managers with which it does; each of ``ways`` says what it can be chosen for, and with which of them.
+    """
+
+    act: str
+    ways: tuple[tuple[Outcome, Sets], ...]
+    sets: Sets
+
+    @property
+    def outcome(self) -> Outcome:
+        """What it comes to, but for the choices and the answers of nodes."""
+        return self.ways[0][0]
+
+    def way(self, managers: Sequence[int]) -> Outcome:
+        """Return how it goes with these managers."""
+        return next(one for one, sets in self.ways if all(number in known for number, known in zip(managers, sets, strict=True)))
+
+
+@dataclass
+class Region:
+    """A memory and what the managers can be; ``origin``: the region before it, and the tick that led here."""
+
+    memory: int
+    closures: tuple[Closure, ...]
+    origin: tuple[int, Ticked] | None
+    sets: Sets
+    next: list[tuple[int, Ticked]] = field(default_factory=list)
+    """Each tick that leads to a region, or into one."""
+
+
+class Regions:
+    """The regions that can be reached; ``complete`` when there are no more."""
+
+    def __init__(self, system: System, deadline: Deadline) -> None:
+        self.system = system
+        self.regions: list[Region] = []
+        self.complete = False
+        self._deadline = deadline
+        self._by_memory: dict[int, list[int]] = {}
+        self._closures: dict[tuple[int, frozenset[int], bool], Closure] = {}
+        self._commanded: dict[tuple[int, int, int, tuple[int, ...], tuple[int, ...]], int] = {}
+
+    def explore(self) -> None:
+        """Find them all, those that few ticks lead to first; raises OutOfTimeError."""
+        first = self.system.initial()
+        todo = deque([self._add(first.memory, tuple(frozenset({one}) for one in first.managers), None)])
+        while todo:
+            self._deadline.doing = f"{len(self.regions)} regions, {len(todo)} to look at"
+            self._deadline.check()
+            number = todo.popleft()
+            region = self.regions[number]
+            for act in self._acts(region):
+                for ticked in self.ticks(region.memory, act, region.sets):
+                    memory = ticked.outcome.memory
+                    after = self._after(ticked)
+                    if memory == region.memory and all(a <= b for a, b in zip(after, region.sets, strict=True)):
+                        continue
+                    known = self._within(memory, after)
+                    if known is None:
+                        known = self._add(memory, after, (number, ticked))
+                        todo.append(known)
+                    region.next.append((known, ticked))
+        self.complete = True
+
+    def _acts(self, region: Region) -> Iterator[str]:
+        if self.system.ticker.memories[region.memory].end is None:
+            yield TICK
+            if self.system.failures.aborts and self.system.may_abort(region.memory):
+                yield ABORT
+
+    # --- ticks -------------------------------------------------------------------------------------------------------
+
+    def ticks(self, memory: int, act: str, sets: Sets) -> Iterator[Ticked]:
+        """Yield what a tick can come to; ways that differ in what they have observed of one skillset alone are one."""
+        found: dict[tuple[int, tuple[int, ...], tuple[int, ...]], list[Ticked]] = {}
+        for outcome, left in self.split(memory, act, sets):
+            same = found.setdefault((outcome.memory, outcome.started, outcome.interrupted), [])
+            one = Ticked(act, ((outcome, left),), left)
+            while (other := next((known for known in same if _differ(known.sets, one.sets) <= 1), None)) is not None:
+                same.remove(other)
+                both = tuple(a | b for a, b in zip(other.sets, one.sets, strict=True))
+                one = Ticked(act, (*other.ways, *one.ways), both)
+            same.append(one)
+        for same in found.values():
+            yield from same
+
+    def split(self, memory: int, act: str, sets: Sets) -> Iterator[tuple[Outcome, Sets]]:
+        """Yield each way in which a tick can go, with the managers that it can go so with."""
+        todo: list[tuple[tuple[Answer, ...], Sets]] = [((), sets)]
+        while todo:
+            answers, left = todo.pop()
+            known = self.system.ticker.known(memory, act, self._view(left), answers)
+            if isinstance(known, Outcome):
+                yield known, left
+            elif known.options:
+                todo += [((*answers, option), left) for option in known.options]
+            else:
+                todo += [((*answers, answer), divided) for answer, divided in self._divided(known, left)]
+
+    def _divided(self, known: Decision, sets: Sets) -> Iterator[tuple[Answer, Sets]]:
+        place = self.system.place_of(known.question)
+        found: dict[Answer, list[int]] = {}
+        for number in sets[place]:
+            found.setdefault(self.system.answer(number, known.question), []).append(number)
+        for answer, numbers in found.items():
+            yield answer, (*sets[:place], frozenset(numbers), *sets[place + 1 :])
+
+    def _view(self, sets: Sets) -> _Any:
+        return _Any(self.system, sets)
+
+    def after(self, place: int, number: int, outcome: Outcome) -> int:
+        """Return managers after what a tick has asked for."""
+        key = (place, number, outcome.memory, outcome.started, outcome.interrupted)
+        if key not in self._commanded:
+            self._commanded[key] = self.system.commanded(place, number, outcome)
+        return self._commanded[key]
+
+    def _after(self, ticked: Ticked) -> Sets:
+        outcome = ticked.outcome
+        return tuple(frozenset(self.after(place, number, outcome) for number in numbers) for place, numbers in enumerate(ticked.sets))
+
+    # --- regions -----------------------------------------------------------------------------------------------------
+
+    def _within(self, memory: int, roots: Sets) -> int | None:
+        for number in self._by_memory.get(memory, ()):
+            if all(a <= b for a, b in zip(roots, self.regions[number].sets, strict=True)):
+                return number
+        return None
+
+    def _add(self, memory: int, roots: Sets, origin: tuple[int, Ticked] | None) -> int:
+        over = self.system.ticker.memories[memory].end is not None
+        closures = tuple(self.closure(place, numbers, over=over) for place, numbers in enumerate(roots))
+        self.regions.append(Region(memory, closures, origin, tuple(one.all for one in closures)))
+        self._by_memory.setdefault(memory, []).append(len(self.regions) - 1)
+        return len(self.regions) - 1
+
+    def closure(self, place: int, roots: frozenset[int], *, over: bool) -> Closure:
+        """Return what can come of managers before the next tick; when the mission is over, only what still runs goes on."""
+        key = (place, roots, over)
+        if key not in self._closures:
+            before: dict[int, tuple[int, Event] | None] = dict.fromkeys(sorted(roots))
+            depth = dict.fromkeys(before, 0)
+            todo = deque(before)
+            while todo:
+                number = todo.popleft()
+                for event, after in self.system.moves_of(place, number):
+                    if after not in before and not (over and event.leaf < 0):
+                        before[after], depth[after] = (number, event), depth[number] + 1
+                        todo.append(after)
+            self._closures[key] = Closure(before, depth)
+        return self._closures[key]
+
+    # --- runs --------------------------------------------------------------------------------------------------------
+
+    def run(self, number: int, managers: Mapping[int, int]) -> list[Event]:
+        """Return a run to a region in which some skillsets' managers (by their places) are these."""
+        region = self.regions[number]
+        goal = [managers.get(place, min(one.all, key=one.depth.__getitem__)) for place, one in enumerate(region.closures)]
+        events: list[Event] = []
+        while True:
+            ways = [one.way(target) for one, target in zip(region.closures, goal, strict=True)]
+            events = [event for _, way in ways for event in way] + events
+            if region.origin is None:
+                return events
+            number, ticked = region.origin
+            region = self.regions[number]
+            goal = [self._before(ticked, region, place, root) for place, (root, _) in enumerate(ways)]
+            outcome = ticked.way(goal)
+            started, interrupted, choices, touched = outcome[1:]
+            tick = Event(KINDS[ticked.act], started=started, interrupted=interrupted, choices=choices, touched=touched)
+            events.insert(0, tick)
+
+    def _before(self, ticked: Ticked, region: Region, place: int, root: int) -> int:
+        """Return managers, the soonest there are, that a tick takes to these."""
+        depth = region.closures[place].depth
+        return min((one for one in ticked.sets[place] if self.after(place, one, ticked.outcome) == root), key=depth.__getitem__)
+
+
+def _differ(one: Sets, other: Sets) -> int:
+    return sum(a != b for a, b in zip(one, other, strict=True))
+
+
+class _Any:
+    """Answers observations by some managers of each set: those that were asked before answer alike."""
+
+    def __init__(self, system: System, sets: Sets) -> None:
+        self._system = system
+        self._some = tuple(min(numbers) for numbers in sets)
+
+    def __call__(self, question: Question) -> Answer:
+        return self._system.answer(self._some[self._system.place_of(question)], question)

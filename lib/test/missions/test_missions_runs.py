@@ -1,0 +1,249 @@
+"""All runs of a mission: what is found, and that the search looks at what the engine does."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Iterator, Mapping
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("z3")
+pytest.importorskip("py_trees")
+
+from alula.language.codes import RUN_CODES
+from alula.language.examples import RUNS, examples
+from alula.language.models import ModelFile, check_texts
+from alula.missions.check.page import whole
+from alula.missions.driver import MissionDriver
+from alula.missions.filed.part import NO_PART
+from alula.missions.filed.plan import plan_of_file
+from alula.missions.skillset import MissionClient
+from alula.model.model import Skillset
+from alula.prove.limits import Deadline
+from alula.prove.mission.managers import Failures
+from alula.prove.mission.page import NAME, ROBOT, found_in, page
+from alula.prove.mission.prover import prove_mission
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.state import State
+from alula.prove.mission.system import System
+from alula.runtime.core.execution import Execution
+from alula.runtime.hooks import SkillHooks
+from alula.runtime.local import LocalManagers, LocalWorld
+from alula.trees.status import RUNNING
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+EXAMPLES = examples(RUNS)
+SHOWN = [code for code, example in EXAMPLES.items() if example.broken]
+TWO = """
+skillset eyes {
+  resource lens { state { CLEAR DIRTY } initial CLEAR transition { extern CLEAR -> DIRTY  extern DIRTY -> CLEAR } }
+  skill watch {
+    precondition clear: lens == CLEAR
+    invariant { still { guard lens == CLEAR } }
+  }
+}
+"""
+LEAVES = (
+    "<drone.lift/>",
+    "<drone.hover/>",
+    "<drone.land/>",
+    "<drone.climb/>",
+    "<eyes.watch/>",
+    "<ScriptCondition code=\"failed('ours')\"/>",
+    '<ScriptCondition code="drone.control == OURS"/>',
+    '<WaitFor if="eyes.lens == CLEAR"/>',
+    '<Sleep msec="250"/>',
+    '<Script code="tries += 1"/>',
+)
+ABOVE = (
+    "Sequence",
+    "Fallback",
+    'Parallel success_count="1" failure_count="1"',
+    "ReactiveSequence",
+    "ReactiveFallback",
+    "SequenceWithMemory",
+)
+ROUND = ("ForceSuccess", "ForceFailure", "Inverter", 'RetryAfter attempts="4" wait="0.2" if="tries &lt; 3"', 'Timeout msec="300"')
+
+
+def test_every_code_has_an_example() -> None:
+    assert set(EXAMPLES) == set(RUN_CODES)
+
+
+@pytest.mark.parametrize("code", SHOWN)
+def test_an_example_has_its_finding_and_its_cure_has_none(code: str) -> None:
+    assert code in {finding.code for finding in found_in(EXAMPLES[code].broken)}
+    assert found_in(EXAMPLES[code].mended) == []
+
+
+def test_the_page_is_written_from_the_examples() -> None:
+    """Mend with `python -m alula.prove.mission.page docs`."""
+    text = (DOCS / NAME).read_text(encoding="utf-8")
+    assert page(text) == text
+
+
+def test_a_number_of_the_world_that_a_node_counts_by_is_told(tmp_path: Path) -> None:
+    model = '<TreeNodesModel><SubTree ID="mission"><input_port name="rounds"/></SubTree></TreeNodesModel>'
+    text = whole('<Repeat num_cycles="{rounds}"><drone.lift/></Repeat>').replace("</root>", f"{model}</root>")
+    path = tmp_path / "mission.xml"
+    path.write_text(text)
+    (finding,) = prove_mission(path, robots(), NO_PART).findings
+    assert finding.code == "ALU711"
+
+
+def test_a_bound_is_never_silent(tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    path.write_text(whole(EXAMPLES["ALU703"].mended))
+    proved = prove_mission(path, robots(), NO_PART, timeout_s=0.0)
+    assert not proved.complete
+    assert [finding.code for finding in proved.findings] == ["ALU710"]
+
+
+# --- held against one situation after another, and against the engine -------------------------------------------------
+
+
+def robots() -> list[Skillset]:
+    return [one for file in check_texts([ModelFile("a.rl", ROBOT), ModelFile("b.rl", TWO)]) for one in file.skillsets]
+
+
+def tree(chance: random.Random, depth: int) -> str:
+    if depth == 0:
+        return chance.choice(LEAVES)
+    if chance.random() < 0.3:
+        tag = chance.choice(ROUND)
+        return f"<{tag}>{tree(chance, depth - 1)}</{tag.split()[0]}>"
+    tag = chance.choice(ABOVE)
+    return f"<{tag}>{''.join(tree(chance, depth - 1) for _ in range(2))}</{tag.split()[0]}>"
+
+
+def mission(chance: random.Random, folder: Path, depth: int) -> Path:
+    path = folder / "mission.xml"
+    path.write_text(whole(f'<Sequence><Script code="tries := 0"/><drone.hover/><Sleep msec="150"/>{tree(chance, depth)}</Sequence>'))
+    return path
+
+
+def reached(system: System, most: int) -> set[State] | None:
+    """Return all situations, one after another; None where they are too many."""
+    first = system.initial()
+    seen, todo = {first}, deque([first])
+    while todo and len(seen) <= most:
+        for _, after in system.steps(todo.popleft()):
+            if after not in seen:
+                seen.add(after)
+                todo.append(after)
+    return None if todo else seen
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: Path) -> None:
+    chance = random.Random(seed)  # noqa: S311 - for tests
+    failures = Failures(hooks=chance.random() < 0.5, aborts=False, deaths=chance.random() < 0.3)
+    system = System.read(mission(chance, tmp_path, 1 + seed % 2), robots(), NO_PART, failures)
+    one_by_one = reached(system, 30_000)
+    if one_by_one is None:
+        pytest.skip("too many situations to look at one by one")
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    assert regions.complete
+    assert {State(one.memory, managers) for one in regions.regions for managers in product(*one.sets)} == one_by_one
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_run_of_a_region_is_a_run_step_by_step(seed: int, tmp_path: Path) -> None:
+    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), NO_PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
+    regions = Regions(system, Deadline.after(100.0))
+    regions.explore()
+    for number, region in enumerate(regions.regions):
+        states = {system.initial()}
+        for event in regions.run(number, {}):
+            states = {after for state in states for taken, after in system.steps(state) if taken == event} or (
+                states if event.kind.value == "tick" else set()
+            )
+        assert any(state.memory == region.memory for state in states)
+
+
+class Function(SkillHooks):
+    """A function that a test ends."""
+
+    def __init__(self, running: list[Execution]) -> None:
+        self._running = running
+
+    def on_dispatch(self, execution: Execution) -> None:
+        self._running.append(execution)
+
+
+def flown(path: Path, chance: random.Random) -> Iterator[tuple[frozenset[int], Mapping[str, str], str]]:
+    """Fly a mission by the real engine over real managers, and yield what is the case after each of its ticks."""
+    skillsets = robots()
+    used = [one for one in skillsets if f"{one.name}." in path.read_text()]
+    plan = plan_of_file(path, "mission", used, {}, NO_PART)
+    running: list[Execution] = []
+
+    def make(managers: LocalManagers) -> Mapping[str, SkillHooks]:
+        return {skill.name: Function(running) for skill in managers.skillset.skills}
+
+    world = LocalWorld(used, make, latency_s=0.005)
+    clients = lambda name, wake: MissionClient(world.client(name), wake)  # noqa: E731
+    driver = MissionDriver(plan, clients, lambda: world.clock.now_ns, plan.parameters, soon=world.clock.soon)
+    driver.tick_regularly(world.clock.after, 0.1)
+    nodes = list(driver.director._mission.root.iterate())
+    for _ in range(80):
+        world.run_for(chance.choice((0.004, 0.02, 0.1, 0.15)))
+        act(chance, world, running)
+        resources = {
+            f"{name}.{one}": status.state for name, managers in world.managers.items() for one, status in managers.engine.resources.items()
+        }
+        active = frozenset(node.uid for node in nodes if node.status is RUNNING)
+        yield active, resources, driver.end.outcome.value if driver.end else ""
+        if driver.end:
+            return
+
+
+def act(chance: random.Random, world: LocalWorld, running: list[Execution]) -> None:
+    """Have something happen to the robot, or nothing."""
+    kind = chance.random()
+    opened = [one for one in running if not one.done and one.skill != "watch"]
+    if kind < 0.35 and opened:
+        execution = chance.choice(opened)
+        results = [
+            one.name
+            for managers in world.managers.values()
+            for skill in managers.skillset.skills
+            for one in skill.results
+            if skill.name == execution.skill
+        ]
+        execution.terminate(chance.choice(results))
+    elif kind < 0.6:
+        name, managers = chance.choice(sorted(world.managers.items()))
+        resource = {"drone": "control", "eyes": "lens"}[name]
+        state = managers.engine.resources[resource].state
+        targets = managers.skillset.resource(resource).targets(state, extern=True)
+        managers.transition(resource, chance.choice(list(targets)))
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_what_the_engine_does_is_within_the_search(seed: int, tmp_path: Path) -> None:
+    chance = random.Random(100 + seed)  # noqa: S311 - for tests
+    path = mission(chance, tmp_path, 2)
+    system = System.read(path, robots(), NO_PART, Failures(hooks=False, refusals=False, aborts=False))
+    states = reached(system, 40_000)
+    if states is None:
+        pytest.skip("too many situations to look at one by one")
+    names = [f"{one.name}.{resource.name}" for one in system.skillsets for resource in one.resources]
+    known = {
+        (
+            frozenset(node.uid for node in system.active(state)),
+            tuple(system.resource(state, name) for name in names),
+            outcome.value if (outcome := system.outcome(state)) else "",
+        )
+        for state in states
+    }
+    for _ in range(10):
+        for active, resources, end in flown(path, chance):
+            if not end:  # after the end the functional layer goes on, which the search leaves out
+                assert (active, tuple(resources[name] for name in names), end) in known
+            else:
+                assert end in {one[2] for one in known}
