@@ -48,7 +48,7 @@ def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
                 held = [f"{skillset.name}.{name} == {state}" for name, state in states.items() if state != first[name]]
                 names = ", ".join(f"`{skillset.name}.{skill}`" for skill in lost)
                 message = f"the mission can end ({end}) so that {names} can't start any more ({', '.join(held)})"
-                cure = "have the skill give back what it holds however it ends, or argue in the file why the robot is not used again"
+                cure = "have the skill give back what it holds however it ends, or restart its managers before the next mission"
                 run = told(system, regions.run(number, {place: one}))
                 yield _finding("ALU701", message, system.nodes[0], cure, run)
 
