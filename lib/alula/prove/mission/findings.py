@@ -17,8 +17,9 @@ from alula.trees.node import Node
 
 def findings(regions: Regions, answers: Answers) -> list[Diagnostic]:
     """Return what is wrong, or can go wrong, each thing with a run that shows it."""
-    found = [*_left_taken(regions), *_unanswered(regions, answers)]
-    return found + (list(_never_ticked(regions)) if regions.complete else [])
+    found = list(_left_taken(regions))
+    # What never happens is known only when all runs were looked at.
+    return [*found, *_unanswered(regions, answers), *_never_ticked(regions)] if regions.complete else found
 
 
 def _ends(regions: Regions) -> Iterator[tuple[int, str]]:
