@@ -307,9 +307,7 @@ def test_what_is_no_record_is_refused_in_a_line(tmp_path, capsys, write):
         (["--set", "sped_m_s=1"], "did you mean `speed_m_s`"),
         (["--set", "speed_m_s=fast"], "is no number"),
         (["--set", "speed_m_s=nan"], "is no finite number"),
-        (["--tree", "nowhere.py"], "there is no such file"),
-        (["--tree", "no.such.module"], "no.such"),
-        (["--tree", "json"], "plan"),
+        (["--tree", "nowhere.xml"], "nowhere.xml:1:1: can't be read: No such file or directory"),
         (["--model", "nowhere.skill"], "nowhere.skill"),
     ],
 )

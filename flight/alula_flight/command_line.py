@@ -56,7 +56,7 @@ def parse(arguments: Sequence[str], part: RunPart) -> RunSpec:
         master_port=free_port(),
         console=given.console,
         monitor=given.monitor,
-        groot=groot_address(given.groot, scenario),
+        groot=groot_address(given.groot),
         own=own,
     )
 

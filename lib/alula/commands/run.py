@@ -63,7 +63,7 @@ def prepare(given: argparse.Namespace) -> tuple[MockedMission, RunSpec]:
     flights = load_flights(given.scenario, given.behaviour, world=given.world)
     faults = [parse_fault(text) for text in given.fail]
     flights.check(faults)
-    groot = groot_address(given.groot, flights.scenario)
+    groot = groot_address(given.groot)
     world, plan = world_file(flights.scenario, given.world), flights.plan
     out.mkdir(parents=True, exist_ok=True)
     spec = RunSpec(

@@ -49,12 +49,10 @@ def world_file(scenario: Scenario, wanted: str) -> str:
     return str(path.absolute())
 
 
-def groot_address(wanted: str | None, scenario: Scenario) -> str:
+def groot_address(wanted: str | None) -> str:
     """Return where viewers find the mission's tree, as HOST:PORT; empty where none are wanted. Raises RequestError."""
     if wanted is None:
         return ""
-    if not scenario.mission.endswith(".xml"):
-        raise RequestError(f"--groot: the mission is Python ({scenario.mission}), and viewers are shown trees of files: missions/NAME.xml")
     try:
         address = Address.read(wanted).looked_up()
     except ServerError as error:

@@ -25,7 +25,7 @@ class Scenario:
         name: as on the command line.
         about: in a sentence.
         world: name or file of the robot's worlds, unless another is asked for; the mission's inputs come from it.
-        mission: ``module:function`` that makes the plan (tree and skillsets) of the mission's inputs.
+        mission: the file of its tree, from the robot's folder.
         skillsets: the skillsets whose managers are started.
         launch: ``package/file`` for roslaunch.
         report: parts of the report, of those that the robot has.

@@ -43,7 +43,7 @@ class MissionDriver:
         groot: ``HOST:PORT`` where viewers find the tree of a mission that is a file; empty: nowhere.
 
     Raises:
-        InputError, ServerError: the tree can't be shown to viewers.
+        ServerError: the tree can't be shown to viewers.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Leaves of a mission's tree: skills (green in the paper's figures) and actions internal to the tree (grey).
+"""Leaves of a mission's tree that are skills (green in the paper's figures).
 
 A leaf does no work itself and never waits: it starts, looks, and stops.
 """
@@ -115,80 +115,3 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
 def skill_leaf(node: Behaviour) -> SkillLeaf[Blackboard] | None:
     """Return what follows the skill of a leaf, which of a mission that is a file is a part of its node; None for another node."""
     return node if isinstance(node, SkillLeaf) else getattr(node, "leaf", None)
-
-
-class Do(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is seen untyped
-    """Does something to the blackboard at once, and succeeds."""
-
-    def __init__(self, name: str, action: Callable[[Board], None], *, blackboard: Board) -> None:
-        super().__init__(name)
-        self._blackboard = blackboard
-        self._action = action
-
-    def update(self) -> Status:
-        """Call the action with the blackboard; always SUCCESS."""
-        self._action(self._blackboard)
-        return Status.SUCCESS
-
-
-class Check(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
-    """SUCCESS when the condition holds; otherwise FAILURE, or RUNNING until it does with ``wait``."""
-
-    def __init__(self, name: str, condition: Callable[[], bool], *, wait: bool = False) -> None:
-        super().__init__(name)
-        self._condition = condition
-        self._otherwise = Status.RUNNING if wait else Status.FAILURE
-
-    def update(self) -> Status:
-        """SUCCESS where the condition holds, else the status that was given for that."""
-        return Status.SUCCESS if self._condition() else self._otherwise
-
-
-class Stays(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
-    """SUCCESS when the condition has held for a time of mission clock without a break, FAILURE as soon as it does not."""
-
-    def __init__(self, name: str, condition: Callable[[], bool], duration_s: float, *, blackboard: Blackboard) -> None:
-        super().__init__(name)
-        self._condition = condition
-        self._duration_s = duration_s
-        self._blackboard = blackboard
-        self._since_s = 0.0
-
-    def initialise(self) -> None:
-        """Begin to count the time during which the condition has held."""
-        self._since_s = self._blackboard.now_s
-
-    def update(self) -> Status:
-        """FAILURE as soon as the condition is false, SUCCESS when it has held for the duration."""
-        if not self._condition():
-            return Status.FAILURE
-        return Status.SUCCESS if self._blackboard.now_s - self._since_s >= self._duration_s else Status.RUNNING
-
-
-class Awaits(Behaviour):  # type: ignore[misc]  # py_trees is seen untyped
-    """SUCCESS when the condition has held for ``held_s`` without a break, FAILURE when it has not within a time of mission clock."""
-
-    def __init__(self, name: str, condition: Callable[[], bool], limit_s: float, *, held_s: float = 0.0, blackboard: Blackboard) -> None:
-        super().__init__(name)
-        self._condition = condition
-        self._limit_s = limit_s
-        self._held_s = held_s
-        self._blackboard = blackboard
-        self._since_s = 0.0
-        self._holds_since_s: float | None = None
-
-    def initialise(self) -> None:
-        """Begin to count the time limit, and how long the condition has held."""
-        self._since_s = self._blackboard.now_s
-        self._holds_since_s = None
-
-    def update(self) -> Status:
-        """SUCCESS when the condition has held for long enough without a break, FAILURE at the time limit."""
-        now_s = self._blackboard.now_s
-        if not self._condition():
-            self._holds_since_s = None
-        elif self._holds_since_s is None:
-            self._holds_since_s = now_s
-        if self._holds_since_s is not None and now_s - self._holds_since_s >= self._held_s:
-            return Status.SUCCESS
-        return Status.RUNNING if now_s - self._since_s < self._limit_s else Status.FAILURE

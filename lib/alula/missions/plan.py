@@ -49,18 +49,13 @@ class InputError(Exception):
     """The inputs of a mission can't be used; the message says what is wrong and where."""
 
 
-MakePlan = Callable[[Inputs], MissionPlan]
-"""What ``mission: module:function`` of a scenario names; it raises InputError."""
-
-
 def plan_of(scenario: Scenario, inputs: Inputs) -> MissionPlan:
-    """Return a scenario's plan for these inputs; raises RobotError where its mission can't be imported, and InputError."""
-    if scenario.mission.endswith(".xml"):
-        from alula.missions.filed.scenario import plan_of_mission_file  # which needs this module
+    """Return a scenario's plan for these inputs; raises RobotError where there is no robot or none of its nodes, and InputError."""
+    from alula.missions.filed.scenario import plan_of_mission_file  # which needs this module
 
-        return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)
-    make_plan: MakePlan = find_robot().load(scenario.mission)
-    return make_plan(inputs)
+    if not scenario.mission.endswith(".xml"):
+        raise InputError(f"the mission {scenario.mission} is no file of a tree; name one: missions/NAME.xml")
+    return plan_of_mission_file(find_robot().root / scenario.mission, scenario, inputs)
 
 
 def inputs_of(scenario: Scenario, world: str = "") -> Inputs:

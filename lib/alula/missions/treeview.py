@@ -6,31 +6,12 @@ import operator
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Parallel, Selector, Sequence
-from py_trees.decorators import Decorator
 
-from alula.missions.leaves import Check, SkillLeaf, Stays, skill_leaf
+from alula.missions.leaves import skill_leaf
 from alula.trees.node import Node
-from alula.trees.view import NodeView, source_of
-from alula.trees.view import kind_of as kind_in_a_file
+from alula.trees.view import NodeView, kind_of, source_of
 
 INTERRUPTED = "INTERRUPTED"
-KINDS: tuple[tuple[type[Behaviour], str], ...] = (
-    (SkillLeaf, "skill"),
-    (Sequence, "sequence"),
-    (Selector, "selector"),
-    (Parallel, "parallel"),
-    (Decorator, "decorator"),
-    (Check, "condition"),
-    (Stays, "condition"),
-)
-
-
-def kind_of(node: Behaviour) -> str:
-    """Return what a node is, in the words of the figures."""
-    if isinstance(node, Node):
-        return kind_in_a_file(node)
-    return next((kind for cls, kind in KINDS if isinstance(node, cls)), "action")
 
 
 def path_of(node: Behaviour) -> tuple[str, ...]:
@@ -47,7 +28,7 @@ class _Memory:
     def __init__(self, node: Behaviour) -> None:
         self.node = node
         leaf = skill_leaf(node)
-        self.kind, self.skill = kind_of(node), "" if leaf is None else leaf.skill_name
+        self.kind, self.skill = kind_of(node) if isinstance(node, Node) else "action", "" if leaf is None else leaf.skill_name
         self.source = source_of(node) if isinstance(node, Node) else None
         self.status = Status.INVALID
         self.left = False

@@ -5,6 +5,7 @@ What makes XML dangerous is refused: a document type and so any entity of one's 
 
 from __future__ import annotations
 
+import html
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
@@ -20,7 +21,11 @@ DEEPEST = 256
 LONGEST_BYTES = 16 << 20
 MOST_ELEMENTS = 30_000
 ATTRIBUTE = re.compile(rb"""(\s+)([^\s=/>]+)(\s*=\s*)("[^"]*"|'[^']*')""")
-CHARACTER = re.compile(r"&[^;]*;|\r\n|.", re.DOTALL)
+CHARACTER = re.compile(r"&#?\w+;|\r\n|.", re.DOTALL)
+AMPERSAND = re.compile(rb"&(?!#?\w+;)")
+"""One that stands for itself."""
+ENTITY, BREAK = re.compile(r"&#?\w+;"), re.compile(r"\r\n|[\r\n\t]")
+TAG = re.compile(rb"<[A-Za-z_][^\s=/>]*")
 
 
 @dataclass
@@ -146,14 +151,45 @@ def parse_document(content: str | bytes, path: str = "<text>") -> Document:
     """Read the text of a file, UTF-8; raises FileError."""
     source = content.encode() if isinstance(content, str) else content
     mark = b"\xef\xbb\xbf" if source.startswith(b"\xef\xbb\xbf") else b""
-    return _Parser(source[len(mark) :], path).document(mark.decode())
+    text = source[len(mark) :]
+    try:
+        return _Parser(text, path).document(mark.decode())
+    except FileError:
+        plain = _plain(text)
+        if plain == text:
+            raise
+    return _Parser(text, path, plain).document(mark.decode())
+
+
+def _plain(source: bytes) -> bytes:
+    """Return a text of the same length without the `&` and `<` that stand for themselves in attributes, as in ``a < b && c``.
+
+    They are no XML, and BehaviorTree.CPP's reader takes them: files of the field have them in their scripts.
+    """
+    plain, index = bytearray(source), 0
+    while index < len(source):
+        start = index
+        index = source.find(b"<", start)
+        index = len(source) if index < 0 else index
+        plain[start:index] = AMPERSAND.sub(b"_", source[start:index])
+        end = b"-->" if source.startswith(b"<!--", index) else b">"
+        if match := TAG.match(source, index):
+            index = match.end()
+            while match := ATTRIBUTE.match(source, index):
+                start, index = match.span(4)
+                plain[start:index] = AMPERSAND.sub(b"_", source[start:index]).replace(b"<", b"_")
+        index = source.find(end, index) + len(end)
+        if index < len(end):
+            break
+    return bytes(plain)
 
 
 class _Parser:
     """Builds the elements while expat goes through the file; a stack, so that no nesting harms."""
 
-    def __init__(self, source: bytes, path: str) -> None:
+    def __init__(self, source: bytes, path: str, plain: bytes | None = None) -> None:
         self._source = source
+        self._plain = source if plain is None else plain
         self._path = path
         self._lines = [0, *(match.end() for match in re.finditer(rb"\n", source))]
         self._open: list[Element] = []
@@ -175,7 +211,7 @@ class _Parser:
         except UnicodeDecodeError as error:
             raise self._error(error.start, "is not UTF-8", "save it as UTF-8") from error
         try:
-            self._expat.Parse(self._source, True)
+            self._expat.Parse(self._plain, True)
         except expat.ExpatError as error:
             raise self._error(self._expat.ErrorByteIndex, f"is no XML: {expat.ErrorString(error.code)}") from error
         if self._root is None:
@@ -222,7 +258,10 @@ class _Parser:
             lead, raw_name, sign, source = match.groups()
             name = raw_name.decode()
             places = self._place(match.start(2)), self._place(match.start(4) + 1)
-            element.attributes[name] = Attribute(name, values[name], places[0], lead.decode(), sign.decode(), source.decode(), places[1])
+            value = values[name]
+            if self._plain[match.start(4) : match.end(4)] != source:
+                value = ENTITY.sub(lambda one: html.unescape(one[0]), BREAK.sub(" ", source.decode()[1:-1]))
+            element.attributes[name] = Attribute(name, value, places[0], lead.decode(), sign.decode(), source.decode(), places[1])
             index = match.end()
         return index
 

@@ -10,13 +10,13 @@ import pytest
 pytest.importorskip("py_trees")
 
 from py_trees.behaviour import Behaviour
+from py_trees.behaviours import Success
 from py_trees.common import Status
 
 from alula.common.record import OPERATOR, TICKS, TREE, read_record
 from alula.missions.blackboard import Blackboard
 from alula.missions.director import Outcome
 from alula.missions.driver import MissionDriver
-from alula.missions.leaves import Check
 from alula.missions.pausing import PauseRefusedError
 from alula.missions.pending import PendingInterrupts
 from alula.missions.plan import MissionPlan
@@ -44,7 +44,7 @@ class Tree:
         return []
 
     def stop_here(self) -> Behaviour:
-        return Check("stands", lambda: True)
+        return Success("stands")
 
 
 class Root(Behaviour):

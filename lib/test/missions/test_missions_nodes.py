@@ -12,8 +12,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from alula.missions.blackboard import Blackboard, Failure
-from alula.missions.decorators import RetryAfter, Until
-from alula.missions.leaves import Check, Do, SkillLeaf, Stays
+from alula.missions.leaves import SkillLeaf
 from alula.missions.pending import PendingInterrupts
 from alula.model.execution_state import ExecutionState
 from alula.runtime.handle import SkillHandle
@@ -37,21 +36,6 @@ class Client:
         handle = SkillHandle(skill, str(len(self.started)), lambda: self.interrupts.append(skill))
         self.started.append((skill, inputs, handle))
         return handle
-
-
-class Script(Behaviour):
-    """Gives one status after the other; counts how often it is begun."""
-
-    def __init__(self, *statuses: Status) -> None:
-        super().__init__("script")
-        self.left = list(statuses)
-        self.begun = 0
-
-    def initialise(self) -> None:
-        self.begun += 1
-
-    def update(self) -> Status:
-        return self.left.pop(0)
 
 
 class Clock:
@@ -134,42 +118,3 @@ def test_the_reason_names_each_failure_once_and_nothing_that_fails_afterwards(cl
     clock.board.note_reason()
     clock.board.failures.append(Failure("c", "arm.rest", E.FAILED, "", ""))
     assert clock.board.reason == "arm.grip: FAILED (cold); then arm.lift: STUCK"
-
-
-def test_do_check_and_stays_look_at_the_mission_clock(clock):
-    seen, holds = [], [False]
-    assert ticked(Do("do", seen.append, blackboard=clock.board)) is S
-    assert seen == [clock.board]
-    assert [ticked(Check("now", lambda: holds[0])), ticked(Check("wait", lambda: holds[0], wait=True))] == [F, R]
-    stays = Stays("stays", lambda: holds[0], 2.0, blackboard=clock.board)
-    assert ticked(stays) is F
-    holds[0] = True
-    assert ticked(stays) is R
-    clock.s = 1.9
-    assert ticked(stays) is R
-    clock.s = 2.0
-    assert ticked(stays) is S
-
-
-def test_until_repeats_its_child_and_fails_with_it():
-    laps = [False, False, True]
-    child = Script(R, S, S, S)
-    until = Until("until", child, lambda: laps.pop(0))
-    assert [ticked(until) for _ in range(4)] == [R, R, R, S]
-    assert child.begun == 3
-    failing = Until("until", Script(F), lambda: True)
-    assert ticked(failing) is F
-
-
-def test_another_chance_comes_after_its_wait_of_mission_clock_and_only_as_often_as_promised(clock):
-    child = Script(F, F, F)
-    retry = RetryAfter("retry", child, chances=2, wait_s=1.0, worth_it=lambda: True, blackboard=clock.board)
-    assert ticked(retry) is R
-    assert retry.feedback_message == "tries again after 1 s"
-    clock.s = 0.9
-    assert (ticked(retry), child.begun) == (R, 1)
-    clock.s = 1.0
-    assert (ticked(retry), child.begun) == (F, 2)
-    assert (ticked(retry), child.begun) == (R, 3)  # begun again: all chances are back
-    hopeless = RetryAfter("retry", Script(F), chances=2, wait_s=1.0, worth_it=lambda: False, blackboard=clock.board)
-    assert ticked(hopeless) is F

@@ -19,7 +19,6 @@ from alula.common.record import TREE, read_record
 from alula.common.scenarios import scenarios_folder
 from alula.missions.director import Outcome
 from alula.missions.mocked import MockedMission
-from alula.missions.plan import InputError
 from alula.missions.record import TREE_LOG
 from alula.trees.groot.address import Address, ServerError
 from alula.trees.groot.btlog import Log, read_log
@@ -144,37 +143,14 @@ def test_without_zeromq_viewers_are_refused_and_the_log_is_left(tmp_path: Path, 
     assert read_log(tmp_path / TREE_LOG).transitions
 
 
-BY_HAND = """
-from alula.missions.blackboard import Blackboard
-from alula.missions.leaves import Check
-from alula.missions.pending import PendingInterrupts
-from alula.missions.plan import MissionPlan
-
-class Mission:
-    degraded = stopping = False
-    root = Check("all is done", lambda: True)
-
-def plan(inputs):
-    make = lambda _clients, clock_ns, _values: (Mission(), Blackboard(clock_ns=clock_ns, pending=PendingInterrupts(clock_ns)))
-    return MissionPlan("mapping", (), make, inputs=inputs)
-"""
-
-
-def test_viewers_of_a_mission_in_python_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mission_that_is_no_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     python = (scenarios_folder() / "mapping.yaml").read_text(encoding="utf-8").replace("missions/mapping.xml", "by_hand:plan")
-    (tmp_path / "by_hand.py").write_text(BY_HAND, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "scenarios").mkdir()
     (tmp_path / "scenarios/mapping.yaml").write_text(python, encoding="utf-8")
     monkeypatch.setattr("alula.common.scenarios.scenarios_folder", lambda: tmp_path / "scenarios")
-    assert run.main(["mapping", "--mock", "--groot", "--out", str(tmp_path / "run")]) == run.CANNOT_START
-    said = "alula run: --groot: the mission is Python (by_hand:plan), and viewers are shown trees of files: missions/NAME.xml\n"
-    assert capsys.readouterr().err == said
+    assert run.main(["mapping", "--mock", "--out", str(tmp_path / "run")]) == run.CANNOT_START
+    assert capsys.readouterr().err == "alula run: the mission by_hand:plan is no file of a tree; name one: missions/NAME.xml\n"
     assert not (tmp_path / "run").exists()
-    with pytest.raises(InputError, match="this one is Python"):
-        mission("mapping", groot="127.0.0.1:1667")
 
 
 @pytest.mark.parametrize("node", ["fly straight", "leg"])

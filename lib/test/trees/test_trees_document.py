@@ -142,3 +142,33 @@ def test_a_file_with_anything_changed_is_read_or_refused_in_one_line():
         except TreeError as error:
             assert "\n" not in str(error), text  # noqa: PT017 - either is right
     assert read > 50
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("a<1 && b == 'c'", "a<1 && b == 'c'"),
+        ("a &lt; 1 && b", "a < 1 && b"),
+        ("a & b &amp; &#99;", "a & b & c"),
+        ("x<y", "x<y"),
+        ("a &&\n  b;", "a &&   b;"),
+        ("1 &ltx", "1 &ltx"),
+    ],
+)
+def test_ampersands_and_less_than_in_scripts_are_read_as_the_fields_reader_reads_them(written, value):
+    text = f'<root><!-- a < b & "c --><A b="{written}" c="&lt;"/> x & y\n<B   d = "1"/></root>'
+    document = parse_document(text, "m.xml")
+    node, other = document.root.children
+    assert (node.get("b"), node.get("c")) == (value, "<")
+    assert (other.tag, other.place.line, other.place.column) == ("B", 2 + written.count("\n"), 1)
+    assert document.text() == text
+    assert node.attributes["b"].place_of(2).column == text.index(written) + 3
+
+
+NO_XML = ('<root a="1 b="2"/>', "<root><</root>", "<root><A b=<c>/></root>", "<root>&nothing;</root>", "<root><!-- & ", '<root a&b="1"/>')
+
+
+@pytest.mark.parametrize("text", NO_XML)
+def test_what_no_reader_takes_is_still_no_xml(text):
+    with pytest.raises(FileError, match="is no XML"):
+        parse_document(text, "m.xml")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from alula.missions.director import Mission
 from alula.missions.filed.plan import FiledMission
-from alula.missions.plan import InputError
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import Clock
 from alula.trees.groot.address import Address, ServerError
@@ -42,9 +41,6 @@ class WatchedTree:
 
 
 def watched(mission: Mission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> WatchedTree | None:
-    """Return what shows the tree; None where nobody sees it. Raises ServerError, and InputError for viewers of a mission in Python."""
-    if isinstance(mission, FiledMission):
-        return WatchedTree(mission.tree, clock_ns, record, groot) if groot or record is not None else None
-    if groot:
-        raise InputError("viewers are shown the tree of a mission that is a file, and this one is Python")
-    return None
+    """Return what shows the tree; None where nobody sees it. Raises ServerError."""
+    shown = isinstance(mission, FiledMission) and (groot or record is not None)
+    return WatchedTree(mission.tree, clock_ns, record, groot) if shown else None

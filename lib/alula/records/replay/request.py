@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +14,7 @@ from alula.common.suggestions import nearest
 from alula.language.errors import LanguageError
 from alula.language.load import load_skillset
 from alula.missions.filed.scenario import plan_of_mission_file
-from alula.missions.plan import InputError, Inputs, MakePlan, MissionPlan, plan_of
+from alula.missions.plan import InputError, Inputs, MissionPlan, plan_of
 from alula.model.model import Skillset
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
@@ -35,35 +34,13 @@ def inputs_of_record(recorded: Recorded) -> Inputs:
 
 
 def plan_for(recorded: Recorded, tree: str) -> MissionPlan:
-    """Return the mission's own plan, or that of ``tree``: a Python file or a module, with ``:function`` where it is not ``plan``."""
+    """Return the mission's own plan, or that of the file ``tree``."""
     inputs = inputs_of_record(recorded)
     try:
         scenario = load_scenario(recorded.scenario)
-        if tree.endswith(".xml"):
-            return plan_of_mission_file(Path(tree), scenario, inputs)
-        return _tree(tree)(inputs) if tree else plan_of(scenario, inputs)
+        return plan_of_mission_file(Path(tree), scenario, inputs) if tree else plan_of(scenario, inputs)
     except (ScenarioError, RobotError, InputError) as error:
         raise ReplayError(f"{recorded.path}: {error}") from error
-
-
-def _tree(text: str) -> MakePlan:
-    place, _, function = text.partition(":")
-    name = function or "plan"
-    path = Path(place)
-    try:
-        if path.suffix != ".py":
-            make: MakePlan = find_robot().load(f"{place}:{name}")
-            return make
-        spec = importlib.util.spec_from_file_location("replayed_tree", path)
-        if spec is None or spec.loader is None or not path.is_file():
-            raise ReplayError(f"--tree {text}: there is no such file")
-        module = importlib.util.module_from_spec(spec)
-        find_robot().import_path()
-        spec.loader.exec_module(module)
-        own: MakePlan = getattr(module, name)
-    except (ImportError, AttributeError, SyntaxError, RobotError) as error:
-        raise ReplayError(f"--tree {text}: {error}; give a module or a file that has {name}(inputs) -> MissionPlan") from error
-    return own
 
 
 def skillsets_for(plan: MissionPlan, models: Sequence[Path]) -> list[Skillset]:

@@ -9,8 +9,24 @@ from alula.trees.errors import TickError
 from alula.trees.node import Condition, SyncAction
 from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, SUCCESS, Answer
-from alula.trees.values import ANY, DOUBLE, INT
+from alula.trees.values import ANY, DOUBLE, INT, PortType
 from uav_missions.route import Route, route_of, wrap_rad
+
+
+def _heights(value: object) -> list[float]:
+    """Read heights with `;` between them, as BehaviorTree.CPP writes lists of numbers; raises ValueError."""
+    words = value if isinstance(value, list) else str(value).split(";") if value else []
+    try:
+        heights = [float(word) for word in words]
+    except ValueError:
+        heights = [math.nan]
+    if not all(math.isfinite(height) for height in heights):
+        msg = f"'{value}' is no list of heights, such as 3;7"
+        raise ValueError(msg)
+    return heights
+
+
+HEIGHTS = PortType("std::vector<double>", _heights, _heights)
 
 
 class NextWaypoint(SyncAction):
@@ -22,6 +38,7 @@ class NextWaypoint(SyncAction):
 
     ports = (
         input_port("route", ANY, doc="a list of [x, y, z] (map, ENU, metres)", unit="m"),
+        input_port("heights", HEIGHTS, "", "where the route's first height is flown again and again; none: the route as it is", unit="m"),
         input_port("reached", INT, doc="how many of them were reached"),
         output_port("count", INT, doc="how many there are"),
         output_port("waypoint", ANY, doc="{x, y, z}", unit="m"),
@@ -48,6 +65,9 @@ class NextWaypoint(SyncAction):
         if not isinstance(waypoints, list):
             raise TickError(f"{self.place()}: the route is no list")
         route = route_of({"route": waypoints})
+        heights = self.get("heights")
+        if isinstance(heights, list) and heights:
+            route = route.at_heights(heights)
         route.reached = reached
         return route
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Sequence
@@ -36,6 +37,11 @@ class Route:
     def current(self) -> Waypoint | None:
         """The waypoint to fly to, None when there are no more."""
         return None if self.done else self.waypoints[self.reached]
+
+    def at_heights(self, heights_m: Sequence[float]) -> Route:
+        """Return another route: the part up to where this one leaves its first height, at each of these heights."""
+        lap = list(itertools.takewhile(lambda waypoint: waypoint[2] == self.waypoints[0][2], self.waypoints))
+        return Route([(x, y, height_m) for height_m in heights_m for x, y, _ in lap], self._home)
 
     def mark_reached(self) -> None:
         """Take the next waypoint from now on."""
