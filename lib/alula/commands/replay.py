@@ -85,9 +85,7 @@ def parse(words: Sequence[str], depths: Depths = NO_DEPTHS) -> Arguments:
     parser.add_argument(
         "--from", dest="depth", choices=[SKILLS, *depths], default=SKILLS, help="the layer whose record is replayed (default skills)"
     )
-    parser.add_argument(
-        "--tree", default="", metavar="FILE.xml", help="use the tree of another mission's file"
-    )
+    parser.add_argument("--tree", default="", metavar="FILE.xml", help="use the tree of another mission's file")
     parser.add_argument(
         "--model", type=Path, action="append", default=[], metavar="FILE", help="use another model of a skillset; repeatable"
     )

@@ -43,16 +43,18 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         blackboard: Board,
         success: Collection[str] = (),
         on_success: Callable[[Board], None] = nothing_more,
+        halt_waits: bool = False,
     ) -> None:
         super().__init__(name)
         self.client = client
         self.skill = skill
         self.handle: SkillHandle | None = None
-        self._interrupted = False
+        self._interrupted = self._noted = False
         self._inputs = inputs
         self._blackboard = blackboard
         self.success = frozenset(success)
         self._on_success = on_success
+        self._halt_waits = halt_waits
 
     @property
     def skill_name(self) -> str:
@@ -62,7 +64,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
     def initialise(self) -> None:
         """Forget the last execution; the start itself is in `update`, because it may have to wait."""
         self.handle = None
-        self._interrupted = False
+        self._interrupted = self._noted = False
         self.feedback_message = ""
 
     def update(self) -> Status:
@@ -72,21 +74,36 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         handle = self.handle
         if handle is None or not handle.done:
             return Status.RUNNING
-        if handle.state is ExecutionState.TERMINATED and handle.result in self.success:
+        if self._succeeded(handle):
             self.feedback_message = handle.result
             self._on_success(self._blackboard)
             return Status.SUCCESS
-        failure = Failure(self.name, self.skill_name, handle.state, handle.result, handle.message)
-        self._blackboard.failures.append(failure)
-        self.feedback_message = failure.sentence()
+        self._note(handle)
         return Status.FAILURE
 
+    def _note(self, handle: SkillHandle) -> None:
+        failure = Failure(self.name, self.skill_name, handle.state, handle.result, handle.message)
+        self._blackboard.failures.append(failure)
+        self._noted = True
+        self.feedback_message = failure.sentence()
+
     def terminate(self, new_status: Status) -> None:
-        """Interrupt the execution when the tree leaves the leaf before its end; composites may call this again and again."""
-        if new_status is Status.INVALID and self.handle is not None and not self.handle.done and not self._interrupted:
+        """Interrupt the execution when the tree leaves the leaf before its end; composites may call this again and again.
+
+        One that has failed since the last tick, together with what the tree leaves the leaf for, is noted with it.
+        """
+        handle = self.handle
+        if new_status is not Status.INVALID or handle is None or self._interrupted:
+            return
+        if not handle.done:
             self._interrupted = True
             self.feedback_message = "interrupted"
-            self._blackboard.pending.interrupt(self.client.skillset, self.skill, self.handle)
+            self._blackboard.pending.interrupt(self.client.skillset, self.skill, handle, holds_all=self._halt_waits)
+        elif not self._succeeded(handle) and not self._noted:
+            self._note(handle)
+
+    def _succeeded(self, handle: SkillHandle) -> bool:
+        return handle.state is ExecutionState.TERMINATED and handle.result in self.success
 
     @property
     def interrupted(self) -> bool:
@@ -95,7 +112,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
 
     def recall(self, handle: SkillHandle | None, *, interrupted: bool) -> None:
         """Follow another execution, as it was at another moment of the mission."""
-        self.handle, self._interrupted = handle, interrupted
+        self.handle, self._interrupted, self._noted = handle, interrupted, False
 
     def with_inputs(self, inputs: Inputs[Board]) -> None:
         """Start with other inputs from now on."""

@@ -2,7 +2,7 @@
 
 A leaf that starts while another one's interruption is under way would be NOT_READY: the resource is still taken. Trying again
 blindly would hide real refusals, so a start waits here, and only for interruptions in the same skillset (no resource is
-shared between two). The wait is bounded; after it the start is made anyway, and the resource manager has the last word.
+shared between two), unless the mission wants all of them to wait. The wait is bounded; after it the start is made anyway, and the resource manager has the last word.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ class _Pending:
     skill: str
     handle: SkillHandle
     since_ns: int
+    holds_all: bool
 
 
 class PendingInterrupts:
@@ -30,10 +31,10 @@ class PendingInterrupts:
         self._bound_ns = bound_s * NANOSECONDS
         self._pending: list[_Pending] = []
 
-    def interrupt(self, skillset: str, skill: str, handle: SkillHandle) -> None:
-        """Ask for the end of an execution and remember it until it has ended."""
+    def interrupt(self, skillset: str, skill: str, handle: SkillHandle, *, holds_all: bool = False) -> None:
+        """Ask for the end of an execution and remember it until it has ended; ``holds_all``: starts in all skillsets wait for it."""
         handle.interrupt()
-        self._pending.append(_Pending(skillset, skill, handle, self._clock_ns()))
+        self._pending.append(_Pending(skillset, skill, handle, self._clock_ns(), holds_all))
 
     @property
     def handles(self) -> list[SkillHandle]:
@@ -45,7 +46,7 @@ class PendingInterrupts:
         self._pending = [_Pending(skillset, handle.skill, handle, self._clock_ns()) for skillset, handle in interrupted]
 
     def names(self, skillset: str | None = None) -> list[str]:
-        """Return the skills of this skillset (None: of all) whose interruption is under way and not overdue."""
+        """Return the skills whose end a start in this skillset (None: in any) waits for: their interruption is under way, not overdue."""
         now_ns = self._clock_ns()
         self._pending = [p for p in self._pending if not p.handle.done and now_ns - p.since_ns < self._bound_ns]
-        return [f"{p.skillset}.{p.skill}" for p in self._pending if skillset in {None, p.skillset}]
+        return [f"{p.skillset}.{p.skill}" for p in self._pending if p.holds_all or skillset in {None, p.skillset}]

@@ -11,6 +11,7 @@ from alula.trees.values import ANY, BOOL, DOUBLE, INT, SIZED, STRING, UINT, Port
 
 SUCCESS_PORT = "success"
 OUTCOME_PORT = "outcome"
+HALT_PORT = "halt_waits"
 STATE_PORT = "state"
 SEPARATOR = ";"
 """Between the results that a port names."""
@@ -28,6 +29,7 @@ def skill_type(skillset: str, skill: Skill, doc: str = "") -> NodeType:
         Port(
             SUCCESS_PORT, STRING, Direction.INPUT, successes, f"results that mean success, of {results}" if results else "it has no results"
         ),
+        Port(HALT_PORT, BOOL, Direction.INPUT, "false", "when it is halted, no skill of any skillset starts until it has ended"),
         Port(OUTCOME_PORT, STRING, Direction.OUTPUT, None, "why it ended: its result, or how it failed"),
     ]
     return node_type(f"{skillset}.{skill.name}", Category.ACTION, ports, doc=doc)

@@ -291,3 +291,14 @@ def test_a_foreign_missions_entries_may_come_from_outside(robot, tmp_path):
     (foreign,) = findings_of("mission.xml", text, robot, [palette])
     assert (ours.code, ours.severity) == ("ALU607", Severity.ERROR)
     assert (foreign.code, foreign.severity) == ("ALU607", Severity.WARNING)
+
+
+@pytest.mark.parametrize("body", ["<ReactiveSequence><Sleep msec=\"1\"/><Until if=\"1\"><AlwaysSuccess/></Until></ReactiveSequence>",
+                                  "<ReactiveSequence><Sleep msec=\"1\"/><RetryAfter if=\"1\"><AlwaysFailure/></RetryAfter></ReactiveSequence>"])  # fmt: skip
+def test_decorators_that_run_a_child_again_take_several_ticks(body, robot):
+    assert "ALU611" in [one.code for one in findings_of("mission.xml", whole(body).encode(), robot)]
+
+
+def test_what_waits_does_not_fail(robot):
+    found = findings_of("mission.xml", whole('<Fallback><WaitFor if="1"/><AlwaysSuccess/></Fallback>').encode(), robot)
+    assert "ALU610" in [one.code for one in found]

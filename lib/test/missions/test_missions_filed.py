@@ -85,3 +85,37 @@ def test_numbers_have_the_limits_of_their_types():
 def test_what_is_no_resource_has_no_value_in_a_script():
     world = World({"arm": Arm()}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)), frozenset({"arm.hand"}), frozenset())
     assert [world.value(name) for name in ("arm.hand", "arm.level", "arm.level.value", "leg.hand")] == ["OPEN", None, None, None]
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_after_a_halt_a_start_in_its_skillset_waits_and_in_another_one_where_the_file_says_so(waits):
+    files = [ModelFile("arm.rl", MODEL), ModelFile("leg.rl", "skillset leg { skill walk { success THERE {} } }")]
+    models = [one for file in check_texts(files) for one in file.skillsets]
+    arm, leg = Arm(), Arm()
+    leg.skillset = "leg"
+    crew = Crew({"arm": arm, "leg": leg}, Blackboard(clock_ns=int, pending=PendingInterrupts(int)))
+    halted = f'<arm.grip tries="1" {"halt_waits=" + chr(34) + "true" + chr(34) if waits else ""}/>'
+    body = f'<Sequence><Parallel success_count="1">{halted}<AlwaysSuccess/></Parallel><leg.walk/><arm.grip tries="2"/></Sequence>'
+    text = f'<root BTCPP_format="4"><BehaviorTree ID="m">{body}</BehaviorTree></root>'
+    tree = make_tree(read_text(text, "m.xml"), mission_palette(models, NO_PART, crew), int)
+    assert tree.tick() is RUNNING
+    assert len(leg.started) == (0 if waits else 1)
+    if not waits:
+        leg.started[0][0].end(ExecutionState.TERMINATED, "THERE", "")
+        assert tree.tick() is RUNNING
+        assert [inputs for _, inputs in arm.started] == [{"tries": 1}]  # the second one waits for the end of the first
+    arm.started[0][0].end(ExecutionState.INTERRUPTED, "", "")
+    assert tree.tick() is RUNNING
+    assert (len(leg.started), len(arm.started)) == ((1, 1) if waits else (1, 2))
+
+
+def test_two_skills_that_fail_at_once_are_both_the_reason():
+    arm = Arm()
+    both = '<Parallel success_count="2" failure_count="1"><arm.grip name="a" tries="1"/><arm.grip name="b" tries="2"/></Parallel>'
+    tree = tree_of(both, arm)
+    tree.tick()
+    for handle, _ in arm.started:
+        handle.end(ExecutionState.TERMINATED, "DROPPED", "")
+    assert tree.tick() is FAILURE
+    memory = tree.root.children[0].crew.memory
+    assert [failure.leaf for failure in memory.failures] == ["a", "b"]

@@ -68,6 +68,10 @@ def named_results(site: Site) -> frozenset[str] | None:
     return frozenset(attribute.value.split(SEPARATOR)) - {""}
 
 
+_NEVER_FAIL = frozenset({"WaitFor", "NoteReason"})
+_AGAIN = frozenset({"Until", "RetryAfter"})
+
+
 class SkillTraits(PlainTraits):
     """What is known of BehaviorTree.CPP's nodes and of the robot's skills."""
 
@@ -77,13 +81,15 @@ class SkillTraits(PlainTraits):
 
     def ends(self, site: Site) -> frozenset[str]:
         """Any skill may fail: it may be refused, interrupted, or stopped by an invariant."""
+        if site.kind in _NEVER_FAIL:
+            return frozenset({S})
         if self._skills.of(site) is None:
             return super().ends(site)
         return frozenset({F, S} if self._skills.successes(site) else {F})
 
     def runs(self, site: Site) -> bool | None:
-        """Every skill takes several ticks."""
-        return True if self._skills.of(site) is not None else super().runs(site)
+        """Every skill takes several ticks, and so do decorators that run their child again a tick later."""
+        return True if self._skills.of(site) is not None or site.kind in _AGAIN else super().runs(site)
 
     def endless(self, site: Site) -> bool:
         """Tell whether none of its results is a success."""

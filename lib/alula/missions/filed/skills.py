@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from alula.missions.blackboard import Blackboard
 from alula.missions.leaves import SkillLeaf
-from alula.missions.skill_types import OUTCOME_PORT, SEPARATOR, STATE_PORT, SUCCESS_PORT, resource_type, skill_type
+from alula.missions.skill_types import HALT_PORT, OUTCOME_PORT, SEPARATOR, STATE_PORT, SUCCESS_PORT, resource_type, skill_type
 from alula.missions.skillset import Client
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Resource, Skill, Skillset
@@ -29,7 +29,8 @@ class SkillNode(Action):
 
     A result that the model calls a success is one, or those that ``success`` names; every other end is a failure. ``outcome`` is written
     when it has ended: the result, or the precondition or invariant that did not hold, or the state. A halt asks for the interruption and
-    does not wait: until it has ended, a start in the same skillset waits, RUNNING, so nothing is left behind.
+    does not wait: until it has ended, a start in the same skillset waits, RUNNING, so nothing is left behind; with ``halt_waits`` a start in
+    any skillset does.
     """
 
     crew: Crew
@@ -41,7 +42,13 @@ class SkillNode(Action):
         client = self.crew.clients[self.skillset]
         success = str(self.get(SUCCESS_PORT)).split(SEPARATOR)
         self.leaf: SkillLeaf[Blackboard] = SkillLeaf(
-            self.name, client, self.model.name, self._inputs, blackboard=self.crew.memory, success=frozenset(success) - {""}
+            self.name,
+            client,
+            self.model.name,
+            self._inputs,
+            blackboard=self.crew.memory,
+            success=frozenset(success) - {""},
+            halt_waits=bool(self.get(HALT_PORT)),
         )
 
     def on_start(self) -> Answer:

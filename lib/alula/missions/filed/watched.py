@@ -42,5 +42,6 @@ class WatchedTree:
 
 def watched(mission: Mission, clock_ns: Clock, record: MissionRecord | None, groot: str) -> WatchedTree | None:
     """Return what shows the tree; None where nobody sees it. Raises ServerError."""
-    shown = isinstance(mission, FiledMission) and (groot or record is not None)
-    return WatchedTree(mission.tree, clock_ns, record, groot) if shown else None
+    if not isinstance(mission, FiledMission) or not (groot or record is not None):
+        return None
+    return WatchedTree(mission.tree, clock_ns, record, groot)
