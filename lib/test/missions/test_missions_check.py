@@ -293,9 +293,9 @@ def test_a_foreign_missions_entries_may_come_from_outside(robot, tmp_path):
     assert (foreign.code, foreign.severity) == ("ALU607", Severity.WARNING)
 
 
-@pytest.mark.parametrize("body", ["<ReactiveSequence><Sleep msec=\"1\"/><Until if=\"1\"><AlwaysSuccess/></Until></ReactiveSequence>",
-                                  "<ReactiveSequence><Sleep msec=\"1\"/><RetryAfter if=\"1\"><AlwaysFailure/></RetryAfter></ReactiveSequence>"])  # fmt: skip
-def test_decorators_that_run_a_child_again_take_several_ticks(body, robot):
+@pytest.mark.parametrize("again", ['<Until if="1"><AlwaysSuccess/></Until>', '<RetryAfter if="1"><AlwaysFailure/></RetryAfter>'])
+def test_decorators_that_run_a_child_again_take_several_ticks(again, robot):
+    body = f'<ReactiveSequence><Sleep msec="1"/>{again}</ReactiveSequence>'
     assert "ALU611" in [one.code for one in findings_of("mission.xml", whole(body).encode(), robot)]
 
 

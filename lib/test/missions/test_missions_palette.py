@@ -61,6 +61,7 @@ def test_skills_are_actions_and_resources_conditions(written):
         ("input_port", "tries", "int", None, None),
         ("input_port", "hard", "bool", None, None),
         ("input_port", "success", "std::string", "HELD", "results that mean success, of HELD, DROPPED"),
+        ("input_port", "halt_waits", "bool", "false", "when it is halted, no skill of any skillset starts until it has ended"),
         ("output_port", "outcome", "std::string", None, "why it ended: its result, or how it failed"),
     ]
     assert grip.find("MetadataFields/Metadata").get("description") == "Close the hand about a thing, as gently as can be."
