@@ -2,7 +2,8 @@
 
 A leaf that starts while another one's interruption is under way would be NOT_READY: the resource is still taken. Trying again
 blindly would hide real refusals, so a start waits here, and only for interruptions in the same skillset (no resource is
-shared between two), unless the mission wants all of them to wait. The wait is bounded; after it the start is made anyway, and the resource manager has the last word.
+shared between two), unless the mission wants all of them to wait.
+The wait is bounded; after it the start is made anyway, and the resource manager has the last word.
 """
 
 from __future__ import annotations
