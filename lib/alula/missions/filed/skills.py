@@ -29,8 +29,8 @@ class SkillNode(Action):
 
     A result that the model calls a success is one, or those that ``success`` names; every other end is a failure. ``outcome`` is written
     when it has ended: the result, or the precondition or invariant that did not hold, or the state. A halt asks for the interruption and
-    does not wait: until it has ended, a start in the same skillset waits, RUNNING, so nothing is left behind; with ``halt_waits`` a start in
-    any skillset does.
+    does not wait: until it has ended, a start in the same skillset waits, RUNNING, so nothing is left behind; with ``halt_waits``
+    a start in any skillset does.
     """
 
     crew: Crew
