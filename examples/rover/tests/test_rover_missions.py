@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from alula.common.faults import parse_fault
 from alula.common.robots import find_robot
 from alula.common.scenarios import load_scenario

@@ -52,7 +52,7 @@ class BridgedService(_Served):
 
 @dataclass(frozen=True)
 class BridgedAction(_Served):
-    """An action that crosses the bridge: actionlib's in ROS 1. ``type`` is ``package/Name``, as ROS 2 has it (``move_base_msgs/MoveBase``)."""
+    """An action that crosses the bridge: actionlib's. ``type`` is ``package/Name``, as ROS 2 has it (``tf2_msgs/LookupTransform``)."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         self._blackboard = blackboard
         self.success = frozenset(success)
         self._on_success = on_success
-        self._halt_waits = halt_waits
+        self.halt_waits = halt_waits
 
     @property
     def skill_name(self) -> str:
@@ -98,7 +98,7 @@ class SkillLeaf(Behaviour, Generic[Board]):  # type: ignore[misc]  # py_trees is
         if not handle.done:
             self._interrupted = True
             self.feedback_message = "interrupted"
-            self._blackboard.pending.interrupt(self.client.skillset, self.skill, handle, holds_all=self._halt_waits)
+            self._blackboard.pending.interrupt(self.client.skillset, self.skill, handle, holds_all=self.halt_waits)
         elif not self._succeeded(handle) and not self._noted:
             self._note(handle)
 

@@ -42,9 +42,10 @@ class PendingInterrupts:
         """Those that are remembered, ended or not."""
         return [one.handle for one in self._pending]
 
-    def recall(self, interrupted: Iterable[tuple[str, SkillHandle]]) -> None:
-        """Remember these executions instead, each with its skillset, as at another moment of the mission."""
-        self._pending = [_Pending(skillset, handle.skill, handle, self._clock_ns()) for skillset, handle in interrupted]
+    def recall(self, interrupted: Iterable[tuple[str, SkillHandle, bool]]) -> None:
+        """Remember these executions instead, each with its skillset and whether it holds all, as at another moment of the mission."""
+        now_ns = self._clock_ns()
+        self._pending = [_Pending(skillset, handle.skill, handle, now_ns, holds_all) for skillset, handle, holds_all in interrupted]
 
     def names(self, skillset: str | None = None) -> list[str]:
         """Return the skills whose end a start in this skillset (None: in any) waits for: their interruption is under way, not overdue."""

@@ -148,7 +148,10 @@ class Keeper:
         interrupted = dict(memory.leaves)
         for number, node in enumerate(self.leaves):
             node.leaf.recall(handles.get(number) if number in interrupted else None, interrupted=interrupted.get(number, False))  # type: ignore[arg-type]
-        body.board.pending.recall([(handles[leaf].skillset, handles[leaf]) for leaf in memory.pending])  # type: ignore[misc]
+        body.board.pending.recall(
+            (handles[leaf].skillset, handles[leaf], self.leaves[leaf].leaf.halt_waits)  # type: ignore[misc]
+            for leaf in memory.pending
+        )
 
     def _put_nodes(self, memory: TreeMemory) -> None:
         values = iter(memory.nodes)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-
 from alula.missions.plan import InputError, Inputs
 
 Pose = dict[str, float]

@@ -20,10 +20,9 @@ from rover_robot.hooks.clock import Watch
 from rover_robot.hooks.journey import Journey
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
     from alula.runtime.core.execution import Execution
     from alula.runtime.hooks import SkillHooks
+    from rclpy.node import Node
 
 STANDS_M_S, STANDS_RAD_S = 0.01, 0.02
 
@@ -78,7 +77,7 @@ class StopHere(AbstractStopHereSkill):
         self._execution = execution
         self._command()
 
-    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
+    def on_interrupt(self, execution: Execution) -> None:
         """Command nothing any more."""
         self._execution = None
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from alula.runtime.hooks import SkillHooks
 from cargo_managers.hooks import AbstractAskSkill, AbstractLoadSkill, AbstractOpenDoorSkill, AbstractUnloadSkill
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from alula.runtime.hooks import SkillHooks
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
     from alula.runtime.core.execution import Execution
+    from rclpy.node import Node
 
 ANSWER = "done "
 """Whoever answers says this before what was asked."""
@@ -101,7 +100,7 @@ class OpenDoor(AbstractOpenDoorSkill):
         service = self._node.create_client(SetBool, f"/door/{execution.inputs.door}/open")  # type: ignore[attr-defined]
         service.call_async(SetBool.Request(data=True)).add_done_callback(lambda future: self._on_answer(execution, future.result()))
 
-    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
+    def on_interrupt(self, execution: Execution) -> None:
         """A door may be open."""
         self._execution = None
 

@@ -7,16 +7,15 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from action_msgs.msg import GoalStatus
+from alula.runtime.hooks import SkillHooks
 from geometry_msgs.msg import Pose2D
 from move_base_msgs.action import MoveBase
 from rclpy.action import ActionClient
 
-from alula.runtime.hooks import SkillHooks
-
 if TYPE_CHECKING:
+    from alula.runtime.core.execution import Execution
     from rclpy.node import Node
 
-    from alula.runtime.core.execution import Execution
     from rover_robot.hooks.clock import Watch
 
 SILENT_S = 4.0

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from alula.runtime.hooks import SkillHooks
 from perception_managers.hooks import AbstractBumperSkill, AbstractScanSkill
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 
-from alula.runtime.hooks import SkillHooks
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from rclpy.node import Node
-
     from alula.runtime.core.execution import Execution
+    from rclpy.node import Node
 
 SILENT_S = 2.0
 """The functional layer notices silence after 0.5 s and says why (resource `laser`); this is for when it is silent itself."""

@@ -11,11 +11,10 @@ from sensor_msgs.msg import BatteryState
 from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
-    from power_managers.inputs import ChargeInputs
-    from rclpy.node import Node
-
     from alula.runtime.core.execution import Execution
     from alula.runtime.hooks import SkillHooks
+    from power_managers.inputs import ChargeInputs
+    from rclpy.node import Node
 
 WINDOW_S = 10.0
 FALLS_FAST = 0.004
@@ -62,11 +61,11 @@ class Supply(AbstractSupplySkill):
         """Begin."""
         self._since_s, self._execution = self._battery.watch.now_s, execution
 
-    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
+    def on_interrupt(self, execution: Execution) -> None:
         """End."""
         self._execution = None
 
-    def progress(self, execution: Execution) -> float:  # noqa: ARG002
+    def progress(self, execution: Execution) -> float:
         """Return how full the battery is."""
         return self._battery.level or 0.0
 
@@ -95,7 +94,7 @@ class Charge(AbstractChargeSkill):
         self._best, self._best_s = self._battery.level or 0.0, self._battery.watch.now_s
         self._execution = execution
 
-    def on_interrupt(self, execution: Execution) -> None:  # noqa: ARG002
+    def on_interrupt(self, execution: Execution) -> None:
         """End."""
         self._execution = None
 
