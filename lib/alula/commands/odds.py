@@ -36,6 +36,7 @@ from alula.trees.errors import TreeError
 COMMAND = "alula odds"
 WRONG = 2
 MOST_SITUATIONS = 200_000
+COUNTED = 100  # attempts and rounds, exactly: each has its share of the odds
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -68,7 +69,7 @@ def run(given: argparse.Namespace) -> int:
     models = models_of(robot, COMMAND)
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
-    system = System.read(given.file, models, part_of(robot, COMMAND), failures)
+    system = System.read(given.file, models, part_of(robot, COMMAND), failures, few=COUNTED)
     steps = MissionSteps(system, effects, _brought(robot, models), _departure(robot, models))
     graph = explore(steps, at_use=figures.at_use, most=given.most, tell=_tell)
     changes = {text: changed(figures, text, graph) for text in given.changes}

@@ -58,6 +58,8 @@ class Body:
     trees: tuple[Tree, ...]
     skillsets: Mapping[str, Skillset]
     read: Read
+    few: int = FEW
+    """Up to how many attempts and rounds are counted exactly."""
 
     def nodes(self) -> list[Node]:
         """Return all nodes, tree by tree."""
@@ -109,10 +111,10 @@ class Keeper:
         value = getattr(node, name)
         if name not in COUNTS or not isinstance(value, int | float):
             return _frozen(value)
-        if not isinstance(value, UnknownNumber) and value <= FEW:
+        if not isinstance(value, UnknownNumber) and value <= self._body.few:
             return _frozen(value)
         least = value.low if isinstance(value, UnknownNumber) else float(value)
-        low = max(1.0, min(least, FEW - 1.0)) if name == LEFT else FEW + 1.0
+        low = max(1.0, min(least, self._body.few - 1.0)) if name == LEFT else self._body.few + 1.0
         return _frozen(UnknownNumber(self._body.robot.oracle, f"{COUNTS[name]} of '{node.name}'", low))
 
     @staticmethod

@@ -29,7 +29,7 @@ from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.limits import Deadline
 from alula.prove.mission.managers import ENDED, RUNNING, SENT, End, Failures, ManagersSteps
-from alula.prove.mission.memory import Body, TreeMemory
+from alula.prove.mission.memory import FEW, Body, TreeMemory
 from alula.prove.mission.oracle import Answer, Oracle, Question
 from alula.prove.mission.reading import what_is_read
 from alula.prove.mission.robot import Client, Memory, Robot, opaque
@@ -72,8 +72,12 @@ class System:
         part: MissionPart,
         failures: Failures = Failures(),  # noqa: B008 - a value
         deadline: Deadline | None = None,
+        few: int = FEW,
     ) -> System:
-        """Read a mission's file; raises InputError where it can't be used, UndecidedError where the search can't look at it."""
+        """Read a mission's file; attempts and rounds are counted exactly up to ``few``.
+
+        Raises InputError where the file can't be used, UndecidedError where the search can't look at it.
+        """
         files = read_files(path)
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
@@ -90,7 +94,7 @@ class System:
         director = Director(OneStop(mission, stop), board)
         unread = [*(name for name, _ in part.nodes), *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
         read = what_is_read(files, unread, plan.parameters, oracle)
-        body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read)
+        body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)
         for number, node in enumerate(ticker.leaves):
             node.leaf.with_inputs(_Starting(robot, number))
