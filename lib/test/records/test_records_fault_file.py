@@ -57,7 +57,7 @@ def test_the_example_of_the_page_is_right(tmp_path):
         (
             "faults:\n  zed: {state: {}}",
             2,
-            "`zed` has no `state`; it may have states, later, ends, happens, lasts, source (did you mean `states`?)",
+            "`zed` has no `state`; it may have states, later, ends, told, happens, lasts, source (did you mean `states`?)",
         ),
         ("faults:\n  zed:\n    states: {perception.zed_statu: BROKEN}", 3, "there is no resource `perception.zed_statu`; there are"),
         (

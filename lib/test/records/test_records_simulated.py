@@ -1,4 +1,4 @@
-"""A campaign over the simulator, with a recorded flight in its place: what is asked of ``fly``, and what its folders become."""
+"""A campaign over the simulator, with a recorded flight in its place: what is asked of ``alula run``, and what its folders become."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ def recorded_flights(tmp_path, monkeypatch):
 def test_a_flight_of_the_simulator_becomes_a_row_and_keeps_its_folder(recorded_flights, tmp_path):
     flights = [Flight(4, "mapping", 7, ("zed@6", "lidar@9"), tmp_path / "hill.yaml"), Flight(5, "mapping", 13, ())]
     (tmp_path / "out" / "flight-00004").mkdir(parents=True)
-    row, failed = fly(flights, SIMULATOR, (), str(tmp_path / "out"))
+    row, failed = fly(flights, SIMULATOR, (), str(tmp_path / "out"), ("--rate", "0"))
     asked = (tmp_path / "asked").read_text(encoding="utf-8").splitlines()
     folder = tmp_path / "out" / "flight-00004-2"  # what a crash has left half done stays as it is
-    assert asked[0] == f"fly mapping --seed 7 --rate 0 --world {tmp_path / 'hill.yaml'} --fail zed@6 --fail lidar@9 --out {folder}"
+    assert asked[0] == f"run mapping --seed 7 --rate 0 --world {tmp_path / 'hill.yaml'} --fail zed@6 --fail lidar@9 --out {folder}"
     assert (folder / "skills.mcap").is_file()
     found = (row["outcome"], row["landed"], row["collisions"], row["min_clearance_m"], row["open"], row["exit_code"], row["conforms"])
     assert found == ("degraded", True, 0, 1.2, ["b"], 0, True)
