@@ -75,7 +75,7 @@ class Rig:
         if found.quality >= 0.5:
             self._T_map_odom = compose(found.pose, inverse(odom))
         misses = np.where(np.isinf(sweep.ranges_m), sweep.range_max_m, np.inf)
-        self.around.look(self.pose, self._points, points_of(misses, sweep.angle_min_rad, sweep.angle_step_rad))
+        self.around.look(self.pose, self._points, points_of(misses, sweep.angle_min_rad, sweep.angle_step_rad), now_s)
 
     def _hear(self, now_s):
         verdicts = (self.laser.verdict(now_s), self.status.verdict, self.wheels.verdict, self.bumper.verdict)

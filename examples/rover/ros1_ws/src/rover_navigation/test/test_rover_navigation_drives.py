@@ -11,7 +11,7 @@ from rover_navigation_rig import Rig
 from rover_navigation.geometry import compose, points_of
 from rover_navigation.jobs import Corridor, Creep, Dock, Drive, Ended
 from rover_navigation.matching import match, search
-from rover_navigation.planning import NoWayError, plan
+from rover_navigation.planning import NoWayError, plan, plan_anew
 
 KITCHEN, OFFICE, WORKSHOP = (2.6, 8.6, math.pi), (13.4, 8.8, 0.0), (13.6, 1.6, 0.0)
 ARRIVED = Ended(arrived=True, text="arrived")
@@ -103,6 +103,28 @@ def test_plans_keep_away_from_walls_and_say_why_there_is_none():
     assert rig.grid.distance_m[rig.grid.cells(way[10:])].min() > 0.25
     with pytest.raises(NoWayError, match=r"\(8.00, 2.00\) is taken"):
         plan(rig.around, rig.pose, (8.0, 2.0, 0.0))
-    rig.around.seen[rig.grid.cells(np.column_stack((np.full(40, 2.0), np.linspace(4.4, 6.4, 40))))] = True
+    rig.around.seen_s[rig.grid.cells(np.column_stack((np.full(40, 2.0), np.linspace(4.4, 6.4, 40))))] = 0.0
     with pytest.raises(NoWayError, match="too narrow"):
         plan(rig.around, rig.pose, OFFICE)
+
+
+def test_what_was_not_seen_for_longest_is_forgotten_where_it_leaves_no_way():
+    rig = Rig()
+    now_s, rows = rig.simulation.now_s, np.linspace(4.4, 6.4, 40)
+    old, new, fresh = (rig.grid.cells(np.column_stack((np.full(40, x), rows))) for x in (2.0, 4.0, 6.0))
+    rig.around.seen_s[old], rig.around.seen_s[new] = now_s - 30.0, now_s - 10.0
+    nearer = (3.0, 5.4, 0.0)
+    assert len(plan_anew(rig.around, rig.pose, nearer, now_s))
+    assert not rig.around.seen[old].any()
+    assert rig.around.seen[new].all()
+    rig.around.seen_s[old], rig.around.seen_s[fresh] = now_s - 30.0, now_s
+    with pytest.raises(NoWayError, match="too narrow"):
+        plan_anew(rig.around, rig.pose, OFFICE, now_s)
+    assert rig.around.seen[old].all()  # nothing is forgotten for nothing
+
+
+def test_a_door_that_is_shut_is_seen_and_the_other_way_taken():
+    rig = Rig(doors=("office", "side"))
+    assert rig.run(Drive(rig.around, KITCHEN), 150.0) == ARRIVED
+    assert rig.simulation.truth.distance_m > 20.0  # through the office
+    assert rig.simulation.truth.collisions == 0

@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_navigation.following import STAND, Twist, careful, carrot, towards, turn
 from rover_navigation.geometry import Points, Pose, inverse, transformed, wrapped
-from rover_navigation.planning import NoWayError, Surroundings, plan
+from rover_navigation.planning import NoWayError, Surroundings, plan, plan_anew
 
 ARRIVED_M, ARRIVED_RAD = 0.12, 0.1
 SPEED_M_S, CREEP_M_S, DOCK_M_S = 0.5, 0.15, 0.1
@@ -100,7 +100,11 @@ class Drive:
     def _plan(self, now: Situation) -> None:
         self.planned_s = now.now_s
         try:
-            self.way, self.no_way = plan(self.around, now.pose, self.goal, seen=self.laser), ""
+            if self.laser:
+                self.way = plan_anew(self.around, now.pose, self.goal, now.now_s)
+            else:
+                self.way = plan(self.around, now.pose, self.goal, seen=False)
+            self.no_way = ""
         except NoWayError as error:
             self.way, self.no_way = None, str(error)
 

@@ -111,7 +111,7 @@ class NavigationNode:
         with self._lock:
             self._points, self._scan_s = points_of_scan(scan), scan.header.stamp.to_sec()
             if self._pose is not None:
-                self._around.look(self._pose, self._points, free_of_scan(scan))
+                self._around.look(self._pose, self._points, free_of_scan(scan), self._scan_s)
 
     def _on_bumper(self, message: Bool) -> None:
         self._bumped = message.data

@@ -16,6 +16,7 @@ KEEP_M = 0.5  # ways nearer to something than this cost more
 COARSE = 2  # planning's cells are so many of the map's
 SEEN_M = 0.15  # what the laser hits so near to something of the map is no news
 LEAVE_M = 0.4  # around the rover itself ways are allowed that are too narrow: it stands there
+RECENT_S = 2.0  # what was seen within it is there
 
 
 class NoWayError(Exception):
@@ -23,22 +24,31 @@ class NoWayError(Exception):
 
 
 class Surroundings:
-    """The map, and what has been seen that is not on it: it stays until a beam goes through where it was."""
+    """The map, and when something that is not on it was last seen where: it stays until a beam goes through where it was.
+
+    Who walks leaves marks in their own shadow, where no beam goes through. So what was not seen for longest is forgotten where there
+    is no way else.
+    """
 
     def __init__(self, grid: GridMap) -> None:
         self.grid = grid
-        self.seen = np.zeros_like(grid.occupied)
+        self.seen_s = np.full(grid.occupied.shape, -np.inf)
 
-    def look(self, pose: Pose, points: Points, free: Points) -> None:
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Return the cells in which something was seen."""
+        return np.isfinite(self.seen_s)
+
+    def look(self, pose: Pose, points: Points, free: Points, now_s: float) -> None:
         """Take in what the laser hit, and how far the beams came that hit nothing; both in base_link, from a pose in map."""
         self._clear(pose, np.vstack((points, free)))
         cells = self.grid.cells(transformed(pose, points))
         news = self.grid.distance_m[cells] > SEEN_M
-        self.seen[cells[0][news], cells[1][news]] = True
+        self.seen_s[cells[0][news], cells[1][news]] = now_s
 
-    def forget(self) -> None:
-        """Forget what was seen: after the pose was wrong it is in wrong places."""
-        self.seen[:] = False
+    def forget(self, until_s: float = np.inf) -> None:
+        """Forget what was not seen after a time; all: after the pose was wrong it is in wrong places."""
+        self.seen_s[self.seen_s <= until_s] = -np.inf
 
     def distance_m(self, *, seen: bool) -> NDArray[np.float64]:
         """Return how far each cell is from the next occupied one; ``seen``: also from what was seen."""
@@ -51,7 +61,46 @@ class Surroundings:
         steps = np.arange(RADIUS_M, far.max(initial=RADIUS_M), self.grid.resolution_m)
         rays = ends[:, None, :] / far[:, None, None] * steps[None, :, None]
         before = steps[None, :] < far[:, None] - 2.0 * self.grid.resolution_m
-        self.seen[self.grid.cells(transformed(pose, rays[before]))] = False
+        self.seen_s[self.grid.cells(transformed(pose, rays[before]))] = -np.inf
+
+
+def plan_anew(around: Surroundings, start: Pose, goal: Pose, now_s: float) -> Points:
+    """Plan; where no way is left, forget what was not seen for longest, as little of it as there is a way again.
+
+    Raises:
+        NoWayError: as ``plan``, also without all that was not seen within the last RECENT_S; then nothing is forgotten.
+    """
+    try:
+        return plan(around, start, goal)
+    except NoWayError:
+        before, times = around.seen_s.copy(), np.unique(around.seen_s[around.seen])
+        old = times[times < now_s - RECENT_S]
+        if not len(old):
+            raise
+    few, most = 0, len(old) - 1  # the way is searched for by halves: with more forgotten there is one all the more
+    try:
+        while few < most:
+            middle = (few + most) // 2
+            few, most = (few, middle) if _a_way(around, before, old[middle], start, goal) else (middle + 1, most)
+        _without(around, before, old[most])
+        return plan(around, start, goal)
+    except NoWayError:
+        around.seen_s[:] = before
+        raise
+
+
+def _a_way(around: Surroundings, before: NDArray[np.float64], until_s: float, start: Pose, goal: Pose) -> bool:
+    _without(around, before, until_s)
+    try:
+        plan(around, start, goal)
+    except NoWayError:
+        return False
+    return True
+
+
+def _without(around: Surroundings, before: NDArray[np.float64], until_s: float) -> None:
+    around.seen_s[:] = before
+    around.forget(until_s)
 
 
 def plan(around: Surroundings, start: Pose, goal: Pose, *, seen: bool = True) -> Points:
