@@ -108,7 +108,7 @@ def called(module: str) -> str:
 def dependencies(*, extra: bool) -> set[str]:
     project = tomllib.loads((LIBRARY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     optional = [name for names in project["optional-dependencies"].values() for name in names if not name.startswith("alula")]
-    return set(optional if extra else project["dependencies"])
+    return {re.split("[<>=]", name)[0] for name in (optional if extra else project["dependencies"])}
 
 
 @pytest.mark.parametrize("package", GENERAL)

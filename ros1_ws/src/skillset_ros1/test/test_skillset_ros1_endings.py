@@ -39,7 +39,7 @@ class Served:
         assert self.client.wait_ready(SOON_S)
         transition = rospy.ServiceProxy(f"{self.namespace}/navigation/transition", Transition)
         for resource, state in {"SDK_authority": "AVAILABLE", "homepoint_status": "VALID"}.items():
-            assert transition(resource, state).accepted
+            assert transition(resource, state, "").accepted
         handle = self.client.start("takeoff", height=3, speed=1)
         until(lambda: handle.state is S.RUNNING, f"takeoff runs, it is {handle}: {handle.message}")
         return handle

@@ -167,7 +167,8 @@ def test_skills_and_resources(whole):
     assert (takeoff["skillset"], takeoff["id"], takeoff["inputs"]) == ("navigation", "t1", {"height": 3.0, "speed": 2.0})
     assert (takeoff["start_s"], takeoff["running_s"], takeoff["end_s"]) == (-1.2, -1.18, 4.6)
     broken = [change for change in summary["resources"] if change["to"] == "BROKEN"]
-    assert broken == [{"t_s": 30.25, "skillset": "perception", "resource": "zed_status", "from": "OK", "to": "BROKEN", "cause": "extern"}]
+    change = {"skillset": "perception", "resource": "zed_status", "from": "OK", "to": "BROKEN", "cause": "extern", "reason": ""}
+    assert broken == [{"t_s": 30.25, **change}]
 
 
 def test_the_files(whole):

@@ -74,7 +74,7 @@ def command(name, *words):
 
 def test_the_checker_finds_nothing_in_the_drones_missions():
     names = ["missions/mapping.xml", "missions/inspection.xml"]
-    files = json.loads(command("check", "--json", *names))["files"]
+    files = json.loads(command("check", "--no-proofs", "--json", *names))["files"]
     assert [(one["file"], one["findings"]) for one in files] == [(name, []) for name in names]
 
 

@@ -149,21 +149,28 @@ class OfflineWorker(Generic[Item]):
 
 
 class OfflineReporter:
-    """Reports extern transitions, each as a call that was accepted."""
+    """Reports extern transitions and their reasons, each as a call that was accepted; see ``resource_reporter.ResourceReporter``."""
 
     graph: Graph
 
     def __init__(self, skillset: str) -> None:
         self._skillset = skillset
-        self._states: dict[str, str] = {}
+        self._shown: dict[str, tuple[str, str]] = {}
 
-    def report(self, resource: str, state: str) -> None:
-        """Say that the hardware's resource has this state."""
-        before, self._states[resource] = self._states.get(resource, "UNKNOWN"), state
-        if before != state:
+    def report(self, resource: str, state: str, reason: str = "", *, insist: bool = True) -> None:
+        """Say that the hardware's resource has this state, and why.
+
+        What the skillset shows before the first call is not known here: a reason alone is told only of what was said here.
+        """
+        before, known = self._shown.get(resource, ("UNKNOWN", reason))
+        if insist if before != state else reason not in {"", known}:
+            self._shown[resource] = state, reason
             now_s = self.graph.now_ns / 1e9
-            response = {"accepted": True, "reason": "", "state": state}
-            call = {"service": f"/{self._skillset}/transition", "request": {"resource": resource, "to": state}, "response": response}
+            call = {
+                "service": f"/{self._skillset}/transition",
+                "request": {"resource": resource, "to": state, "reason": reason},
+                "response": {"accepted": True, "reason": "", "state": state},
+            }
             self.graph.publish(CALLS, String(data=json.dumps({**call, "error": "", "begin_s": now_s, "end_s": now_s})))
 
 
