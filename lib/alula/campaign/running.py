@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -59,7 +60,7 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: s
 
 def _words(campaign: Campaign) -> tuple[str, ...]:
     try:
-        return tuple(words_of(campaign.options, ask_options())) if campaign.options else ()
+        return tuple(words_of(campaign.options, asyncio.run(ask_options()))) if campaign.options else ()
     except RequestError as error:
         raise AnalysisError(f"`options`: {error}") from None
 

@@ -11,7 +11,7 @@ import json
 import secrets
 import sys
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from http import HTTPStatus
@@ -74,7 +74,12 @@ class Console:
     """
 
     def __init__(
-        self, admission: Admission, link: Link, *, fixed: Path | None = None, ask_options: Callable[[], Sequence[RunOption]] = tuple
+        self,
+        admission: Admission,
+        link: Link,
+        *,
+        fixed: Path | None = None,
+        ask_options: Callable[[], Awaitable[Sequence[RunOption]]] | None = None,
     ) -> None:
         self._admission = admission
         self._fixed = fixed
@@ -105,8 +110,9 @@ class Console:
         class Known(ServerConnection):
             """A connection that is found at the end whether it has asked for something or not."""
 
-            def __init__(self, *given: Any, **named: Any) -> None:
-                super().__init__(*given, **named)
+            def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                """Note the connection: one that is still at its TLS handshake has no transport yet, and nothing to be aborted."""
+                super().connection_made(transport)
                 connections.add(self)
 
         looking = [
@@ -193,7 +199,7 @@ class Console:
     async def _learn_options(self) -> None:
         """Ask once, as it takes a second or two; until then, and where no live run can be started here, the page offers mocks only."""
         try:
-            self._options = await asyncio.to_thread(self._ask_options)
+            self._options = await self._ask_options() if self._ask_options else ()
         except RequestError as error:
             sys.stderr.write(f"alula console: runs can be started over mocks only: {error}\n")
             return

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
 import json
 import os
 import re
+import signal
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -62,15 +64,29 @@ def as_json(part: RunPart) -> str:
     return json.dumps([asdict(option) for option in options_of(part)])
 
 
-def ask_options() -> list[RunOption]:
-    """Ask the robot's ``alula run``; raises RequestError, with its words, where the robot can't be run live here."""
+async def ask_options() -> list[RunOption]:
+    """Ask the robot's ``alula run``; raises RequestError, with its words, where the robot can't be run live here.
+
+    Who is cancelled while it waits leaves no process behind.
+    """
     try:
-        done = subprocess.run(
-            [entry(), "run", FLAG], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=TIMEOUT_S
-        )
-        if done.returncode:
-            raise RequestError((done.stderr.strip().splitlines() or [f"alula run {FLAG} ended with {done.returncode}"])[-1])
-        return [RunOption(**{**said, "choices": tuple(said["choices"])}) for said in json.loads(done.stdout)]
+        # Started at once rather than by asyncio: who is cancelled while asyncio starts a process doesn't get to know its group.
+        with subprocess.Popen(  # noqa: ASYNC220
+            [entry(), "run", FLAG],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        ) as asked:
+            try:
+                told, why = await asyncio.to_thread(asked.communicate, timeout=TIMEOUT_S)
+            finally:
+                if asked.poll() is None:
+                    os.killpg(asked.pid, signal.SIGTERM)
+        if asked.returncode:
+            raise RequestError((why.strip().splitlines() or [f"alula run {FLAG} ended with {asked.returncode}"])[-1])
+        return [RunOption(**{**said, "choices": tuple(said["choices"])}) for said in json.loads(told)]
     except (OSError, subprocess.TimeoutExpired, ValueError, TypeError) as error:
         raise RequestError(f"alula run {FLAG}: {error}") from None
 

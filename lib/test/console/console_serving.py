@@ -126,13 +126,16 @@ class Served:
             loop = asyncio.get_running_loop()
             self._stop = lambda: loop.call_soon_threadsafe(over.set)
             admission = Admission("127.0.0.1", self.port, "")
-            async with Console(admission, self._link, fixed=self._fixed, ask_options=lambda: self._options).open():
+            async with Console(admission, self._link, fixed=self._fixed, ask_options=self._told).open():
                 up.set()
                 await over.wait()
 
         self._thread = threading.Thread(target=lambda: asyncio.run(main()), daemon=True)
         self._thread.start()
         assert up.wait(WAIT_S)
+
+    async def _told(self) -> Sequence[RunOption]:
+        return self._options
 
     @property
     def address(self) -> str:

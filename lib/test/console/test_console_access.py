@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import http.client
 import json
 import os
 import ssl
 import subprocess
 import sys
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -193,36 +195,66 @@ def test_files_that_are_no_certificate_end_with_2(tmp_path: Path, certificate: P
 
 
 @pytest.fixture
-def console(tmp_path: Path) -> Iterator[Callable[..., tuple[str, str]]]:
-    """Start the command; return its address, and its first line on standard error."""
+def console(tmp_path: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start the command, which asks `alula run --options` of a folder where that never answers."""
     started: list[subprocess.Popen[str]] = []
+    (tmp_path / "alula").write_text(f"#!/bin/sh\necho $$ > {tmp_path}/asked\nsleep 600\n", encoding="utf-8")
+    (tmp_path / "alula").chmod(0o700)
+    environment = {**os.environ, "ALULA_STATE": str(tmp_path), "ALULA_ROOT": str(tmp_path)}
 
-    def start(*words: str) -> tuple[str, str]:
+    def start(*words: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "alula.console", "--port", str(free_port()), *words]
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "ALULA_STATE": str(tmp_path)}
-        )
-        started.append(process)
-        assert process.stdout is not None
-        assert process.stderr is not None
-        return process.stdout.readline().strip(), process.stderr.readline().strip()
+        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment))
+        return started[-1]
 
     yield start
     for process in started:
         process.terminate()
-        process.wait(WAIT_S)
+        process.communicate(timeout=WAIT_S)
+
+
+def first_lines(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """Return the address, and the first line on standard error."""
+    assert process.stdout is not None
+    assert process.stderr is not None
+    return process.stdout.readline().strip(), process.stderr.readline().strip()
 
 
 def test_elsewhere_is_served_over_tls_with_a_fingerprint_and_loopback_plainly(
-    console: Callable[..., tuple[str, str]], tmp_path: Path
+    console: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
-    address, known_by = console("--host", "0.0.0.0")  # noqa: S104 - what is tested
+    address, known_by = first_lines(console("--host", "0.0.0.0"))  # noqa: S104 - what is tested
     assert address.startswith("https://")
     assert "0.0.0.0" not in address  # noqa: S104
     assert known_by.endswith(f"SHA-256 fingerprint: {fingerprint(tmp_path / 'console' / NAME)}")
-    plain, _ = console("--host", "0.0.0.0", "--plain")  # noqa: S104
+    plain, _ = first_lines(console("--host", "0.0.0.0", "--plain"))  # noqa: S104
     assert plain.startswith("http://")
     assert "?token=" in plain
-    own, _ = console()
+    own, _ = first_lines(console())
     assert own.startswith("http://127.0.0.1:")
     assert "token" not in own
+
+
+def test_its_end_waits_for_no_answer_and_leaves_no_process(console: Callable[..., subprocess.Popen[str]], tmp_path: Path) -> None:
+    process = console()
+    first_lines(process)
+    asked = tmp_path / "asked"
+    until(lambda: asked.exists() and asked.read_text(encoding="utf-8").endswith("\n"))
+    process.terminate()
+    process.communicate(timeout=WAIT_S)
+    assert process.returncode == 0
+    until(lambda: not is_group(int(asked.read_text(encoding="utf-8"))))
+
+
+def is_group(number: int) -> bool:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(number, 0)
+        return True
+    return False
+
+
+def until(happened: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + WAIT_S
+    while not happened():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
