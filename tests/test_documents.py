@@ -88,11 +88,17 @@ def files() -> frozenset[str]:
     return frozenset(GENERATED).union(path.name for room in ROOMS for path in (ALULA_ROOT / room).rglob("*") if path.is_file())
 
 
+def robot_of(page: Path) -> Path:
+    """Return the folder that a page names paths in: that of the robot that it belongs to."""
+    return next(folder for folder in page.parents if folder == ALULA_ROOT or (folder / "robot.yaml").is_file())
+
+
 def missing_paths(page: Path) -> Iterator[str]:
     """Yield the paths below a room, and the source files, that a page names and that are not there."""
     code = spans(page.read_text())
+    roots = {ALULA_ROOT, robot_of(page)}
     for path in re.findall(r"(?<![\w/.~$-])(?:\./)?((?:[\w@.+-]+/)+[\w@.*+-]*)", code):
-        if path.split("/")[0] in ROOMS and not EXAMPLE.search(path) and not list(ALULA_ROOT.glob(path.rstrip("./"))):
+        if path.split("/")[0] in ROOMS and not EXAMPLE.search(path) and not any(list(root.glob(path.rstrip("./"))) for root in roots):
             yield path
     for path in re.findall(r"(?<![\w/.*<@-])((?:\w+/)*\w+\.(?:py|js|cpp|hpp|launch|srv|msg))\b(?!\.)", code):
         if not EXAMPLE.search(path) and path.split("/")[-1] not in files():
