@@ -8,7 +8,6 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 from skillset_interfaces.msg import Event
@@ -18,7 +17,7 @@ from alula.runtime.core.events import EngineEvent, TransitionEvent
 from skill_bench.cases import FREE, INPUT, LOST, Case, make_skillset, resource_name, skill_name
 from skill_bench.processes import follow
 from skill_bench.servers import ACTION, BARE_ACTION, BARE_TOPIC, make_interfaces
-from skillset_ros2 import SkillHandle, SkillsetClient
+from skillset_ros2 import ActionClient, SkillHandle, SkillsetClient
 from skillset_ros2.names import EVENTS
 from skillset_ros2.session import Session
 

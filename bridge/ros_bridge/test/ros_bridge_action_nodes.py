@@ -6,42 +6,16 @@ import uuid
 
 import rclpy
 from bridge_test_interfaces.action import Count
-from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from ros_bridge_harness import wait_until
 
 from alula_testing.ros2 import spin
+from skillset_ros2 import ActionClient
 
 WITHIN_S = 20.0
 MET_S = 3.0
-
-
-class CountClient(ActionClient):
-    """A client whose responses wait until their requests are noted down.
-
-    rclpy 7.1.6 sends a request first and notes it then; a response that another thread of the executor takes in between is dropped.
-    """
-
-    def __init__(self, node: "ActionNode", name: str) -> None:
-        self._noting = threading.RLock()
-        super().__init__(node.node, Count, name, callback_group=node.group)
-
-    def take_data(self):
-        with self._noting:
-            return super().take_data()
-
-    def send_goal_async(self, *arguments):
-        with self._noting:
-            return super().send_goal_async(*arguments)
-
-    def _get_result_async(self, goal_handle):
-        with self._noting:
-            return super()._get_result_async(goal_handle)
-
-    def _cancel_goal_async(self, goal_handle):
-        with self._noting:
-            return super()._cancel_goal_async(goal_handle)
 
 
 class Sent:
@@ -110,7 +84,7 @@ class ActionNode:
 
     def client(self, name: str) -> ActionClient:
         if name not in self.clients:
-            self.clients[name] = CountClient(self, name)
+            self.clients[name] = ActionClient(self.node, Count, name, callback_group=self.group)
         assert self.clients[name].wait_for_server(WITHIN_S)
         return self.clients[name]
 

@@ -12,7 +12,7 @@ import pytest
 rclpy = pytest.importorskip("rclpy")
 
 from navigation_interfaces.action import Hover  # noqa: E402
-from rclpy.action import ActionClient, ActionServer  # noqa: E402
+from rclpy.action import ActionServer  # noqa: E402
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.exceptions import InvalidHandle  # noqa: E402
@@ -25,6 +25,7 @@ from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from alula_testing.waits import until  # noqa: E402
+from skillset_ros2 import ActionClient  # noqa: E402
 from skillset_ros2.executor import RclpyExecutor, SparingExecutor  # noqa: E402
 
 SOON_S = 20.0

@@ -13,7 +13,6 @@ navigation_actions = pytest.importorskip("navigation_interfaces.action")
 
 from action_msgs.msg import GoalStatus  # noqa: E402
 from navigation_managers.model import SKILLSET  # noqa: E402
-from rclpy.action import ActionClient  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from skillset_interfaces.msg import SkillStates  # noqa: E402
 from skillset_interfaces.srv import SetPaused, Why  # noqa: E402
@@ -24,7 +23,7 @@ from alula.runtime.core.errors import SkillRuntimeError  # noqa: E402
 from alula.runtime.hooks import SkillHooks  # noqa: E402
 from alula.runtime.workers import Workers  # noqa: E402
 from alula_testing.navigation import FLYING  # noqa: E402
-from skillset_ros2 import SkillsetNode  # noqa: E402
+from skillset_ros2 import ActionClient, SkillsetNode  # noqa: E402
 from skillset_ros2.names import LATCHED  # noqa: E402
 
 S = ExecutionState

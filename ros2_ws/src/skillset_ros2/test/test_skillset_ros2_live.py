@@ -20,7 +20,6 @@ from action_msgs.msg import GoalStatus, GoalStatusArray  # noqa: E402
 from geometry_msgs.msg import Point  # noqa: E402
 from navigation_managers.inputs import GotoStraightInputs  # noqa: E402
 from navigation_managers.model import SKILLSET  # noqa: E402
-from rclpy.action import ActionClient  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import qos_profile_action_status_default  # noqa: E402
@@ -40,7 +39,7 @@ from alula.model.json_form import from_json  # noqa: E402
 from alula.runtime.core.errors import SkillRuntimeError  # noqa: E402
 from alula_testing.navigation import FLYING, check_interrupt_and_violation, check_refusals  # noqa: E402
 from alula_testing.recorder import Recorder  # noqa: E402
-from skillset_ros2 import SkillsetClient, SkillsetNode  # noqa: E402
+from skillset_ros2 import ActionClient, SkillsetClient, SkillsetNode  # noqa: E402
 from skillset_ros2.names import EVENTS  # noqa: E402
 from skillset_ros2.spin import spin_until  # noqa: E402
 
@@ -261,12 +260,8 @@ def test_managers_that_are_shut_down_send_the_results_of_their_goals(spinning, p
     def ask(sent) -> None:
         sent.result().get_result_async().add_done_callback(lambda ended: results.append(ended.result().result.message))
 
-    def send() -> None:
-        for _ in range(goals):
-            actions.send_goal_async(navigation_actions.GotoStraight.Goal(speed=1.0)).add_done_callback(ask)
-
-    # On the thread that takes the responses: rclpy sends a goal before it notes it, and drops a response that comes in between.
-    node.executor.create_task(send)
+    for _ in range(goals):
+        actions.send_goal_async(navigation_actions.GotoStraight.Goal(speed=1.0)).add_done_callback(ask)
     until(lambda: client.resources["axes_authority"] == "USED" and len(results) == goals - 1, "one runs, the others are refused")
     served.send_signal(signal.SIGINT)
     until(lambda: len(results) == goals, "all have their results")

@@ -8,11 +8,11 @@ rclpy = pytest.importorskip("rclpy")
 navigation_actions = pytest.importorskip("navigation_interfaces.action")
 
 from action_msgs.msg import GoalStatus  # noqa: E402
-from rclpy.action import ActionClient  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from skillset_ros2_rig import SOON_S, Navigation, until  # noqa: E402
 
 from alula_testing.navigation import FLYING  # noqa: E402
+from skillset_ros2 import ActionClient  # noqa: E402
 
 KEPT_S = 900.0
 """rclpy's default (``result_timeout`` of ``ActionServer``, 7.1.6)."""

@@ -10,7 +10,7 @@ from action_msgs.msg import GoalStatus
 from alula.runtime.hooks import SkillHooks
 from geometry_msgs.msg import Pose2D
 from move_base_msgs.action import MoveBase
-from rclpy.action import ActionClient
+from skillset_ros2 import ActionClient
 
 if TYPE_CHECKING:
     from alula.runtime.core.execution import Execution
