@@ -33,13 +33,26 @@ Take = Callable[[Any], Any]
 
 
 class RclpyExecutor(SingleThreadedExecutor):  # type: ignore[misc]  # rclpy has no types
-    """Runs callbacks in the thread that spins it: rclpy's own executor, and whether it has something left to do."""
+    """Runs callbacks in the thread that spins it: rclpy's own executor, but for what another thread destroys while it waits."""
 
     @property
     def idle(self) -> bool:
         """Whether no task is left to be done, but for one that asks."""
         with self._tasks_lock:
             return all(_over(task) or task.executing() for task, _, _ in self._tasks)
+
+    def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> Any:
+        """Return what is to be run next, its entity and node. No callback runs in here, so what is raised is of the wait itself."""
+        end_s = math.inf
+        while True:
+            try:
+                return super().wait_for_ready_callbacks(*args, **kwargs)
+            except (InvalidHandle, rclpy_implementation.RCLError):
+                # Another thread has destroyed something, which it takes off its node's list next. What was ready is found so again.
+                end_s = min(end_s, time.monotonic() + DESTROYED_S)
+                if time.monotonic() > end_s:
+                    raise
+                time.sleep(AGAIN_S)
 
 
 class SparingExecutor(RclpyExecutor):
@@ -52,18 +65,9 @@ class SparingExecutor(RclpyExecutor):
         self._awaited: weakref.WeakSet[Future] = weakref.WeakSet()
 
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> Any:
-        """Return what is to be run next, its entity and node. No callback runs in here, so what is raised is of the wait itself."""
+        """Return what is to be run next, its entity and node."""
         self._follow(self._run)
-        found, end_s = None, math.inf
-        while found is None:
-            try:
-                found = super().wait_for_ready_callbacks(*args, **kwargs)
-            except (InvalidHandle, rclpy_implementation.RCLError):
-                # Another thread has destroyed something, which it takes off its node's list next. What was ready is found so again.
-                end_s = min(end_s, time.monotonic() + DESTROYED_S)
-                if time.monotonic() > end_s:
-                    raise
-                time.sleep(AGAIN_S)
+        found = super().wait_for_ready_callbacks(*args, **kwargs)
         self._run = found[0]
         return found
 

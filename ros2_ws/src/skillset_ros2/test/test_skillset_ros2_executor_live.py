@@ -13,7 +13,7 @@ rclpy = pytest.importorskip("rclpy")
 import skillset_ros2_executor_rig as rig  # noqa: E402
 from action_msgs.msg import GoalStatus  # noqa: E402
 from navigation_interfaces.action import Hover  # noqa: E402
-from rclpy.action import ActionClient, ActionServer  # noqa: E402
+from rclpy.action import ActionServer  # noqa: E402
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup  # noqa: E402
 from rclpy.task import Future  # noqa: E402
 from skillset_ros2_executor_rig import DEEP, SOON_S, Counting, First, all_arrived, connected, quiet, turn, turned  # noqa: E402
@@ -21,6 +21,7 @@ from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from alula_testing.waits import until  # noqa: E402
+from skillset_ros2 import ActionClient  # noqa: E402
 from skillset_ros2.base import QUIET, RestingGroup  # noqa: E402
 from skillset_ros2.executor import RCLPY, NodeExecutor, RclpyExecutor, SparingExecutor, executor_for  # noqa: E402
 
@@ -420,11 +421,11 @@ def test_a_turn_lasts_as_long_as_it_may_and_not_longer_than_it_must(node, execut
 # --- which executor -------------------------------------------------------------------------------------------------
 
 
-def test_with_another_rclpy_than_the_pinned_one_its_own_executor_is_taken():
+def test_with_another_rclpy_than_the_pinned_one_its_own_loop_and_handlers_are_taken():
     assert NodeExecutor is executor_for(RCLPY) is SparingExecutor
     assert executor_for("7.1.7") is executor_for("") is RclpyExecutor
     changed = set(vars(RclpyExecutor)) - set(vars(object)) - {"__module__", "__doc__", "__dict__", "__weakref__", "__annotations__"}
-    assert changed - {"__abstractmethods__", "_abc_impl", "__parameters__", "__orig_bases__"} == {"idle"}
+    assert changed - {"__abstractmethods__", "_abc_impl", "__parameters__", "__orig_bases__"} == {"idle", "wait_for_ready_callbacks"}
 
 
 def test_the_pinned_rclpy_is_the_one_that_the_executor_knows():
