@@ -1,14 +1,14 @@
 """What the nodes say of a recorded flight, and of the same flight with a sensor that breaks: ``./alula bench perception --recording BAG``.
 
-The bag is a run's ``functional.bag`` with raw measurements (``--record sensors``). The pure parts of the nodes are driven as the nodes
-drive them; a sensor breaks as the simulator breaks it.
+The bag is a run's ``functional.bag`` with raw measurements (``--record sensors``). The cores of the nodes judge its measurements; a
+sensor breaks as the simulator breaks it.
 """
 
 from __future__ import annotations
 
 import bisect
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -18,28 +18,18 @@ import rosbag
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 
-from lidar_obstacles import CloudJudge, LidarAhead, LidarSettings, MountCheck
-from perception_core import (
-    NS,
-    Finding,
-    HealthLimits,
-    HealthWatch,
-    Motion,
-    PoseBuffer,
-    StampJudge,
-    Sweep,
-    SweepStamps,
-    TurnJoiner,
-    Verdict,
-    first_trouble,
-)
+from lidar_obstacles import LidarSettings
+from lidar_obstacles.core import LidarObstacles
+from perception_core import NS, Ahead, Finding, HealthLimits, HealthWatch, Motion, PoseBuffer, Sweep, Verdict
 from perception_core.clouds import sweep_of_cloud
+from perception_core.conversions import matrix_of_transform
 from perception_core.images import GrayConverter
-from perception_core.ros import matrix_of_transform
+from perception_core.vehicle import BASE, Vehicle
 from uav_simulator.sensors import degradation
 from uav_simulator.sensors.faults import FAULTS, SensorMode
 from uav_simulator.sensors.lidar import POINT_DTYPE
-from zed_depth import Pairing, StereoPair, StereoRig, ZedSettings, look_ahead
+from zed_depth import Pairing, StereoPair, ZedSettings
+from zed_depth.core import ZedDepth
 
 Floats = NDArray[np.float64]
 WORDS = ("free", "unknown", "obstacle")
@@ -109,8 +99,51 @@ class Sensor(Protocol):
         """Return the finding of measurement ``k``, broken since ``last_good``, and what of `WORDS` it says, if it is to ``look``."""
 
 
+class RecordingHost:
+    """Runs a core of which single steps are called: it knows when the measurement at hand has arrived, and takes nothing."""
+
+    def __init__(self) -> None:
+        self.arrived_ns = 0
+
+    def now_ns(self) -> int:
+        """Return when the measurement arrived."""
+        return self.arrived_ns
+
+    def publish(self, topic: str, message: object) -> None:
+        """Take nothing."""
+
+    def wanted(self, _topic: str) -> bool:
+        """Return that nobody takes it."""
+        return False
+
+    def published(self, _topic: str) -> bool:
+        """Return that the recording publishes it."""
+        return True
+
+    def done(self, stamp_ns: int) -> None:
+        """Wait for nobody."""
+
+    def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
+        """Take nothing."""
+
+    def offer(self, work: Callable[[], None]) -> None:
+        """Take nothing."""
+
+    def info(self, text: str) -> None:
+        """Take nothing."""
+
+    def warn(self, about: str, text: str, *, every_s: float = 2.0) -> None:
+        """Take nothing."""
+
+
+def _know(vehicle: Vehicle, recording: Recording) -> None:
+    vehicle.poses = recording.poses
+    for frame, mount in recording.mounts.items():
+        vehicle.set_mount(BASE, frame, mount)
+
+
 class Camera:
-    """The node /zed_depth without ROS: the same cores, fed with a recording's image pairs."""
+    """The core of /zed_depth, fed with a recording's image pairs."""
 
     def __init__(self, recording: Recording) -> None:
         self.name, self._recording, self._settings = "zed", recording, ZedSettings()
@@ -119,15 +152,12 @@ class Camera:
 
     def restart(self) -> None:
         """Begin as a node does."""
-        self._rig, self._stamps = StereoRig(self._settings, self._camera_pose), StampJudge(self._settings.stamps)
+        self._host = RecordingHost()
+        self._core = ZedDepth(self._settings, self._host)
+        self._core.frame = "zed_left"
+        _know(self._core.vehicle, self._recording)
         self._rng = np.random.default_rng(0)
         self._info(1)
-
-    def _camera_pose(self, stamp_ns: int) -> Floats | None:
-        try:
-            return self._recording.poses.at([stamp_ns]).matrix() @ self._recording.mounts["zed_left"]
-        except LookupError:
-            return None
 
     def _info(self, scale: int) -> None:
         for side, info in self._recording.infos.items():
@@ -135,37 +165,25 @@ class Camera:
             P = [*matrices["P"][:10], 1.0, 0.0]  # noqa: N806 -- the message's name
             told = CameraInfo(height=info.height * scale, width=info.width * scale, D=info.D, K=[*matrices["K"][:8], 1.0], R=info.R, P=P)
             told.distortion_model = info.distortion_model
-            self._rig.take_info(side, told)
+            self._core.take_info(side, told)
 
     def take(self, k: int, mode: SensorMode, last_good: int, *, look: bool) -> tuple[Finding, str]:
         """Return the finding of a pair, and what it says."""
-        recording = self._recording
+        recording, core = self._recording, self._core
         given, shown = recording.pairs[k], recording.pairs[last_good if mode in REPEATED else k]
         left, right = degradation.pair(mode, (shown.left, shown.right), self._rng)
         pair = StereoPair(given.stamp_ns + SHIFTED_NS.get(mode, 0), left, right)
         if mode is SensorMode.WRONG_INFO and k == last_good + 1:
             self._info(2)
-        finding = first_trouble(self._stamps.finding(pair.stamp_ns, given.stamp_ns), self._rig.finding(pair))
+        self._host.arrived_ns, core.vehicle.motion = given.stamp_ns, recording.motion(pair.stamp_ns)
+        finding = core.finding(pair)
         if not finding.ok or not look:
             return finding, "unknown"
-        depth = self._rig.depth(pair)
-        try:
-            ahead = look_ahead(
-                depth.metres,
-                pair.stamp_ns,
-                geometry=depth.geometry,
-                T_base_camera=recording.mounts["zed_left"],
-                poses=recording.poses,
-                motion=recording.motion(pair.stamp_ns),
-                settings=self._settings.ahead,
-            )
-        except LookupError:
-            return finding, "unknown"
-        return finding, _word(ahead.nearest, ahead.unknown or depth.doubt)
+        return finding, _word(lambda: core.ahead(core.depth(pair), pair.stamp_ns))
 
 
 class Scanner:
-    """The node /lidar_obstacles without ROS: the same cores, fed with a recording's sweeps."""
+    """The core of /lidar_obstacles, fed with a recording's sweeps."""
 
     def __init__(self, recording: Recording) -> None:
         self.name, self._recording, self._settings = "lidar", recording, LidarSettings()
@@ -174,40 +192,29 @@ class Scanner:
 
     def restart(self) -> None:
         """Begin as a node does."""
-        settings = self._settings
-        self._judge, self._ahead, self._stamps = CloudJudge(settings.cloud), LidarAhead(settings.ahead), StampJudge(settings.stamps)
-        self._sweep_stamps, self._turns, self._mounting = SweepStamps(), TurnJoiner(), MountCheck()
+        self._host = RecordingHost()
+        self._core = LidarObstacles(self._settings, self._host)
+        _know(self._core.vehicle, self._recording)
         self._rng = np.random.default_rng(0)
 
     def take(self, k: int, mode: SensorMode, last_good: int, *, look: bool) -> tuple[Finding, str]:
         """Return the finding of a sweep, and what it says."""
-        recording, given = self._recording, self._recording.sweeps[k]
+        recording, core, given = self._recording, self._core, self._recording.sweeps[k]
         sweep = _broken_sweep(mode, recording.sweeps[last_good if mode in REPEATED else k], self._rng)
         sweep = replace(sweep, stamp_ns=given.stamp_ns + SHIFTED_NS.get(mode, 0))
-        sweep = self._turns.joined(self._sweep_stamps.begun(sweep, given.end_ns))
-        stamp = self._stamps.finding(sweep.end_ns, given.end_ns)
-        position_m, self_m = self._position_m(sweep.end_ns), self._settings.body_radius_m
-        motion, mount = recording.motion(sweep.end_ns), recording.mounts["lidar"]
-        finding = first_trouble(stamp, self._judge.finding(sweep, self_m=self_m, position_m=position_m))
-        finding = self._mounting.finding(sweep, mount, recording.poses, self_m=self_m) if finding.ok else finding
-        if not finding.ok or not look:
-            return finding, "unknown"
-        try:
-            ahead = self._ahead.look(sweep, T_base_lidar=mount, poses=recording.poses, motion=motion, gone=self._judge.gone)
-        except LookupError:
-            return finding, "unknown"
-        return finding, _word(ahead.nearest, ahead.unknown)
-
-    def _position_m(self, stamp_ns: int) -> Floats | None:
-        try:
-            poses = self._recording.poses.at([stamp_ns])
-        except LookupError:
-            return None
-        return poses.matrix()[:3, 3]
+        self._host.arrived_ns, core.vehicle.motion = given.end_ns, recording.motion(sweep.end_ns)
+        judged = core.judged(sweep, "lidar")
+        if not judged.finding.ok or not look:
+            return judged.finding, "unknown"
+        return judged.finding, _word(lambda: core.ahead(judged, "lidar"))
 
 
-def _word(nearest: object, unknown: str) -> str:
-    return "obstacle" if nearest is not None else "unknown" if unknown else "free"
+def _word(look: Callable[[], Ahead]) -> str:
+    try:
+        ahead = look()
+    except LookupError:
+        return "unknown"
+    return "obstacle" if ahead.nearest is not None else "unknown" if ahead.unknown else "free"
 
 
 def _broken_sweep(mode: SensorMode, sweep: Sweep, rng: np.random.Generator) -> Sweep:

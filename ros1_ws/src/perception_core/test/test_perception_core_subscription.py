@@ -10,8 +10,11 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import String
 
 from alula_testing.ros1 import wait_until
-from perception_core.ros import RawSubscriber, subscription
+from perception_core.host import Input
+from perception_core.ros import RawSubscriber, subscription, warn_of_garbage
 from perception_core.testing import framed, send_raw
+
+BUFFER_BYTES = 1 << 16
 
 
 @pytest.fixture
@@ -19,7 +22,7 @@ def link(ros_master):
     heard: list[float] = []
     garbage: list[str] = []
     publisher = rospy.Publisher("/raw/point", Point, queue_size=10)
-    subscriber = RawSubscriber("/raw/point", Point, lambda message: heard.append(message.x), garbage.append, buffer_bytes=1 << 16)
+    subscriber = RawSubscriber(Input("/raw/point", Point, lambda message: heard.append(message.x), garbage.append, BUFFER_BYTES))
     wait_until(publisher.get_num_connections, timeout_s=15.0, what="connected")
     yield publisher, heard, garbage
     subscriber.close()
@@ -80,7 +83,7 @@ def watched(ros_master, monkeypatch):
 def test_a_held_clock_is_no_silence(watched) -> None:
     """Simulated time waits for slow nodes: no message is due, so the connections stay as they are."""
     publisher = rospy.Publisher("/raw/held", Point, queue_size=10)
-    subscriber = RawSubscriber("/raw/held", Point, lambda _message: None, lambda _why: None, buffer_bytes=1 << 16)
+    subscriber = RawSubscriber(Input("/raw/held", Point, lambda _message: None, lambda _why: None, BUFFER_BYTES))
     wait_until(publisher.get_num_connections, timeout_s=15.0, what="connected")
     send_raw(publisher, struct.pack("<I", 24) + b"the rest is due")
     watched.look()
@@ -96,7 +99,7 @@ def test_a_topic_that_is_silent_by_nature_is_left_alone(watched) -> None:
     heard: list[float] = []
     publisher = rospy.Publisher("/raw/latched", Point, queue_size=10, latch=True)
     publisher.publish(Point(x=4.0))
-    subscriber = RawSubscriber("/raw/latched", Point, lambda message: heard.append(message.x), buffer_bytes=1 << 16)
+    subscriber = RawSubscriber(Input("/raw/latched", Point, lambda message: heard.append(message.x), warn_of_garbage, BUFFER_BYTES))
     wait_until(lambda: heard == [4.0], timeout_s=15.0, what="the latched message")
     for _ in range(3):
         watched.now_s += 100.0
@@ -112,7 +115,7 @@ def test_another_type_is_told(ros_master) -> None:
     garbage: list[str] = []
     publisher = rospy.Publisher("/raw/other", String, queue_size=10, latch=True)
     publisher.publish(String("x"))
-    subscriber = RawSubscriber("/raw/other", rospy.AnyMsg, lambda _message: None, garbage.append, buffer_bytes=1 << 16)
+    subscriber = RawSubscriber(Input("/raw/other", rospy.AnyMsg, lambda _message: None, garbage.append, BUFFER_BYTES))
     wait_until(lambda: bool(garbage), timeout_s=15.0, what="told")
     assert garbage[0] == "/raw/other carries std_msgs/String, expected *"
     subscriber.close()

@@ -10,14 +10,12 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
-from perception_core.ros import vehicle as module
-from perception_core.ros.conversions import GUIDANCE_MAP
-from perception_core.ros.vehicle import Vehicle
+from perception_core.conversions import GUIDANCE_MAP
+from perception_core.vehicle import Vehicle
 
 
 @pytest.fixture
-def vehicle(monkeypatch: pytest.MonkeyPatch) -> Vehicle:
-    monkeypatch.setattr(module, "RawSubscriber", lambda *_, **__: None)
+def vehicle() -> Vehicle:
     return Vehicle()
 
 

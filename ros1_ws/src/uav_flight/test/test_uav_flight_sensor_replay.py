@@ -17,7 +17,7 @@ from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
-from perception_core.ros import cloud_message
+from perception_core.conversions import cloud_message
 from perception_core.testing.flight import BASELINE_M, CX, CY, FX, _mounts
 from perception_core.testing.sensors import box_cloud, wall_pair
 

@@ -14,7 +14,7 @@ from std_msgs.msg import Header  # noqa: E402
 from tf2_msgs.msg import TFMessage  # noqa: E402
 from uav_msgs.msg import Obstacle  # noqa: E402
 
-from perception_core.ros import matrix_of_transform  # noqa: E402
+from perception_core.conversions import matrix_of_transform  # noqa: E402
 from uav_guidance.localization import Correction  # noqa: E402
 from uav_guidance.messages import correction_message, map_to_odom, pose_message, sighting  # noqa: E402
 from uav_guidance.vectors import Vec3  # noqa: E402

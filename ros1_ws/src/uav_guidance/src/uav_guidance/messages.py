@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, Obstacle
 
-from perception_core.ros.conversions import GUIDANCE_MAP, MAP, ODOMETRY
+from perception_core.conversions import GUIDANCE_MAP, MAP, ODOMETRY
 from uav_guidance.frames import turned, turned_about_vertical
 from uav_guidance.guidance import Report
 from uav_guidance.localization import Correction, Transform

@@ -31,7 +31,8 @@ from uav_msgs.srv import (
 )
 from uav_msgs.srv import TakeoffRequest as TakeoffCall
 
-from perception_core.ros import DoneReporter, RawSubscriber, TunableSettings, read_settings
+from perception_core.host import Input
+from perception_core.ros import DoneReporter, RawSubscriber, TunableSettings, read_settings, warn_of_garbage
 from resource_reporter import ResourceReporter, ToldService
 from uav_guidance import requests
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
@@ -91,9 +92,9 @@ class GuidanceNode:
             on_idle=self._report_done,
         )
         for topic in ("/zed_depth/obstacle", "/lidar_obstacles/obstacle"):
-            RawSubscriber(topic, Obstacle, self._on_obstacle, _on_garbage, buffer_bytes=BUFFER_BYTES, queue_size=5)
-        RawSubscriber("/lidar_mapping/state", MappingState, self._on_mapping, buffer_bytes=BUFFER_BYTES)
-        RawSubscriber("/tf", TFMessage, self._on_transforms, buffer_bytes=BUFFER_BYTES, queue_size=TRANSFORMS_WAITING)
+            RawSubscriber(Input(topic, Obstacle, self._on_obstacle, _on_garbage, BUFFER_BYTES, queue_size=5))
+        RawSubscriber(Input("/lidar_mapping/state", MappingState, self._on_mapping, warn_of_garbage, BUFFER_BYTES))
+        RawSubscriber(Input("/tf", TFMessage, self._on_transforms, warn_of_garbage, BUFFER_BYTES, queue_size=TRANSFORMS_WAITING))
         self._offer_services()
         self._tuning = TunableSettings(settings, self._tune)
 

@@ -4,29 +4,14 @@ from __future__ import annotations
 
 import math
 from threading import Lock, Thread
-from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-import genpy
 import rospy
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from perception_core.host import Input
 
 SILENCE_S = 2.0  # that the rest of a message may take; mission clock: while it is held, or the machine is slow, none is due
 LONGEST_SILENCE_S = 30.0
 LOOK_S = 0.5  # wall clock
-
-
-class MessageLike(Protocol):
-    """What is needed of a message's class."""
-
-    _type: str
-
-    def deserialize(self, data: bytes) -> object:
-        """Read the message from its bytes."""
-
-
-Message = TypeVar("Message", bound=MessageLike)
 
 
 def warn_of_garbage(reason: str) -> None:
@@ -64,27 +49,17 @@ class Stream:
         return True
 
 
-class RawSubscriber(Generic[Message]):
+class RawSubscriber:
     """Subscribe to bytes and decode them here.
 
     rospy decodes inside its receiving loop and keeps what can't be decoded at the head of its buffer: nothing after it is ever received.
-    So the bytes are taken as they are, and what can't be decoded is told to ``on_garbage``, with a sentence. A `Stream` that has lost the
+    So the bytes are taken as they are, and what can't be decoded is told to ``garbage``, with a sentence. A `Stream` that has lost the
     borders between its messages can't be decoded at all: the connections are rebuilt, at growing intervals. Where no bytes come, as mostly
     on a latched topic, nothing is wrong with the stream. Of messages that wait the newest ``queue_size`` are decoded.
     """
 
-    def __init__(
-        self,
-        topic: str,
-        kind: type[Message],
-        on_message: Callable[[Message], None],
-        on_garbage: Callable[[str], None] = warn_of_garbage,
-        *,
-        buffer_bytes: int,
-        queue_size: int = 1,
-    ) -> None:
-        self._topic, self._kind, self._buffer_bytes, self._queue_size = topic, kind, buffer_bytes, queue_size
-        self._on_message, self._on_garbage = on_message, on_garbage
+    def __init__(self, taken: Input) -> None:
+        self._input = taken
         self._lock = Lock()
         self._stream = Stream()
         self._reconnected_s = -math.inf
@@ -94,8 +69,8 @@ class RawSubscriber(Generic[Message]):
         self._watch.start()
 
     def _subscribe(self) -> rospy.Subscriber:
-        size, queue = self._buffer_bytes, self._queue_size
-        return rospy.Subscriber(self._topic, rospy.AnyMsg, self._on_bytes, queue_size=queue, buff_size=size, tcp_nodelay=True)
+        size, queue = self._input.buffer_bytes, self._input.queue_size
+        return rospy.Subscriber(self._input.topic, rospy.AnyMsg, self._on_bytes, queue_size=queue, buff_size=size, tcp_nodelay=True)
 
     @property
     def published(self) -> bool:
@@ -112,17 +87,7 @@ class RawSubscriber(Generic[Message]):
 
     def _on_bytes(self, raw: rospy.AnyMsg) -> None:
         sent = raw._connection_header.get("type", "*")  # noqa: SLF001 -- rospy's documented way to the publisher's type
-        wanted = self._kind._type  # noqa: SLF001 -- generated messages have it
-        if sent not in {"*", wanted}:
-            self._on_garbage(f"{self._topic} carries {sent}, expected {wanted}")
-            return
-        message = self._kind()
-        try:
-            message.deserialize(raw._buff)  # noqa: SLF001 -- all that an AnyMsg has
-        except (genpy.DeserializationError, ValueError, MemoryError) as error:
-            self._on_garbage(f"a message of {len(raw._buff)} bytes can't be decoded: {error}")  # noqa: SLF001
-            return
-        self._on_message(message)
+        self._input.take_bytes(sent, raw._buff)  # noqa: SLF001 -- all that an AnyMsg has
 
     def _watch_connections(self) -> None:
         pause = rospy.rostime.wallsleep

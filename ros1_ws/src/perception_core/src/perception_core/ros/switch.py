@@ -18,14 +18,12 @@ if TYPE_CHECKING:
 class EnableSwitch:
     """Serve ``~enable``, and keep the answer in the parameter ``~enabled``: a node started again after a crash goes on as it was."""
 
-    def __init__(self, *, enabled: bool, on_change: Callable[[bool], None] | None = None) -> None:
-        self.enabled = enabled
-        self._on_change = on_change
+    def __init__(self, switch: Callable[[bool], None]) -> None:
+        self._switch = switch
         self._service = ToldService("~enable", SetBool, self._serve)
 
     def _serve(self, request: SetBoolRequest) -> SetBoolResponse:
-        self.enabled = bool(request.data)
-        rospy.set_param("~enabled", self.enabled)
-        if self._on_change is not None:
-            self._on_change(self.enabled)
-        return SetBoolResponse(success=True, message="enabled" if self.enabled else "disabled")
+        enabled = bool(request.data)
+        rospy.set_param("~enabled", enabled)
+        self._switch(enabled)
+        return SetBoolResponse(success=True, message="enabled" if enabled else "disabled")

@@ -19,8 +19,8 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState, SensorHealth
 
+from perception_core.conversions import cloud_message
 from perception_core.poses import NS
-from perception_core.ros import cloud_message
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,1 +1,1 @@
-"""Recorded measurements through the real perception nodes, in the order of their stamps and in virtual time."""
+"""Recorded measurements through the perception's cores, in the order of their stamps and in virtual time."""

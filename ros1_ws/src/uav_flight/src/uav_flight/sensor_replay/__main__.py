@@ -1,6 +1,6 @@
 """``python3 -m uav_flight.sensor_replay BAG OUT [--fail zed@20] [--set zed_depth.NAME=VALUE]``: perceive a recorded flight again.
 
-The real nodes zed_depth, lidar_obstacles and lidar_mapping get the measurements of a bag (``./alula fly --record sensors``); OUT is the
+The cores of zed_depth, lidar_obstacles and lidar_mapping get the measurements of a bag (``./alula fly --record sensors``); OUT is the
 bag with what they say now in place of what they said then. Ends with 0, or 2 with one line on standard error.
 """
 
@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import argparse
 import functools
-import importlib
 import json
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,9 +21,17 @@ import rospy
 import yaml
 
 from alula.common.faults import FaultError
-from uav_flight.sensor_replay import offline
+from lidar_mapping.core import LidarMapping
+from lidar_mapping.settings import MappingSettings
+from lidar_obstacles.core import LidarObstacles
+from lidar_obstacles.settings import LidarSettings
+from perception_core.host import Core, Input
+from perception_core.ros.settings import override
 from uav_flight.sensor_replay.faults import TOPICS, Faults, read_faults
+from uav_flight.sensor_replay.host import CALLS, BagHost, Timeline
 from uav_flight.sensor_replay.nodes import NODES, node_and_parameter
+from zed_depth.core import ZedDepth
+from zed_depth.settings import ZedSettings
 
 AGAIN = ("/perception/transition", "/mapping/transition")
 """Calls that the nodes make again."""
@@ -54,7 +60,7 @@ def settings_of(texts: Sequence[str]) -> dict[str, dict[str, object]]:
 
 def lift_off_of(bag: rosbag.Bag) -> int:
     """Return when flight_status became IN_AIR first, nanoseconds; 0 where it never did."""
-    for _, message, _ in bag.read_messages(topics=[offline.CALLS]):
+    for _, message, _ in bag.read_messages(topics=[CALLS]):
         call = json.loads(message.data)
         if call["request"].get("resource") == "flight_status" and call["request"].get("to") == "IN_AIR":
             return round(float(call["end_s"]) * 1e9)
@@ -73,30 +79,8 @@ def begins_of(bag: rosbag.Bag, names: Mapping[str, str]) -> dict[str, int]:
     return {resource: max(first[topic] for topic in topics) for resource, topics in MEASURED.items() if first.keys() >= set(topics)}
 
 
-def make_nodes(graph: offline.Graph, map_path: str) -> list[object]:
-    """Make the nodes as their executables do, on the offline graph."""
-    setattr(importlib.import_module("perception_core.ros.health"), "ResourceReporter", offline.OfflineReporter)  # noqa: B010
-    override = importlib.import_module("perception_core.ros.settings").override
-    made: list[object] = []
-    for name, (node, settings) in NODES.items():
-        module = importlib.import_module(f"{name}.node")
-        replaced = {"NewestWorker": offline.OfflineWorker, "TunableSettings": _untuned, "ResourceReporter": offline.OfflineReporter}
-        for attribute, replacement in replaced.items():
-            setattr(module, attribute, replacement)
-        defaults = getattr(module, settings)()
-        if hasattr(defaults, "map_path"):
-            defaults = replace(defaults, map_path=map_path)
-        with graph.node(name):
-            made.append(getattr(module, node)(override(defaults, graph.own_parameters())))
-    return made
-
-
-def _untuned(_settings: object, _apply: object) -> None:
-    """Offer no parameters to change: a replay keeps those it began with."""
-
-
 class Perception:
-    """Feeds the nodes from one bag, and writes the other; ``names``: what topics of the source are called here."""
+    """Feeds the cores from one bag, and writes the other; ``names``: what topics of the source are called here."""
 
     def __init__(
         self,
@@ -111,54 +95,75 @@ class Perception:
         self._names = names
         self._faults = faults
         self._begins = begins_of(source, names)
-        self._graph = offline.Graph(self._publish)
-        self._graph.parameters = parameters
-        offline.install(self._graph)
+        self._parameters = parameters
+        self._timeline = Timeline()
+        self._cores: dict[str, Core] = {}
+        self._inputs: dict[str, list[Input]] = {}
 
     def run(self) -> None:
-        """Give every recorded measurement to the nodes, in the order of the bag."""
+        """Give every recorded measurement to the cores, in the order of the bag."""
         with tempfile.TemporaryDirectory() as folder:
-            self._graph.now_ns = round(self._source.get_start_time() * 1e9)
-            nodes = make_nodes(self._graph, str(Path(folder) / "map.ply"))
+            self._timeline.now_ns = round(self._source.get_start_time() * 1e9)
+            self._make_cores(str(Path(folder) / "map.ply"))
             for topic, (kind, data, *_, message_class), time in self._source.read_messages(raw=True):
-                self._graph.advance_to(time.to_nsec())
+                self._timeline.advance_to(time.to_nsec())
                 self._take(self._names.get(topic, topic), kind, data, message_class)
-            del nodes
+
+    def _make_cores(self, map_path: str) -> None:
+        zed = override(ZedSettings(), self._parameters.get("zed_depth", {}))
+        lidar = override(LidarSettings(), self._parameters.get("lidar_obstacles", {}))
+        mapping = override(MappingSettings(map_path=map_path), self._parameters.get("lidar_mapping", {}))
+        self._add("zed_depth", ZedDepth(zed, self._host("zed_depth", "perception")))
+        self._add("lidar_obstacles", LidarObstacles(lidar, self._host("lidar_obstacles", "perception")))
+        self._add("lidar_mapping", LidarMapping(mapping, self._host("lidar_mapping", "mapping")))
+
+    def _host(self, name: str, skillset: str) -> BagHost:
+        return BagHost(name, skillset, self._timeline, self._publish)
+
+    def _add(self, name: str, core: Core) -> None:
+        self._cores[name] = core
+        for each in core.inputs:
+            self._inputs.setdefault(each.topic, []).append(each)
+        for period_s, work in core.timers:
+            self._timeline.every(period_s, work)
 
     def _take(self, topic: str, kind: str, data: bytes, message_class: Any) -> None:
-        now_ns = self._graph.now_ns
+        now_ns = self._timeline.now_ns
         if topic in TOPICS:
             for message, at_ns in self._faults.arriving(topic, message_class().deserialize(data), now_ns):
                 wire = BytesIO()
                 message.serialize(wire)
-                self._graph.after((at_ns - now_ns) / 1e9, functools.partial(self._graph.deliver, topic, kind, wire.getvalue()))
-            self._graph.advance_to(now_ns)
-        elif topic == offline.CALLS:
+                self._timeline.after((at_ns - now_ns) / 1e9, functools.partial(self._deliver, topic, kind, wire.getvalue()))
+            self._timeline.advance_to(now_ns)
+        elif topic == CALLS:
             self._take_call(message_class().deserialize(data))
         elif not topic.startswith(tuple(f"/{name}/" for name in NODES)):
             self._target.write(topic, message_class().deserialize(data), self._time())
-            self._graph.deliver(topic, kind, data)
+            self._deliver(topic, kind, data)
+
+    def _deliver(self, topic: str, kind: str, data: bytes) -> None:
+        for each in self._inputs.get(topic, ()):
+            each.take_bytes(kind, data)
 
     def _take_call(self, message: Any) -> None:
         call = json.loads(message.data)
         if call["service"] in AGAIN and not self._came_before(call):
             return
-        self._target.write(offline.CALLS, message, self._time())
-        if call["service"] not in AGAIN and not call["service"].endswith("/save"):
-            self._graph.call(call["service"], call["request"])
+        self._target.write(CALLS, message, self._time())
+        node, _, service = call["service"].removeprefix("/").rpartition("/")
+        if service == "enable" and node in self._cores:
+            self._cores[node].switch(bool(call["request"]["data"]))
 
     def _came_before(self, call: Mapping[str, Any]) -> bool:
         """Tell whether a node has judged by measurements that the bag does not hold: the recorder begins later than the flight."""
-        return self._graph.now_ns < self._begins.get(call["request"].get("resource"), 0)
+        return self._timeline.now_ns < self._begins.get(call["request"].get("resource"), 0)
 
     def _publish(self, topic: str, message: Any) -> None:
-        if topic == offline.CALLS and json.loads(message.data)["service"] not in AGAIN:
-            return  # a call from the bag, which is written already
-        if not topic.endswith("/done") and topic != "/tf":
+        if topic != "/tf":  # what the recording has there is written
             self._target.write(topic, message, self._time())
 
     def _time(self) -> rospy.Time:
-        return rospy.Time(self._graph.now_ns // 1_000_000_000, self._graph.now_ns % 1_000_000_000)
+        return rospy.Time(self._timeline.now_ns // 1_000_000_000, self._timeline.now_ns % 1_000_000_000)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-NODES = {
-    "zed_depth": ("ZedDepthNode", "ZedSettings"),
-    "lidar_obstacles": ("LidarObstaclesNode", "LidarSettings"),
-    "lidar_mapping": ("LidarMappingNode", "MappingSettings"),
-}
-"""The nodes that perceive: by package, the classes of node and settings in its module ``node``."""
+NODES = ("zed_depth", "lidar_obstacles", "lidar_mapping")
+"""The nodes that perceive."""
 
 
 def is_setting(text: str) -> bool:

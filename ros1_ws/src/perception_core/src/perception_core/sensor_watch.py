@@ -5,28 +5,28 @@ from __future__ import annotations
 from threading import Lock
 from typing import TYPE_CHECKING
 
-import rospy
+from genpy import Time
 from uav_msgs.msg import SensorHealth
 
 from perception_core.health import FaultKind, Finding, HealthLimits, HealthWatch, Verdict, broken
+from perception_core.host import Output
 from perception_core.poses import NS
 from perception_core.stamps import StampJudge, StampLimits
-from resource_reporter import ResourceReporter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from perception_core.host import Host
 
 TICK_S = 0.02
 PUBLISH_S = 0.1
+HEALTH = Output("~health", SensorHealth)
 VERDICTS = {Verdict.UNKNOWN: SensorHealth.UNKNOWN, Verdict.OK: SensorHealth.OK, Verdict.BROKEN: SensorHealth.BROKEN}
 
 
-class HealthReporter:
-    """A health watch driven by a 50 Hz timer on the ROS clock; its methods may be called from any thread."""
+class SensorWatch:
+    """A health watch of one sensor; ``tick`` is to be called every `TICK_S`. Its methods may be called from any thread."""
 
-    def __init__(self, sensor: str, *, resource: str, limits: HealthLimits, stamps: StampLimits) -> None:
-        self.missing: Callable[[], str] = lambda: ""
-        """Says which inputs have no driver; to be set by the subscriber."""
+    def __init__(self, host: Host, sensor: str, *, resource: str, limits: HealthLimits, stamps: StampLimits) -> None:
+        self._host = host
         self._sensor = sensor
         self._resource = resource
         self._watch = HealthWatch(limits)
@@ -36,20 +36,16 @@ class HealthReporter:
         self._judged = False
         self._reported: tuple[Verdict, str] | None = None
         self._published_ns = 0
-        self._reporter = ResourceReporter("perception")
-        self._publisher = rospy.Publisher("~health", SensorHealth, queue_size=1)
-        # reset: a clock that jumps back (a bag played again) must not end the timer's thread.
-        self._timer = rospy.Timer(rospy.Duration.from_sec(TICK_S), self._tick, reset=True)
 
     def stamp(self, stamp_ns: int) -> Finding:
         """Return what the stamp of a measurement tells that has just arrived; call it once for each, in order."""
         with self._lock:
-            return self._stamps.finding(stamp_ns, rospy.Time.now().to_nsec())
+            return self._stamps.finding(stamp_ns, self._host.now_ns())
 
     def take(self, finding: Finding) -> None:
         """Tell what was found of a measurement that has just arrived."""
         with self._lock:
-            self._watch.take(finding, rospy.Time.now().to_nsec())
+            self._watch.take(finding, self._host.now_ns())
 
     def tune(self, limits: HealthLimits, stamps: StampLimits) -> None:
         """Go on with other limits."""
@@ -73,21 +69,22 @@ class HealthReporter:
         with self._lock:
             return self._watch.reason
 
-    def _tick(self, _event: object) -> None:
-        now_ns, missing = rospy.Time.now().to_nsec(), self.missing()
+    def tick(self, missing: str) -> None:
+        """Judge at this moment; ``missing`` says which inputs have no driver."""
+        now_ns = self._host.now_ns()
         with self._lock:
             verdict = self._watch.tick(now_ns, missing=missing)
             message = self._message(now_ns)
         changed = verdict is not self._told
         self._told = verdict
         if changed:
-            rospy.loginfo(f"{self._sensor} is {verdict.value} {message.reason}")
+            self._host.info(f"{self._sensor} is {verdict.value} {message.reason}")
         self._judged |= changed
         self._report(verdict, message)
         # Half a tick of tolerance, or the clock's grain would turn 10 Hz into 8.
         if changed or not 0 <= now_ns - self._published_ns < (PUBLISH_S - TICK_S / 2) * NS:
             self._published_ns = now_ns
-            self._publisher.publish(message)
+            self._host.publish(HEALTH.topic, message)
 
     def _report(self, verdict: Verdict, message: SensorHealth) -> None:
         """Tell the skillset a new verdict or a new kind of fault, with its reason; the figures in a reason change all the time.
@@ -97,13 +94,13 @@ class HealthReporter:
         news = (verdict, message.fault if self._judged else message.reason)
         if news != self._reported:
             self._reported = news
-            self._reporter.report(self._resource, verdict.value, message.reason, insist=self._judged)
+            self._host.report(self._resource, verdict.value, message.reason, insist=self._judged)
 
     def _message(self, now_ns: int) -> SensorHealth:
         watch = self._watch
         message = SensorHealth(sensor=self._sensor, ok=watch.verdict is Verdict.OK, reason=watch.reason)
         message.verdict, message.fault = VERDICTS[watch.verdict], watch.fault.value
-        message.header.stamp = rospy.Time(now_ns // NS, now_ns % NS)
+        message.header.stamp = Time(now_ns // NS, now_ns % NS)
         message.rate_hz = watch.rate_hz(now_ns)
         message.age_s = watch.age_s(now_ns)
         return message

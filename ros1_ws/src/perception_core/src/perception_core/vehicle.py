@@ -10,12 +10,14 @@ from geometry_msgs.msg import PoseStamped
 from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
+from perception_core.conversions import GUIDANCE_MAP, is_rigid, matrix_of_transform
 from perception_core.corridor import Motion
+from perception_core.host import Input
 from perception_core.poses import PoseBuffer
-from perception_core.ros.conversions import GUIDANCE_MAP, is_rigid, matrix_of_transform
-from perception_core.ros.subscription import RawSubscriber
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 BUFFER_BYTES = 1 << 16
@@ -27,7 +29,7 @@ POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
 
 class Vehicle:
-    """Listen to the guidance and to ``/tf_static``; the attributes are always the latest.
+    """What the guidance and ``/tf_static`` say; the attributes are always the latest.
 
     All is in the autopilot's frame `odom`, which no correction of the map makes jump: ``poses`` come in it, ``motion`` is turned into it.
     """
@@ -38,11 +40,14 @@ class Vehicle:
         self._T_odom_map: NDArray[np.float64] | None = None
         self._map_told = Condition()
         self._mounts: dict[str, tuple[str, NDArray[np.float64]]] = {}  # of each frame its parent and T_parent_frame
-        self._subscribers = [
-            RawSubscriber("/uav_guidance/pose", PoseStamped, self._on_pose, buffer_bytes=BUFFER_BYTES, queue_size=50),
-            RawSubscriber("/uav_guidance/state", GuidanceState, self._on_state, buffer_bytes=BUFFER_BYTES),
-            RawSubscriber("/tf", TFMessage, self._on_transforms, buffer_bytes=BUFFER_BYTES, queue_size=TRANSFORMS_WAITING),
-            RawSubscriber("/tf_static", TFMessage, self._on_static, buffer_bytes=BUFFER_BYTES, queue_size=10),
+
+    def inputs(self, garbage: Callable[[str], None]) -> list[Input]:
+        """Return the topics that tell of the vehicle; what is no message goes to ``garbage``."""
+        return [
+            Input("/uav_guidance/pose", PoseStamped, self._on_pose, garbage, BUFFER_BYTES, queue_size=50),
+            Input("/uav_guidance/state", GuidanceState, self._on_state, garbage, BUFFER_BYTES),
+            Input("/tf", TFMessage, self._on_transforms, garbage, BUFFER_BYTES, queue_size=TRANSFORMS_WAITING),
+            Input("/tf_static", TFMessage, self._on_static, garbage, BUFFER_BYTES, queue_size=10),
         ]
 
     def poses_at(self, stamp_ns: int) -> PoseBuffer:
@@ -88,4 +93,8 @@ class Vehicle:
 
     def _on_static(self, message: TFMessage) -> None:
         for item in message.transforms:
-            self._mounts[item.child_frame_id.lstrip("/")] = item.header.frame_id.lstrip("/"), matrix_of_transform(item.transform)
+            self.set_mount(item.header.frame_id, item.child_frame_id, matrix_of_transform(item.transform))
+
+    def set_mount(self, parent: str, frame: str, T_parent_frame: NDArray[np.float64]) -> None:  # noqa: N803 -- T_target_source
+        """Take where a frame is mounted on another, (4, 4)."""
+        self._mounts[frame.lstrip("/")] = parent.lstrip("/"), T_parent_frame

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-import rospy
+from genpy import Time
 from geometry_msgs.msg import Point, Vector3
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Image, PointCloud2, PointField
@@ -63,7 +63,7 @@ def is_rigid(transform: Transform) -> bool:
 
 def obstacle_message(stamp_ns: int, source: str, nearest: Nearest | None, unknown: str = "") -> Obstacle:
     """Return what one sensor says of one measurement: the nearest obstacle, that none is seen, or why that can't be said."""
-    stamp = rospy.Time(stamp_ns // NS, stamp_ns % NS)
+    stamp = Time(stamp_ns // NS, stamp_ns % NS)
     message = Obstacle(header=Header(stamp=stamp, frame_id=ODOMETRY), source=source, detected=nearest is not None, distance_m=math.inf)
     if nearest is not None:
         message.distance_m = nearest.distance_m

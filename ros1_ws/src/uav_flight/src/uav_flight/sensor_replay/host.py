@@ -1,0 +1,123 @@
+"""What runs the perception's cores over a bag: virtual time, no graph and no threads. The same messages make the same messages."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import json
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from std_msgs.msg import String
+
+log = logging.getLogger(__name__)
+Publish = Callable[[str, Any], None]
+WORK_S = 0.1
+"""How long a node takes for a measurement: by then the poses up to its end are there, as they are in flight."""
+CALLS = "/calls"
+
+
+class Timeline:
+    """The mission clock, and what is to be done when."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self._jobs: list[tuple[int, int, Callable[[], None]]] = []
+        self._numbers = itertools.count()
+
+    def after(self, delay_s: float, job: Callable[[], None]) -> None:
+        """Have a job done after a while."""
+        heapq.heappush(self._jobs, (self.now_ns + round(delay_s * 1e9), next(self._numbers), job))
+
+    def every(self, period_s: float, job: Callable[[], None]) -> None:
+        """Have a job done again and again."""
+
+        def again() -> None:
+            self.after(period_s, again)
+            job()
+
+        self.after(period_s, again)
+
+    def advance_to(self, stamp_ns: int) -> None:
+        """Let time pass, and do what is due."""
+        while self._jobs and self._jobs[0][0] <= stamp_ns:
+            self.now_ns, _, job = heapq.heappop(self._jobs)
+            job()
+        self.now_ns = max(self.now_ns, stamp_ns)
+
+
+class BagHost:
+    """The host of one core in a replay; the bag stands for the drivers, and nobody takes what is made for subscribers alone.
+
+    Args:
+        name: the node's.
+        skillset: has the resources that the core reports.
+        publish: gets what is published, ``publish(topic, message)``.
+    """
+
+    def __init__(self, name: str, skillset: str, timeline: Timeline, publish: Publish) -> None:
+        self._name, self._skillset, self._timeline, self._publish = name, skillset, timeline, publish
+        self._shown: dict[str, tuple[str, str]] = {}
+        self._waiting: list[Callable[[], None]] = []
+        self._busy = False
+
+    def now_ns(self) -> int:
+        """Return the bag's time."""
+        return self._timeline.now_ns
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Pass it on with the node's name."""
+        self._publish(f"/{self._name}/{topic[1:]}" if topic.startswith("~") else topic, message)
+
+    def wanted(self, _topic: str) -> bool:
+        """Return that nobody takes it."""
+        return False
+
+    def published(self, _topic: str) -> bool:
+        """Return that the bag publishes it."""
+        return True
+
+    def done(self, _stamp_ns: int) -> None:
+        """Wait for nobody: time goes on when all of a moment is done."""
+
+    def report(self, resource: str, state: str, reason: str, *, insist: bool = True) -> None:
+        """Tell a new state or reason as a call that was accepted.
+
+        What the skillset shows before the first call is not known here: a reason alone is told only of what was said here.
+        """
+        before, known = self._shown.get(resource, ("UNKNOWN", reason))
+        if insist if before != state else reason not in {"", known}:
+            self._shown[resource] = state, reason
+            now_s = self.now_ns() / 1e9
+            response = {"accepted": True, "reason": "", "state": state}
+            request = {"resource": resource, "to": state, "reason": reason}
+            call = {"service": f"/{self._skillset}/transition", "request": request, "response": response, "error": ""}
+            self._publish(CALLS, String(data=json.dumps({**call, "begin_s": now_s, "end_s": now_s})))
+
+    def offer(self, work: Callable[[], None]) -> None:
+        """Have this done `WORK_S` later; what is offered meanwhile waits, and only the newest of that."""
+        self._waiting = [work]
+        if not self._busy:
+            self._begin()
+
+    def _begin(self) -> None:
+        if self._waiting:
+            self._busy, work = True, self._waiting.pop()
+            self._timeline.after(WORK_S, lambda: self._finish(work))
+
+    def _finish(self, work: Callable[[], None]) -> None:
+        self._busy = False
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 -- one bad measurement must not end the node, as in flight
+            log.debug("%s: %s", type(error).__name__, error)
+        self._begin()
+
+    def info(self, text: str) -> None:
+        """Log."""
+        log.debug(text)
+
+    def warn(self, _about: str, text: str, *, every_s: float = 2.0) -> None:  # noqa: ARG002 -- a protocol's signature
+        """Log."""
+        log.debug(text)
