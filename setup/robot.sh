@@ -40,7 +40,7 @@ make_underlays() {
 missing_packages() { [ -z "$robot_debian1$robot_debian2" ] || missing_of $robot_debian1 $robot_debian2; }
 title_apt="Debian packages of the robot"
 key_apt() { echo "$robot_debian1 $robot_debian2"; [ ! -f "$state/stamps/apt" ] || missing_packages; }
-make_apt() { install_packages; }
+make_apt() { install_packages "$(missing_packages)"; }
 
 # An environment of its own sees Alula's by a path file; without pip in it, which it has from there.
 make_environment() { # WORLD PINS OPTIONS...
@@ -94,7 +94,7 @@ begin
 run robot
 said
 run underlays
-check_rights
+check_rights "$(missing_packages)"
 run apt
 together venv1 venv2 generated
 together ros1 ros2

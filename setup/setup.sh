@@ -9,8 +9,9 @@ ALULA_ROBOT="" ALULA_ROBOT_STATE=""   # nothing here is a robot's
 exec 1>&2     # standard output belongs to the results of the command that needs the set-up
 state=$ALULA_STATE what=Alula
 steps="apt venv1 venv2 ros1 ros2"
-# usage: setup.sh [--quiet] [--runtime] [--only STEP[,STEP]...]
 quiet=0 runtime=() only=${steps// /,}
+steps+=" browser"   # of the tests of pages alone: only where it is asked for
+# usage: setup.sh [--quiet] [--runtime] [--only STEP[,STEP]...]
 while [ $# -gt 0 ]; do
   case "$1" in
     --quiet) quiet=1 ;;                # says nothing where nothing is to be done
@@ -37,7 +38,7 @@ missing_packages() { # of setup/apt.txt
 
 title_apt="Debian packages (ROS 1, build tools)"
 key_apt() { echo "$(digest "$ALULA_ROOT/setup/apt.txt")${runtime[*]}"; [ ! -f "$state/stamps/apt" ] || missing_packages; }
-make_apt() { install_packages; }
+make_apt() { install_packages "$(missing_packages)"; }
 
 make_environment() { # WORLD OPTIONS...: with the pinned packages of the world
   local world=$1; shift
@@ -69,14 +70,21 @@ title_ros2="ROS 2 workspace (colcon build)"
 key_ros2() { key_workspace 2 "$ALULA_ROOT/bridge" "$ALULA_ROOT"/ros2_ws/src/{skillset_ros2,skill_panel}; }
 make_ros2() { make_workspace 2; }
 
+missing_browser() { missing_of chromium chromium-driver; }
+title_browser="Debian's browser (tests of pages)"
+key_browser() { echo chromium; [ ! -f "$state/stamps/browser" ] || missing_browser; }
+make_browser() { install_packages "$(missing_browser)"; }
+
 if [ -f "$state/sealed" ]; then   # an image that flies, without what builds
   [ $quiet = 1 ] || cat "$state/sealed"
   exit 0
 fi
 begin
 check_machine
-check_rights
+check_rights "$(missing_packages)"
 run apt
 together venv1 venv2
 together ros1 ros2
+! asked browser || check_rights "$(missing_browser)"
+run browser
 end

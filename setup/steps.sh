@@ -18,13 +18,13 @@ missing_of() { # PACKAGES...: those that dpkg does not have installed
   comm -23 <(printf '%s\n' "$@" | sort -u) \
     <(dpkg-query -W -f '${db:Status-Status} ${binary:Package}\n' 2>/dev/null | awk '$1=="installed"{sub(/:.*/,"",$2);print $2}' | sort)
 }
-check_rights() { # to install what is missing
-  local missing; missing=$(missing_packages)
+check_rights() { # MISSING: Debian packages, to be installed
+  local missing=$1
   [ -z "$missing" ] || [ "$(id -u)" = 0 ] || command -v sudo >/dev/null ||
-    fail "Debian packages are missing ($(head -n 3 <<<"$missing" | paste -sd' ')...), and this is neither root nor is there sudo" "run './alula setup' once as root"
+    fail "Debian packages are missing ($(head -n 3 <<<"$missing" | paste -sd' ')...), and this is neither root nor is there sudo" "run this once as root: apt-get install --no-install-recommends $(paste -sd' ' <<<"$missing")"
 }
-install_packages() {
-  local name missing; missing=$(missing_packages)
+install_packages() { # MISSING
+  local name missing=$1
   [ -z "$missing" ] && return 0
   as_root apt-get update -q || return 1
   for name in $missing; do

@@ -1,0 +1,120 @@
+"""The suite's own front: its parts, the daily loop, progress, and the browser that it brings."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+from alula_testing.flights import ALULA_ROOT
+from alula_testing.progress import time_left_s, told
+
+
+def pytest_over(folder: Path, plugin: str) -> list[str]:
+    """Return the command that runs a folder's tests as the suite runs a part's."""
+    configuration = ["-c", str(ALULA_ROOT / "tests" / "pytest.ini"), "--rootdir", str(folder), "-p", "no:cacheprovider"]
+    return [sys.executable, "-m", "pytest", *configuration, "-p", plugin, str(folder)]
+
+
+def test_time_left_is_by_what_tests_took_last_time_and_by_this_times_pace() -> None:
+    last_s = {"a": 1.0, "b": 2.0, "c": 3.0}
+    assert time_left_s({}, {}, ["a"]) is None
+    assert time_left_s(last_s, {}, ["a", "c"]) == 4.0
+    assert time_left_s(last_s, {"a": 2.0}, ["b", "c"]) == 10.0, "it is twice as slow as last time"
+    assert time_left_s(last_s, {}, ["b", "new"]) == 4.0, "a new one counts as the mean"
+
+
+def test_progress_is_one_line() -> None:
+    assert told("ROS 1 world", 3, 10, None) == "alula test: ROS 1 world: 3 of 10\n"
+    assert told("ROS 1 world", 3, 10, 61.4) == "alula test: ROS 1 world: 3 of 10, 61 s left\n"
+    assert told("ROS 1 world", 3, 10, 600.0) == "alula test: ROS 1 world: 3 of 10, 10 min left\n"
+
+
+PART = """
+    import pytest
+    from hypothesis import given, strategies
+
+    @pytest.fixture
+    def ros2_domain():
+        raise AssertionError("a graph was started")
+
+    def test_live(ros2_domain):
+        pass
+
+    @pytest.mark.flight
+    def test_flight():
+        raise AssertionError("it was flown")
+
+    seen = set()
+
+    @given(strategies.integers())
+    def test_property(number):
+        seen.add(number)
+
+    def test_few_examples():
+        assert 1 <= len(seen) <= 10
+"""
+
+
+def test_the_daily_loop_starts_no_graph_and_no_flight_and_looks_at_few_examples(tmp_path: Path) -> None:
+    (tmp_path / "test_part.py").write_text(dedent(PART), encoding="utf-8")
+    command = pytest_over(tmp_path, "alula_testing.quick")
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert "2 passed, 2 deselected" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_part_tells_its_progress_to_the_suite_and_knows_the_time_left_the_second_time(tmp_path: Path) -> None:
+    (tmp_path / "test_part.py").write_text("def test_one():\n    pass\n\ndef test_two():\n    pass\n", encoding="utf-8")
+    (tmp_path / "conftest.py").write_text("import alula_testing.progress\nalula_testing.progress.EVERY_S = 0.0\n", encoding="utf-8")
+
+    def lines() -> list[str]:
+        reading, writing = os.pipe()
+        environment = {**os.environ, "ALULA_TEST_PROGRESS": f"{writing}:the part", "ALULA_STATE": str(tmp_path / "state")}
+        command = pytest_over(tmp_path, "alula_testing.progress")
+        done = subprocess.run(command, cwd=tmp_path, env=environment, pass_fds=[writing], capture_output=True, text=True, check=False)
+        os.close(writing)
+        assert done.returncode == 0, done.stdout + done.stderr
+        with os.fdopen(reading) as told_lines:
+            return told_lines.read().splitlines()
+
+    assert [line.partition(",")[0] for line in lines()] == ["alula test: the part: 1 of 2", "alula test: the part: 2 of 2"]
+    assert all(line.endswith(" s left") for line in lines())
+
+
+DPKG = """\
+#!/bin/sh
+sed 's/^/installed /' "{packages}"
+"""
+APT = """\
+#!/bin/sh
+[ "$1" != install ] || for word; do case $word in chromium*) echo $word >>"{packages}"; echo $word >>"{packages}.new" ;; esac; done
+"""
+
+
+@pytest.mark.parametrize("there", [(), ("chromium", "chromium-driver")])
+def test_the_browser_is_brought_where_it_is_missing_and_only_where_it_is_asked_for(tmp_path: Path, there: tuple[str, ...]) -> None:
+    tools, state, packages = tmp_path / "bin", tmp_path / "state", tmp_path / "packages"
+    tools.mkdir()
+    state.mkdir()
+    listed = [line for line in (ALULA_ROOT / "setup" / "apt.txt").read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    packages.write_text("\n".join([*listed, *there, ""]), encoding="utf-8")
+    for name, text in {"dpkg-query": DPKG, "apt-get": APT, "apt-cache": "#!/bin/sh\n", "sudo": '#!/bin/sh\nexec "$@"\n'}.items():
+        (tools / name).write_text(text.format(packages=packages), encoding="utf-8")
+        (tools / name).chmod(0o755)
+    environment = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}", "ALULA_STATE": str(state)}
+
+    def setup(steps: str) -> str:
+        command = [ALULA_ROOT / "setup" / "setup.sh", "--quiet", "--only", steps]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        new = tmp_path / "packages.new"
+        return " ".join(new.read_text(encoding="utf-8").split()) if new.exists() else ""
+
+    wanted = "" if there else "chromium chromium-driver"
+    assert setup("apt") == ""
+    assert setup("browser") == wanted
+    assert setup("browser") == wanted, "it was there the second time"
