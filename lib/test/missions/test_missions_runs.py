@@ -18,7 +18,7 @@ from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
 from alula.missions.check.page import whole
 from alula.missions.driver import MissionDriver
-from alula.missions.filed.part import NO_PART
+from alula.missions.filed.part import NO_PART, MissionPart
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.skillset import MissionClient
 from alula.model.model import Skillset
@@ -32,7 +32,10 @@ from alula.prove.mission.system import System
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
 from alula.runtime.local import LocalManagers, LocalWorld
-from alula.trees.status import RUNNING
+from alula.trees.node import Condition, SyncAction
+from alula.trees.palette import input_port, output_port
+from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
+from alula.trees.values import ANY, INT, STRING
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 EXAMPLES = examples(RUNS)
@@ -57,7 +60,26 @@ LEAVES = (
     '<WaitFor if="eyes.lens == CLEAR"/>',
     '<Sleep msec="250"/>',
     '<Script code="tries += 1"/>',
+    '<robot.Pick name="pick" number="{many}" text="{who}" thing="{thing}"/>',
+    "<ScriptCondition code=\"who == 'anna'\"/>",
+    '<ScriptCondition code="many &gt;= tries"/>',
+    '<Script code="last := who; seen := many"/>',
+    '<SubTree ID="visit" host="{who}" gift="{thing}" _autoremap="true"/>',
+    '<SubTree ID="visit" host="ben" gift="{thing}"/>',
+    '<WaitFor if="progress(drone.hover) &gt;= 1"/>',
+    '<drone.hover outcome="{who}"/>',
 )
+PICKED = '<robot.Pick name="pick at first" number="{many}" text="{who}" thing="{thing}"/>'
+VISIT = """
+  <BehaviorTree ID="visit">
+    <Sequence name="visit">
+      <Script code="@last := @last == host ? 'nobody' : host"/>
+      <robot.Use name="use" thing="{gift}"/>
+      <drone.hover outcome="{visited}"/>
+      <ScriptCondition code="@last == host &amp;&amp; visited == 'DONE'"/>
+    </Sequence>
+  </BehaviorTree>
+</root>"""
 ABOVE = (
     "Sequence",
     "Fallback",
@@ -66,7 +88,41 @@ ABOVE = (
     "ReactiveFallback",
     "SequenceWithMemory",
 )
-ROUND = ("ForceSuccess", "ForceFailure", "Inverter", 'RetryAfter attempts="4" wait="0.2" if="tries &lt; 3"', 'Timeout msec="300"')
+ROUND = (
+    "ForceSuccess",
+    "ForceFailure",
+    "Inverter",
+    'RetryAfter attempts="4" wait="0.2" if="tries &lt; 3"',
+    'Timeout msec="300"',
+    'Until if="many &gt;= tries"',
+)
+
+
+class Pick(SyncAction):
+    """A node of the robot's own, which the search sees nothing of but its ports."""
+
+    ports = (output_port("number", INT), output_port("text", STRING), output_port("thing", ANY))
+    chance = random.Random(0)  # noqa: S311 - for tests
+
+    def update(self) -> Answer:
+        """Write anything."""
+        self.put("number", self.chance.randrange(4))
+        self.put("text", self.chance.choice(("anna", "ben", "nobody", "")))
+        self.put("thing", {"name": "a thing"})
+        return SUCCESS if self.chance.random() < 0.8 else FAILURE
+
+
+class Use(Condition):
+    """Another, which reads what the other has written."""
+
+    ports = (input_port("thing", ANY),)
+
+    def update(self) -> Answer:
+        """Look at it."""
+        return SUCCESS if isinstance(self.get("thing"), dict) else FAILURE
+
+
+PART = MissionPart((("robot.Pick", Pick), ("robot.Use", Use)))
 
 
 def test_every_code_has_an_example() -> None:
@@ -91,6 +147,32 @@ def test_a_number_of_the_world_that_a_node_counts_by_is_told(tmp_path: Path) -> 
     path = tmp_path / "mission.xml"
     path.write_text(text)
     (finding,) = prove_mission(path, robots(), NO_PART).findings
+    assert finding.code == "ALU711"
+
+
+def test_what_a_robots_own_node_writes_may_be_any_text(tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    inside = """<Sequence>
+      <Script code="last := ''"/>
+      <robot.Pick number="{many}" text="{who}" thing="{thing}"/>
+      <SubTree ID="visit" host="{who}" gift="{thing}"/>
+      <Fallback>
+        <ScriptCondition code="who == 'anna'"/>
+        <drone.hover/>
+      </Fallback>
+    </Sequence>"""
+    path.write_text(with_visit(inside))
+    regions = Regions(System.read(path, robots(), PART, Failures(hooks=False)), Deadline.after(100.0))
+    regions.explore()
+    ticked = {number for region in regions.regions for _, one in region.next for way, _ in one.ways for number, _ in way.touched}
+    assert [node.name for number, node in enumerate(regions.system.nodes) if number not in ticked] == []
+
+
+def test_a_tree_that_an_unknown_value_may_break_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "mission.xml"
+    inside = '<Sequence><robot.Pick text="{who}" thing="{thing}"/><Script code="tries := thing + 1"/><drone.hover/></Sequence>'
+    path.write_text(whole(inside))
+    (finding,) = prove_mission(path, robots(), PART).findings
     assert finding.code == "ALU711"
 
 
@@ -119,9 +201,14 @@ def tree(chance: random.Random, depth: int) -> str:
     return f"<{tag}>{''.join(tree(chance, depth - 1) for _ in range(2))}</{tag.split()[0]}>"
 
 
+def with_visit(inside: str) -> str:
+    return whole(inside).replace("</root>", VISIT).replace("<root", '<root main_tree_to_execute="mission"')
+
+
 def mission(chance: random.Random, folder: Path, depth: int) -> Path:
     path = folder / "mission.xml"
-    path.write_text(whole(f'<Sequence><Script code="tries := 0"/><drone.hover/><Sleep msec="150"/>{tree(chance, depth)}</Sequence>'))
+    first = f"""<Script code="tries := 0; last := ''"/>{PICKED}<drone.hover/><Sleep msec="150"/>"""
+    path.write_text(with_visit(f"<Sequence>{first}{tree(chance, depth)}</Sequence>"))
     return path
 
 
@@ -141,7 +228,7 @@ def reached(system: System, most: int) -> set[State] | None:
 def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: Path) -> None:
     chance = random.Random(seed)  # noqa: S311 - for tests
     failures = Failures(hooks=chance.random() < 0.5, aborts=False, deaths=chance.random() < 0.3)
-    system = System.read(mission(chance, tmp_path, 1 + seed % 2), robots(), NO_PART, failures)
+    system = System.read(mission(chance, tmp_path, 1 + seed % 2), robots(), PART, failures)
     one_by_one = reached(system, 30_000)
     if one_by_one is None:
         pytest.skip("too many situations to look at one by one")
@@ -153,7 +240,7 @@ def test_regions_are_exactly_what_is_reached_step_by_step(seed: int, tmp_path: P
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_run_of_a_region_is_a_run_step_by_step(seed: int, tmp_path: Path) -> None:
-    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), NO_PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
+    system = System.read(mission(random.Random(seed), tmp_path, 1), robots(), PART, Failures(hooks=False, aborts=False))  # noqa: S311 - for tests
     regions = Regions(system, Deadline.after(100.0))
     regions.explore()
     for number, region in enumerate(regions.regions):
@@ -179,8 +266,9 @@ def flown(path: Path, chance: random.Random) -> Iterator[tuple[frozenset[int], M
     """Fly a mission by the real engine over real managers, and yield what is the case after each of its ticks."""
     skillsets = robots()
     used = [one for one in skillsets if f"{one.name}." in path.read_text()]
-    plan = plan_of_file(path, "mission", used, {}, NO_PART)
+    plan = plan_of_file(path, "mission", used, {}, PART)
     running: list[Execution] = []
+    Pick.chance = chance
 
     def make(managers: LocalManagers) -> Mapping[str, SkillHooks]:
         return {skill.name: Function(running) for skill in managers.skillset.skills}
@@ -228,7 +316,7 @@ def act(chance: random.Random, world: LocalWorld, running: list[Execution]) -> N
 def test_what_the_engine_does_is_within_the_search(seed: int, tmp_path: Path) -> None:
     chance = random.Random(100 + seed)  # noqa: S311 - for tests
     path = mission(chance, tmp_path, 2)
-    system = System.read(path, robots(), NO_PART, Failures(hooks=False, refusals=False, aborts=False))
+    system = System.read(path, robots(), PART, Failures(hooks=False, refusals=False, aborts=False))
     states = reached(system, 40_000)
     if states is None:
         pytest.skip("too many situations to look at one by one")

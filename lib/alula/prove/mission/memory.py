@@ -11,9 +11,9 @@ from alula.missions.filed.skills import SkillNode
 from alula.model.model import Skillset
 from alula.prove.mission.moments import Later, Moment, thawed
 from alula.prove.mission.oracle import UndecidedError
-from alula.prove.mission.reading import Read
+from alula.prove.mission.reading import ANOTHER, Read
 from alula.prove.mission.robot import Handle, Memory, Robot
-from alula.prove.mission.unknown import UNKNOWN, Unknown, UnknownNumber
+from alula.prove.mission.unknown import UNKNOWN, Unknown, UnknownNumber, UnknownText, is_unknown
 from alula.trees.node import Node
 from alula.trees.status import IDLE, RUNNING, Skipped, Status
 from alula.trees.tree import Tree
@@ -127,6 +127,15 @@ class Keeper:
         entries = self._boards[number].entries()
         return tuple((name, entries[name].type, _frozen(read.value(name, entries[name].value))) for name in sorted(entries))
 
+    @property
+    def unknown(self) -> bool:
+        """Tell whether there is a value on the mission's blackboard that the search does not know."""
+        return any(
+            entry.value == ANOTHER if type(entry.value) is str else is_unknown(entry.value)
+            for board in self._boards
+            for entry in board.entries().values()
+        )
+
     # --- back --------------------------------------------------------------------------------------------------------
 
     def put(self, memory: TreeMemory) -> None:
@@ -188,6 +197,8 @@ class Keeper:
                 return set(items)
             case ("number", (str(what), float(low), float(high))):
                 return UnknownNumber(self._body.robot.oracle, what, low, high)
+            case ("text", str(what)):
+                return UnknownText(self._body.robot.oracle, what)
             case (_, *_):
                 return thawed(self._body.robot.oracle, value)
         return value
@@ -199,7 +210,7 @@ def _frozen(value: object) -> Hashable:
     match value:
         case UnknownNumber():
             return ("number", value.frozen)
-        case Moment() | Later():
+        case Moment() | Later() | UnknownText():
             return value.frozen
         case list():
             return ("list", tuple(_frozen(one) for one in value))

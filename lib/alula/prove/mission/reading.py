@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from alula.missions.filed.plan import DEGRADED, STOPPING
 from alula.prove.mission.oracle import Oracle
-from alula.prove.mission.unknown import UNKNOWN, UnknownNumber
+from alula.prove.mission.unknown import UNKNOWN, UnknownNumber, UnknownText
 from alula.trees.document import Element
 from alula.trees.node import pointer
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS, TreeFiles, is_port, type_name
@@ -46,6 +46,8 @@ class Read:
             number = isinstance(value, int | float)
             return UnknownNumber(self.oracle, f"`{name}`") if number else ANOTHER if isinstance(value, str) else UNKNOWN
         if name in self.whole or (isinstance(value, str) and name in self.ordered):
+            return value
+        if isinstance(value, UnknownText):
             return value
         if isinstance(value, str):
             return value if value in self.texts.get(name, ()) else ANOTHER

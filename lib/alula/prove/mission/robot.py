@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 from alula.missions.blackboard import Blackboard, Failure
 from alula.missions.filed.part import MissionPart
 from alula.missions.pending import PendingInterrupts
+from alula.missions.skill_types import type_of
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.prove.mission.moments import Moment
 from alula.prove.mission.oracle import Oracle
-from alula.prove.mission.unknown import UNKNOWN, UnknownNumber
+from alula.prove.mission.unknown import UnknownNumber, unknown
 from alula.trees.node import Node, pointer
 from alula.trees.palette import Direction
 from alula.trees.status import FAILURE, IDLE, RUNNING, SUCCESS, Answer
-from alula.trees.values import BOOL, NUMBERS, STRING, PortType
 
 NO_END = ("sent",)
 
@@ -85,7 +85,7 @@ class Handle:
     @property
     def outputs(self) -> Mapping[str, object]:
         """Nothing is known of what a function returns."""
-        return {one.name: unknown(self._robot.oracle, f"{self.skill}'s {one.name}", STRING) for one in self._outputs}
+        return {one.name: unknown(self._robot.oracle, f"{self.skill}'s {one.name}", type_of(one.type)) for one in self._outputs}
 
     @property
     def progress(self) -> float:
@@ -189,10 +189,3 @@ def _opaque(robot: Robot, real: type[Node]) -> type[Node]:
 
     content = {"ports": real.ports, "update": update, "category": real.category, "child_count": real.child_count, "halt": halt}
     return type(real.__name__, (Node,), {**content, "__doc__": real.__doc__})
-
-
-def unknown(oracle: Oracle, what: str, type_: PortType) -> object:
-    """Return a value of a type of which nothing is known."""
-    if type_ is BOOL:
-        return UnknownNumber(oracle, what, 0.0, 1.0)
-    return UnknownNumber(oracle, what) if type_ in NUMBERS else UNKNOWN

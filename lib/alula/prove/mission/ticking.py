@@ -137,12 +137,17 @@ class Ticker:
         self._keep(memory, act, asked, outcome)
 
     def _step(self, director: Director) -> None:
-        """Do what the driver of a mission does: a tree that can't be ticked is left, and the robot brought to rest."""
+        """Do what the driver of a mission does: a tree that can't be ticked is left, and the robot brought to rest.
+
+        Raises UndecidedError where the real value of something unknown might have been one that it can be ticked with.
+        """
         try:
             director.step()
         except UndecidedError:
             raise
-        except Exception as error:  # noqa: BLE001 - as the driver
+        except Exception as error:
+            if self._keeper.unknown:
+                raise UndecidedError(str(error)) from error
             director.abort(f"the tree raised {type(error).__name__}: {error}")
 
     def _keep(self, memory: int, act: str, asked: Sequence[Asked], outcome: Outcome) -> None:

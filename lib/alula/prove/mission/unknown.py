@@ -11,6 +11,7 @@ from collections.abc import Hashable
 from typing import Self
 
 from alula.prove.mission.oracle import Oracle, UndecidedError
+from alula.trees.values import BOOL, NUMBERS, STRING, PortType
 
 LARGE = 2.0**53
 """Bounds of C's numbers are compared with, too; no unknown number is meant to be beyond."""
@@ -29,6 +30,61 @@ class Unknown:
 
 
 UNKNOWN = Unknown()
+
+
+class UnknownText(str):
+    """A text of which nothing is known; each comparison is a choice. What needs its letters raises UndecidedError."""
+
+    __slots__ = ("oracle", "what")
+    oracle: Oracle
+    what: str
+
+    def __new__(cls, oracle: Oracle, what: str) -> Self:
+        """Make one; ``what`` is what counterexamples call it."""
+        made = super().__new__(cls, f"(unknown: {what})")
+        made.oracle, made.what = oracle, what
+        return made
+
+    @property
+    def frozen(self) -> Hashable:
+        """It as a value that can be compared without a choice."""
+        return ("text", self.what)
+
+    def _decided(self, symbol: str, other: object) -> bool:
+        if not isinstance(other, str):
+            raise UndecidedError(f"{self.what}, a text, meets {other!r}")
+        name = other.what if isinstance(other, UnknownText) else f"'{other}'"
+        return bool(self.oracle.choose(("compare", self.what, symbol, name)))
+
+    def __eq__(self, other: object) -> bool:
+        return self._decided("==", other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self._decided("==", other)
+
+    def __lt__(self, other: object) -> bool:
+        return self._decided("<", other)
+
+    def __ge__(self, other: object) -> bool:
+        return not self._decided("<", other)
+
+    def __gt__(self, other: object) -> bool:
+        return self._decided(">", other)
+
+    def __le__(self, other: object) -> bool:
+        return not self._decided(">", other)
+
+    def __hash__(self) -> int:
+        raise UndecidedError(f"the value of {self.what} is needed")
+
+    def __len__(self) -> int:
+        raise UndecidedError(f"the length of {self.what} is needed")
+
+    def __bool__(self) -> bool:
+        raise UndecidedError(f"the value of {self.what} is needed")
+
+    def __str__(self) -> str:
+        return self
 
 
 class UnknownNumber(float):
@@ -154,3 +210,17 @@ def _number(other: object) -> float:
 
 def _name(number: float) -> str:
     return number.what if isinstance(number, UnknownNumber) else f"{number:g}"
+
+
+def unknown(oracle: Oracle, what: str, type_: PortType) -> object:
+    """Return a value of a type of which nothing is known."""
+    if type_ is BOOL:
+        return UnknownNumber(oracle, what, 0.0, 1.0)
+    if type_ is STRING:
+        return UnknownText(oracle, what)
+    return UnknownNumber(oracle, what) if type_ in NUMBERS else UNKNOWN
+
+
+def is_unknown(value: object) -> bool:
+    """Tell whether the search does not know a value of the blackboard."""
+    return isinstance(value, Unknown | UnknownNumber | UnknownText)
