@@ -36,7 +36,8 @@ def test_its_models_are_proved_and_its_missions_have_no_findings(rover: Path) ->
     models = [str(path) for path in sorted((rover / "skillsets").iterdir()) if path.suffix in {".skill", ".rl"}]
     done = run(rover, "alula.commands.check", *models, *missions)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert len(re.findall(r": ok$", done.stdout, re.MULTILINE)) == len(models) + len(missions)
+    # The time may be over before all runs of a mission were looked at, which is a note.
+    assert len(re.findall(r": ok(, 1 note)?$", done.stdout, re.MULTILINE)) == len(models) + len(missions)
 
 
 def test_the_laser_dies_and_it_reports_where_it_waits(rover: Path, tmp_path: Path) -> None:

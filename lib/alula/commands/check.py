@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -157,7 +158,7 @@ def _convert(files: Sequence[ModelFile], notation: Notation, code: int) -> int:
 
 
 def _strict(finding: Diagnostic) -> Diagnostic:
-    return replace(finding, severity=Severity.ERROR)
+    return finding if finding.severity is Severity.NOTE else replace(finding, severity=Severity.ERROR)
 
 
 def _write(text: str) -> None:
@@ -175,14 +176,15 @@ def _as_text(files: Sequence[ModelFile]) -> str:
     parts: list[str] = []
     number = 0
     for file in files:
-        errors = sum(finding.severity is Severity.ERROR for finding in file.findings)
-        warnings = len(file.findings) - errors
-        counts = [f"{n} {word}{'s' if n > 1 else ''}" for n, word in ((errors, "error"), (warnings, "warning")) if n]
+        numbers = Counter(finding.severity for finding in file.findings)
+        counts = [f"{n} {severity.value}{'s' if n > 1 else ''}" for severity in Severity if (n := numbers[severity])]
+        if not numbers[Severity.ERROR] + numbers[Severity.WARNING]:
+            counts.insert(0, "ok")
         for finding in file.findings:
             number += bool(finding.counterexample.steps)
             playable = f"      = counterexample {number}: `--play {number}` plays it in running managers\n"
             parts.append(f"{finding.render()}\n{playable if finding.counterexample.steps else ''}")
-        parts.append(f"{file.path}: {', '.join(counts) or 'ok'}")
+        parts.append(f"{file.path}: {', '.join(counts)}")
     return "\n".join(parts)
 
 

@@ -29,7 +29,11 @@ from alula.model.span import Span
 PROOFS_S = 10.0
 """How long the proofs of a saved file may take."""
 
-_SEVERITY = {Severity.ERROR: lsp.DiagnosticSeverity.Error, Severity.WARNING: lsp.DiagnosticSeverity.Warning}
+_SEVERITY = {
+    Severity.ERROR: lsp.DiagnosticSeverity.Error,
+    Severity.WARNING: lsp.DiagnosticSeverity.Warning,
+    Severity.NOTE: lsp.DiagnosticSeverity.Information,
+}
 _COMPLETION_KIND = {
     "state": lsp.CompletionItemKind.EnumMember,
     "resource": lsp.CompletionItemKind.Enum,

@@ -111,6 +111,7 @@ CODES: Mapping[str, str] = {
     "ALU703": "a node that no run ticks",
     "ALU710": "runs that were not looked at in the time given",
     "ALU711": "a mission whose runs can't be looked at",
+    "ALU712": "an acceptance without a reason, or of nothing",
 }
 
 PROOF_CODES: Mapping[str, str] = {code: meaning for code, meaning in CODES.items() if code.startswith("ALU5")}

@@ -11,10 +11,11 @@ from alula.model.span import NOWHERE, Span
 
 
 class Severity(Enum):
-    """An error keeps a model from being used, a warning doesn't."""
+    """An error keeps a model from being used, a warning doesn't; a note is no defect, and is never made an error."""
 
     ERROR = "error"
     WARNING = "warning"
+    NOTE = "note"
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ import pytest
 pytest.importorskip("z3")
 pytest.importorskip("py_trees")
 
+from alula.commands.mission_robot import models_of, part_of
+from alula.common.robots import find_robot
 from alula.language.codes import RUN_CODES
 from alula.language.examples import RUNS, examples
 from alula.language.models import ModelFile, check_texts
@@ -22,10 +24,10 @@ from alula.missions.filed.part import NO_PART, MissionPart
 from alula.missions.filed.plan import plan_of_file
 from alula.missions.skillset import MissionClient
 from alula.model.model import Skillset
-from alula.prove.limits import Deadline
+from alula.prove.limits import Deadline, OutOfTimeError
 from alula.prove.mission.managers import Failures
 from alula.prove.mission.page import NAME, ROBOT, found_in, page
-from alula.prove.mission.prover import prove_mission
+from alula.prove.mission.prover import prove_mission, prove_within
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import State
 from alula.prove.mission.system import System
@@ -37,7 +39,8 @@ from alula.trees.palette import input_port, output_port
 from alula.trees.status import FAILURE, RUNNING, SUCCESS, Answer
 from alula.trees.values import ANY, INT, STRING
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
+ROOT = Path(__file__).resolve().parents[3]
+DOCS = ROOT / "docs"
 EXAMPLES = examples(RUNS)
 SHOWN = [code for code, example in EXAMPLES.items() if example.broken]
 TWO = """
@@ -182,6 +185,47 @@ def test_a_bound_is_never_silent(tmp_path: Path) -> None:
     proved = prove_mission(path, robots(), NO_PART, timeout_s=0.0)
     assert not proved.complete
     assert [finding.code for finding in proved.findings] == ["ALU710"]
+
+
+class Few(Deadline):
+    """A bound of regions in the place of one of time."""
+
+    left = 250
+
+    def check(self) -> None:
+        """Raise OutOfTimeError after so many."""
+        self.left -= 1
+        if not self.left:
+            raise OutOfTimeError("enough")
+
+
+@pytest.mark.parametrize("name", ["mapping", "inspection"])
+def test_the_drones_missions_keep_the_axes_as_listing_3_does(name: str) -> None:
+    robot = find_robot(ROOT)
+    path = ROOT / "missions" / f"{name}.xml"
+    proved = prove_within(Few.after(1e6), path, models_of(robot, "test"), part_of(robot, "test"), given="this test")
+    assert [one.code for one in proved.findings] == ["ALU710"]
+    (finding,) = proved.accepted
+    assert finding.code == "ALU701"
+    assert "`navigation.land`" in finding.message
+    assert "axes_authority == USED" in finding.message
+
+
+def test_a_tree_that_says_that_it_gives_up_has_an_answer() -> None:
+    broken = EXAMPLES["ALU702"].broken
+    assert found_in(f'<Fallback>{broken}<AlwaysFailure name="given up"/></Fallback>') == []
+
+
+def test_a_failure_after_which_nothing_could_be_reached_anyhow_is_no_finding() -> None:
+    assert found_in("<ForceFailure><Sequence><drone.lift/><drone.hover/></Sequence></ForceFailure>") == []
+
+
+def test_an_acceptance_needs_its_words_and_a_reason() -> None:
+    climbs = "<Fallback {}><drone.climb/><drone.land/></Fallback>"
+    accepted = climbs.format('_description="{}"')
+    assert found_in(accepted.format("About it. accepted ALU701 (drone.axes == USED): landed by hand")) == []
+    for text in ("accepted ALU701 (drone.axes == LOST): landed by hand", "accepted ALU701:"):
+        assert {one.code for one in found_in(accepted.format(text))} == {"ALU701", "ALU712"}
 
 
 # --- held against one situation after another, and against the engine -------------------------------------------------

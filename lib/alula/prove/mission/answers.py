@@ -11,12 +11,17 @@ from dataclasses import dataclass, field
 
 from alula.prove.mission.regions import Regions, Ticked
 
-NOTHING = "nothing"
+GOOD = frozenset({"accomplished", "degraded"})
+GIVES_UP = "AlwaysFailure"
+"""The type of node by which a tree says that it gives up."""
 
 
 @dataclass
 class Row:
-    """A failure at a moment, and what comes of it; ``node`` is the name of the leaf that failed, ``region`` where it was first seen."""
+    """A failure at a moment, and what comes of it; ``node`` is the name of the leaf that failed, ``region`` where it was first seen.
+
+    ``loses``: before it the mission could be accomplished, and the tree does not come to a node that says that it gives up.
+    """
 
     skill: str
     end: str
@@ -24,6 +29,7 @@ class Row:
     leaf: int
     moment: tuple[str, ...]
     region: int
+    loses: bool = False
     starts: set[str] = field(default_factory=set)
     outcomes: set[str] = field(default_factory=set)
 
@@ -47,6 +53,7 @@ class Answers:
         self._system = regions.system
         self._leads = self._leading()
         self._starting: dict[int, frozenset[str]] = {}
+        self._giving_up = {number for number, node in enumerate(self._system.nodes) if node.wiring.type.name == GIVES_UP}
         rows: dict[tuple[str, str, int, tuple[str, ...]], Row] = {}
         for number, region in enumerate(regions.regions):
             for target, ticked in region.next:
@@ -64,6 +71,7 @@ class Answers:
         started = frozenset(self._name(one) for one in ticked.outcome.started)
         row.starts |= started or self._started_from(target)
         row.outcomes |= self._leads[target]
+        row.loses |= bool(self._leads[number] & GOOD) and not self._gives_up(target, ticked)
 
     def _failures(self, ticked: Ticked) -> Iterator[tuple[int, str]]:
         """Yield the leaves that fail in a tick, each with how it ended as far as the tree can tell."""
@@ -102,6 +110,20 @@ class Answers:
                         todo.append(target)
             self._starting[region] = frozenset(found)
         return self._starting[region]
+
+    def _gives_up(self, region: int, first: Ticked) -> bool:
+        """Tell whether a tick, or one of the next before anything is asked for, comes to a node by which the tree gives up."""
+        seen: set[int] = {region}
+        todo = [(region, first)]
+        while todo:
+            at, ticked = todo.pop()
+            if any(number in self._giving_up for way, _ in ticked.ways for number, _ in way.touched):
+                return True
+            if not ticked.outcome.started:
+                more = [one for one in self._regions.regions[at].next if one[0] not in seen]
+                seen |= {one for one, _ in more}
+                todo += more
+        return False
 
     def _leading(self) -> list[frozenset[str]]:
         """Return for each region how the mission can end from there."""

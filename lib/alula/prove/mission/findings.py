@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from alula.language.errors import Diagnostic, Severity
 from alula.model import semantics
 from alula.model.span import Span
-from alula.prove.mission.answers import Answers
+from alula.prove.mission.answers import GOOD, Answers
 from alula.prove.mission.regions import Regions
 from alula.prove.mission.state import Managers
 from alula.prove.mission.system import FAILED
@@ -80,13 +80,12 @@ def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
     """Yield ALU702 for failures after which the tree asks for nothing any more, and the mission is not accomplished."""
     seen: set[int] = set()
     for row in answers.rows:
-        good = row.outcomes & {"accomplished", "degraded"}
-        if row.starts or good or row.leaf in seen or not row.outcomes:
+        if row.starts or row.outcomes & GOOD or not row.loses or row.leaf in seen or not row.outcomes:
             continue
         seen.add(row.leaf)
         how = "fails" if row.end == FAILED else f"ends with {row.end}"
         message = f"nothing answers when `{row.skill}` {how}: the mission ends ({', '.join(sorted(row.outcomes))})"
-        cure = "put a Fallback around it with what is to be done then"
+        cure = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
         run = told(regions.system, regions.run(row.region, {}))
         yield _finding("ALU702", message, regions.system.leaves[row.leaf], cure, run)
 

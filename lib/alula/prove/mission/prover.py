@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from alula.language.errors import Diagnostic, Severity
@@ -12,6 +12,7 @@ from alula.missions.plan import InputError
 from alula.model.model import Skillset
 from alula.model.span import Span
 from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.accepted import acceptances, divided
 from alula.prove.mission.answers import Answers, Row
 from alula.prove.mission.findings import findings
 from alula.prove.mission.managers import Failures
@@ -25,11 +26,15 @@ LOOKED_AT = Failures(refusals=False, hooks=False, aborts=False)
 
 @dataclass(frozen=True)
 class Proved:
-    """The findings about a mission, and what answers each of its failures; ``complete``: all runs were looked at."""
+    """The findings about a mission, and what answers each of its failures; ``complete``: all runs were looked at.
+
+    ``accepted`` are findings that the file accepts with a reason.
+    """
 
     findings: list[Diagnostic]
     rows: list[Row]
     complete: bool
+    accepted: list[Diagnostic] = field(default_factory=list)
 
 
 def prove_mission(
@@ -47,6 +52,13 @@ def prove_mission(
     returned.
     """
     deadline = Deadline.after(timeout_s, tell)
+    return prove_within(deadline, path, models, part, failures=failures, given=f"{timeout_s:.3g} s")
+
+
+def prove_within(
+    deadline: Deadline, path: Path, models: Sequence[Skillset], part: MissionPart, *, failures: Failures = LOOKED_AT, given: str
+) -> Proved:
+    """Return the same within a deadline; ``given`` is what messages call it."""
     try:
         regions = Regions(System.read(path, models, part, failures, deadline), deadline)
         _explore(regions)
@@ -54,12 +66,13 @@ def prove_mission(
         message = f"its runs can't be looked at: {error}"
         return Proved([Diagnostic("ALU711", message, _whole(path), Severity.WARNING)], [], complete=False)
     except OutOfTimeError:
-        return Proved([_bound(path, 0, timeout_s)], [], complete=False)
+        return Proved([_bound(path, 0, given)], [], complete=False)
     answers = Answers(regions)
-    found = findings(regions, answers)
+    known = acceptances(regions.system.nodes)
+    found, accepted = divided(findings(regions, answers), known, str(path), complete=regions.complete)
     if not regions.complete:
-        found.append(_bound(path, len(regions.regions), timeout_s))
-    return Proved(found, answers.rows, regions.complete)
+        found.append(_bound(path, len(regions.regions), given))
+    return Proved(found, answers.rows, regions.complete, accepted)
 
 
 def _explore(regions: Regions) -> None:
@@ -69,9 +82,9 @@ def _explore(regions: Regions) -> None:
         return
 
 
-def _bound(path: Path, regions: int, timeout_s: float) -> Diagnostic:
-    message = f"not all runs were looked at: {regions} groups of situations, those that fewest ticks lead to, in {timeout_s:.3g} s"
-    return Diagnostic("ALU710", message, _whole(path), Severity.WARNING, "allow more with `--time`")
+def _bound(path: Path, regions: int, given: str) -> Diagnostic:
+    message = f"not all runs were looked at: {regions} groups of situations, those that fewest ticks lead to, in {given}"
+    return Diagnostic("ALU710", message, _whole(path), Severity.NOTE, "allow more with `--time`")
 
 
 def _whole(path: Path) -> Span:
