@@ -14,7 +14,8 @@ from pathlib import Path
 from alula.commands.mission_robot import models_of, part_of
 from alula.common.files import write_text
 from alula.common.robots import FAULTS, RobotError, RobotFolder, find_robot
-from alula.missions.plan import InputError
+from alula.common.scenarios import ScenarioError, load_scenario, scenario_names
+from alula.missions.plan import InputError, Inputs, inputs_of
 from alula.model.model import Skillset
 from alula.odds.errors import OddsError
 from alula.odds.figures import Figures
@@ -36,6 +37,7 @@ from alula.trees.errors import TreeError
 COMMAND = "alula odds"
 WRONG = 2
 MOST_SITUATIONS = 200_000
+UNLIKELY = 1e-4
 COUNTED = 100  # attempts and rounds, exactly: each has its share of the odds
 
 
@@ -44,7 +46,17 @@ def main(words: Sequence[str] | None = None) -> int:
     given = _parser().parse_args(words)
     try:
         return run(given)
-    except (OddsError, AnalysisError, RobotError, InputError, UndecidedError, SkillRuntimeError, TreeError, OSError) as error:
+    except (
+        OddsError,
+        AnalysisError,
+        RobotError,
+        ScenarioError,
+        InputError,
+        UndecidedError,
+        SkillRuntimeError,
+        TreeError,
+        OSError,
+    ) as error:
         sys.stderr.write(f"{COMMAND}: {error}\n")
         return WRONG
 
@@ -54,6 +66,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("file", type=Path, metavar="FILE", help="a mission: BehaviorTree.CPP 4's XML")
     parser.add_argument(
         "--with", dest="changes", action="append", default=[], metavar="FAULT=UNITS", help="what it would bring: zed=2, or zed=never"
+    )
+    parser.add_argument("--world", default="", metavar="FILE|NAME", help="inputs of the mission (default: those of its scenario)")
+    parser.add_argument(
+        "--unlikely", type=float, default=UNLIKELY, metavar="P", help=f"less likely situations are not looked at ({UNLIKELY:g})"
     )
     parser.add_argument("--most", type=int, default=MOST_SITUATIONS, metavar="N", help=f"situations looked at ({MOST_SITUATIONS})")
     parser.add_argument("--svg", type=Path, metavar="FILE", help="write a picture there, too")
@@ -69,9 +85,10 @@ def run(given: argparse.Namespace) -> int:
     models = models_of(robot, COMMAND)
     figures, effects = _of_faults(robot, models)
     failures = Failures(refusals=False, hooks=False, aborts=False)
-    system = System.read(given.file, models, part_of(robot, COMMAND), failures, few=COUNTED)
-    steps = MissionSteps(system, effects, _brought(robot, models), _departure(robot, models))
-    graph = explore(steps, at_use=figures.at_use, most=given.most, tell=_tell)
+    part = part_of(robot, COMMAND)
+    system = System.read(given.file, models, part, failures, few=COUNTED, known=_inputs(given.file, given.world))
+    steps = MissionSteps(system, effects, _brought(robot, models), _departure(robot, models), figures)
+    graph = explore(steps, figures, most=given.most, unlikely=given.unlikely, tell=_tell)
     changes = {text: changed(figures, text, graph) for text in given.changes}
     found = odds_of(graph, figures)
     others = {text: odds_of(graph, other, costs=False) for text, other in changes.items()}
@@ -80,6 +97,13 @@ def run(given: argparse.Namespace) -> int:
         write_text(given.svg, as_svg(title, found))
     sys.stdout.write(json.dumps(as_dict(found, others)) + "\n" if given.json else as_text(title, found, others))
     return 0
+
+
+def _inputs(path: Path, world: str) -> Inputs | None:
+    """Return the inputs of the scenario that flies a mission's file; None where there is no such scenario."""
+    found = [load_scenario(name) for name in scenario_names()]
+    scenario = next((one for one in found if one.mission.endswith(".xml") and (find_robot().root / one.mission).samefile(path)), None)
+    return None if scenario is None else inputs_of(scenario, world)
 
 
 def _of_faults(robot: RobotFolder, models: Sequence[Skillset]) -> tuple[Figures, Mapping[str, FaultEffects]]:

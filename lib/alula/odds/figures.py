@@ -114,6 +114,7 @@ class SkillFigures:
         lasts: seconds until then; ANY_RATE: nobody knows.
         stages: of that time: 1 is exponential.
         fails: how often it ends with which result while it runs, per second.
+        progress: seconds until its progress is what a mission waits for.
     """
 
     results: Mapping[str, Range] = field(default_factory=dict)
@@ -121,6 +122,7 @@ class SkillFigures:
     stages: int = 1
     fails: Mapping[str, Range] = field(default_factory=dict)
     source: str = ""
+    progress: Range = ANY_RATE
 
     @property
     def clock(self) -> Clock:

@@ -16,6 +16,8 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 from alula.missions.director import Outcome as Ended
+from alula.model.model import Skill
+from alula.odds.figures import NEVER, Figures
 from alula.odds.system import TAKE_OFF, Kind, Outcome, Step
 from alula.prove.mission.oracle import Asked
 from alula.prove.mission.state import Event, State
@@ -26,6 +28,12 @@ from alula.records.causes.effects import FaultEffects
 Brought = Mapping[str, Collection[tuple[str, str]]]
 """By a skill, the states that its success brings about: resource and state."""
 OUTCOMES = {Ended.ACCOMPLISHED: Outcome.ACCOMPLISHED, Ended.DEGRADED: Outcome.DEGRADED, Ended.GIVEN_UP: Outcome.GIVEN_UP}
+
+
+ARRIVALS = frozenset({Happens.START, Happens.REFUSE, Happens.INTERRUPT})
+TIME, PROGRESS = "time", "the progress of "
+"""How the search asks whether a time is over, and whether the progress of a skill is large enough."""
+SECOND_NS = 1e9
 
 
 class Place(NamedTuple):
@@ -44,15 +52,22 @@ class MissionSteps:
         faults: what each brings about, by its name.
         brought: what skills bring about.
         departure: the resource and state that the robot leaves at its departure.
+        figures: what may never happen is left out, and an arrow that has figures of its own comes as these say.
     """
 
     def __init__(
-        self, system: System, faults: Mapping[str, FaultEffects], brought: Brought, departure: tuple[str, str] | None = None
+        self,
+        system: System,
+        faults: Mapping[str, FaultEffects],
+        brought: Brought,
+        departure: tuple[str, str] | None = None,
+        figures: Figures = Figures(),  # noqa: B008 - a value
     ) -> None:
         self._system = system
-        self._faults = faults
+        self._faults = {name: one for name, one in faults.items() if _touches(one, system)}
         self._brought = brought
         self._departure = departure
+        self._figures = figures
         self._states = {pair for several in brought.values() for pair in several}
 
     def initial(self) -> list[Place]:
@@ -65,23 +80,52 @@ class MissionSteps:
         return None if ended is None else OUTCOMES.get(ended)
 
     def steps(self, state: Place) -> Iterator[Step[Place]]:
-        """Yield what can happen; nothing where the mission was aborted."""
+        """Yield what can happen; nothing where the mission was aborted. Before it begins nothing fails, and it waits for all it needs."""
         if self._system.outcome(state.state) is not None:
             return
+        begun = self._system.started(state.state)
+        for step in self._all_steps(state):
+            if (begun or step.kind not in {Kind.FAULT, Kind.WAIT}) and not self._never(step):
+                yield step
+
+    def _never(self, step: Step[Place]) -> bool:
+        if step.kind is Kind.FAULT:
+            figures = self._figures.fault(step.name)
+            return figures.rate == NEVER and not figures.chances
+        return step.kind is Kind.END and self._figures.skill(step.name).fails.get(step.result) == NEVER
+
+    def _all_steps(self, state: Place) -> Iterator[Step[Place]]:
         steps = list(self._system.steps(state.state))
         if state.coming:
             yield from self._strikes(state, steps)
             return
-        waits = not _complete([event.choices for event, _ in steps if event.kind is Happens.TICK])
+        arrivals = [(event, after) for event, after in steps if event.kind in ARRIVALS]
+        first = next((event.skillset for event, _ in arrivals), None)
+        if first is None:
+            yield from self._ticks(state, [(event, after) for event, after in steps if event.kind is Happens.TICK])
         for event, after in steps:
-            yield from self._step(state, event, after, waits=waits)
-        yield from (Step(Kind.FAULT, name, Place(state.state, state.faults, name)) for name in self._faults if name not in state.faults)
+            if event.kind not in ARRIVALS or event.skillset == first:
+                yield from self._step(state, event, after)
+        coming = (name for name in self._faults if name not in state.faults)
+        yield from (Step(Kind.FAULT, name, Place(state.state, state.faults, name)) for name in coming)
 
-    def _step(self, state: Place, event: Event, after: State, *, waits: bool) -> Iterator[Step[Place]]:
+    def _ticks(self, state: Place, ticks: Sequence[tuple[Event, State]]) -> Iterator[Step[Place]]:
+        """Yield what the tree does: what it can do now, else what it waits for, one thing after the other."""
+        told = [(*_waited(event.choices), state._replace(state=after)) for event, after in ticks]
+        still = [(others, target) for waits, others, target in told if not waits]
+        kind = Kind.NOW if _complete([others for others, _ in still]) else Kind.SOON
+        yield from (Step(kind if others else Kind.NOW, "tick", target) for others, target in still)
+        if kind is Kind.SOON:
+            least = min((len(waits) for waits, _, _ in told if waits), default=0)
+            for waits, _, target in told:
+                if len(waits) == least == 1:
+                    yield _wait(waits[0], target)
+                elif len(waits) == least:
+                    yield Step(Kind.SOON, "tick", target)
+
+    def _step(self, state: Place, event: Event, after: State) -> Iterator[Step[Place]]:
         target = state._replace(state=after)
         match event.kind:
-            case Happens.TICK:
-                yield Step(Kind.SOON if waits and event.choices else Kind.NOW, "tick", target)
             case Happens.START:
                 yield Step(Kind.NOW, event.skill, target, uses=(event.skill,))
             case Happens.REFUSE | Happens.INTERRUPT:
@@ -119,7 +163,7 @@ class MissionSteps:
         elif showing:
             yield from (Step(Kind.MENDED, name, target._replace(faults=state.faults - {name}), uses=uses) for name in showing)
         elif (resource, event.result) not in self._states:
-            yield Step(Kind.FAULT if event.failure else Kind.SOON, shown, target, uses=uses)
+            yield Step(Kind.FAULT if event.failure or shown in self._figures.faults else Kind.SOON, shown, target, uses=uses)
 
     def _strikes(self, state: Place, steps: Iterable[tuple[Event, State]]) -> Iterator[Step[Place]]:
         """Yield what the fault that comes may bring about first; the rest may follow, at any time while it is there."""
@@ -141,6 +185,29 @@ class MissionSteps:
         resource, state = self._departure
         left = self._system.resource(before, resource) == state != self._system.resource(after, resource)
         return (TAKE_OFF,) if left else ()
+
+
+def _touches(fault: FaultEffects, system: System) -> bool:
+    """Tell whether a fault shows anything in a mission's skillsets; one that does not is none of its faults."""
+    resources = [f"{of.name}.{one.name} {state}" for of in system.skillsets for one in of.resources for state in one.states]
+    skills: dict[str, Skill] = {f"{leaf.skillset}.{leaf.model.name}": leaf.model for leaf in system.leaves}
+    ends = [f"{name} {one.name}" for name, skill in skills.items() for one in skill.results]
+    ends += [f"{name} {one.name}" for name, skill in skills.items() for one in skill.invariants]
+    shown = any(_any((*fault.states, *fault.later), text) for text in resources)
+    return shown or any(_any(fault.ends, text) for text in (*ends, *(f"{name} {Happens.FAIL.value}" for name in skills)))
+
+
+def _waited(choices: Sequence[Asked]) -> tuple[list[Asked], list[Asked]]:
+    """Return what a tick says is over or far enough, and its choices of another kind."""
+    timed = [asked for asked in choices if asked.question[0] == TIME or str(asked.question[1]).startswith(PROGRESS)]
+    return [asked for asked in timed if asked.answer is True], [asked for asked in choices if asked not in timed]
+
+
+def _wait(asked: Asked, target: Place) -> Step[Place]:
+    kind, what, *_ = asked.question
+    if kind == TIME:
+        return Step(Kind.WAIT, f"{what} ns", target, seconds=float(str(what)) / SECOND_NS)
+    return Step(Kind.WAIT, str(what).removeprefix(PROGRESS), target)
 
 
 def _is_extern(event: Event, resource: str, state: str) -> bool:

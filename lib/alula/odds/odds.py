@@ -10,7 +10,8 @@ from alula.common.located_yaml import choices
 from alula.odds.errors import OddsError
 from alula.odds.figures import NEVER, Figures, Range
 from alula.odds.graph import Graph
-from alula.odds.process import quantify
+from alula.odds.hurry import unhurried
+from alula.odds.process import Process, contracted, quantify
 from alula.odds.storm import Number, Storm
 from alula.odds.system import Kind, Outcome
 
@@ -57,7 +58,7 @@ class Odds:
 
 def odds_of(graph: Graph, figures: Figures, *, costs: bool = True) -> Odds:
     """Return the odds of a graph with figures; raises OddsError where there is no Storm."""
-    process = quantify(graph, figures)
+    process = _process(graph, figures)
     storm = Storm(process)
     found = {one.value: _between(storm, [one]) for one in Outcome}
     ended = _between(storm, list(Outcome))
@@ -67,10 +68,14 @@ def odds_of(graph: Graph, figures: Figures, *, costs: bool = True) -> Odds:
         found,
         seconds,
         _costs(graph, figures, storm) if costs else (),
-        len(graph.steps),
+        len(graph.steps) + graph.left - bool(graph.left),
         len(process.choices),
-        len(graph.open),
+        graph.left,
     )
+
+
+def _process(graph: Graph, figures: Figures) -> Process:
+    return contracted(unhurried(quantify(graph, figures)))
 
 
 def _between(storm: Storm, outcomes: Sequence[Outcome]) -> Between:
@@ -86,7 +91,7 @@ def _costs(graph: Graph, figures: Figures, storm: Storm) -> tuple[Cost, ...]:
     for name in sorted(faults | set(slopes)):
         without = None
         if name in faults:
-            spared = Storm(quantify(graph, figures.with_fault(name, rate=NEVER, chances={}))).chance(WELL, most=False)
+            spared = Storm(_process(graph, figures.with_fault(name, rate=NEVER, chances={})), exact=False).chance(WELL, most=False)
             without = spared.number.value - least.number.value
         found.append(Cost(name, slopes.get(name, 0.0), without))
     return tuple(sorted(found, key=lambda cost: (-(cost.without or 0.0), cost.slope, cost.name)))

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from alula.odds.figures import ANY_RATE, NEVER, Clock, Figures, Range
+from alula.odds.figures import ANY_RATE, NEVER, Clock, Figures, Range, point
 from alula.odds.graph import Graph
 from alula.odds.system import Kind, Outcome, Step
 
@@ -106,7 +106,7 @@ class _Quantifier:
             while len(choices) <= len(keys):
                 choices.append(tuple(self._numbered(keys[len(choices) - 1])))
         outcomes = (None, *(self._graph.outcomes[place] for place, _, _ in keys))
-        unseen = frozenset(number for number, (place, _, _) in enumerate(keys, start=1) if place in self._graph.open)
+        unseen = frozenset(number for number, (place, _, _) in enumerate(keys, start=1) if place == self._graph.open)
         return Process(tuple(choices), outcomes, unseen)
 
     def _number(self, key: Key) -> int:
@@ -133,7 +133,7 @@ class _Quantifier:
         steps = self._graph.steps[place]
         if pending:
             yield from self._of_use(key)
-        elif self._graph.outcomes[place] is None and place not in self._graph.open:
+        elif self._graph.outcomes[place] is None and place != self._graph.open:
             now = [step for step in steps if step.kind is Kind.NOW]
             if now:
                 yield from ((({self._after(step, clocks): ONE}), ZERO, {}) for step in now)
@@ -179,6 +179,9 @@ class _Quantifier:
                 yield self._racer(key, step, self._figures.fault(step.name).clock, step.name)
             elif step.kind is Kind.MENDED:
                 yield self._racer(key, step, self._figures.fault(step.name).recovery)
+            elif step.kind is Kind.WAIT:
+                lasts = point(Fraction(step.seconds)) if step.seconds else self._figures.skill(step.name).progress
+                yield _Racer(lasts.inverse(), [{self._after(step, clocks): ONE}], surely=True)
             elif step.kind is Kind.END:
                 fails = self._figures.skill(step.name).fails
                 if step.result in fails:

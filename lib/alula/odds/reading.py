@@ -5,11 +5,14 @@
         happens: [1 per 500 h, 0.2 % at take-off]       # also `1 to 3 per 1000 h`, `0.01 per use of video.stream`, `never`
         lasts: 30 s                                     # also `10 to 60 s`, `for ever`
         source: maker's data sheet, table 3
+    arrows:                                             # of the functional layer, that are nobody's fault
+      navigation.homepoint_status INVALID: {happens: never, source: "an autopilot that has a home keeps it"}
     skills:
       navigation.goto:
         results: {ARRIVED: 0.97, BLOCKED: 1 to 3 %}     # when it ends by itself
         lasts: 12 s
         fails: {ABORTED: 1 per 200 h}                   # while it runs
+        progress: 0.3 s                                 # until its progress is what the mission waits for
         source: flights of 2025
 
 Figures of results stand here, and not in the models or with the mocks: a model says what may happen on any vehicle, mocks play what
@@ -29,10 +32,10 @@ from alula.model.model import Skill, Skillset
 from alula.odds.errors import OddsError
 from alula.odds.figures import ANY_RATE, NEVER, FaultFigures, Figures, Range, SkillFigures, corners
 from alula.odds.system import TAKE_OFF
-from alula.records.causes.fault_file import EFFECTS, FIGURES, ODDS, PARTS, SECTIONS
+from alula.records.causes.fault_file import ARROWS, EFFECTS, FIGURES, ODDS, PARTS, SECTIONS
 
 SECONDS = {"ms": Fraction(1, 1000), "s": Fraction(1), "min": Fraction(60), "h": Fraction(3600), "d": Fraction(86400)}
-OF_SKILL = ("results", "lasts", "fails", "source")
+OF_SKILL = ("results", "lasts", "fails", "progress", "source")
 OTHER_ENDS = (ExecutionState.FAILED.value, ExecutionState.NOT_VALIDATED.value)
 MOST_STAGES = 100
 
@@ -61,6 +64,11 @@ def load_figures(path: Path, skillsets: Sequence[Skillset]) -> Figures:
     for section in EFFECTS:
         for name, part in sections[section].entries(f"`{section}`").items() if section in sections else ():
             faults[name] = _fault(part, name, skills)
+    arrows = {f"{of.name}.{one.name} {state}" for of in skillsets for one in of.resources for state in one.states}
+    for name, part in sections[ARROWS].entries("`arrows`").items() if ARROWS in sections else ():
+        if name not in arrows:
+            raise part.wrong(f"there is no state `{name}` of a resource; there are {choices(name, arrows)}")
+        faults[name] = _fault(part, name, skills)
     known = sections[FIGURES].entries("`skills`") if FIGURES in sections else {}
     for name, part in known.items():
         if name not in skills:
@@ -99,7 +107,7 @@ def _lasts(part: Located) -> tuple[Range | None, int]:
 
 def _skill(part: Located, name: str, skill: Skill) -> SkillFigures:
     said = part.record(f"`{name}`", OF_SKILL)
-    _need_source(said, name, ("results", "lasts", "fails"))
+    _need_source(said, name, ("results", "lasts", "fails", "progress"))
     ends = (*(result.name for result in skill.results), *OTHER_ENDS)
     results = {end: _likelihood(one) for end, one in _ends(said, "results", name, ends).items()}
     if results and not corners([results.get(end, Range(Fraction(0), Fraction(1))) for end in ends]):
@@ -107,7 +115,8 @@ def _skill(part: Located, name: str, skill: Skill) -> SkillFigures:
     breaking = (*ends, *(invariant.name for invariant in skill.invariants))
     fails = {end: _failing(one) for end, one in _ends(said, "fails", name, breaking).items()}
     lasts, stages = _time(said["lasts"]) if "lasts" in said else (ANY_RATE, 1)
-    return SkillFigures(results, lasts, stages, fails, _source(said))
+    progress, _ = _time(said["progress"]) if "progress" in said else (ANY_RATE, 1)
+    return SkillFigures(results, lasts, stages, fails, _source(said), progress)
 
 
 def _ends(said: Mapping[str, Located], key: str, name: str, ends: Collection[str]) -> Mapping[str, Located]:

@@ -11,12 +11,13 @@ from alula.odds.errors import OddsError
 from alula.odds.process import Chances, Choice, Process
 from alula.odds.system import Outcome
 
-EXACT_STATES = 2000
+EXACT_STATES = 500
 """Up to so many states numbers are fractions without an error: the effort grows faster than the states, by the digits."""
 PRECISION = "1/1000000000"
 """Relative, of numbers that are no fractions; their bounds are proved (optimistic value iteration)."""
 MISSING = "needs the Python package stormpy (the model checker Storm): pip install 'alula[odds]' brings it"
 GOAL = "goal"
+ONE = Fraction(1)
 
 
 @dataclass(frozen=True)
@@ -148,15 +149,20 @@ class Storm:
     def _built(self, rows: Sequence[Sequence[tuple[Chances, Fraction]]], *, grouped: bool = True) -> Any:
         """Return the matrix: a group of rows a state; one that has ended stays there."""
         make = self._stormpy.datastructures.SparseMatrixBuilder[self._type]
-        builder = make(rows=0, columns=len(rows), entries=0, force_dimensions=False, has_custom_row_grouping=grouped, row_groups=0)
+        filled = [
+            [{to: chance for to, chance in chances.items() if chance} for chances, _ in one] or [{at: ONE}] for at, one in enumerate(rows)
+        ]
+        size = sum(map(len, filled)), sum(len(row) for one in filled for row in one)
+        builder = make(
+            rows=size[0], columns=len(rows), entries=size[1], force_dimensions=True, has_custom_row_grouping=grouped, row_groups=0
+        )  # forced: a last state that nothing leads to would be no column
         row = 0
-        for state, choices in enumerate(rows):
+        for one in filled:
             if grouped:
                 builder.new_row_group(row)
-            for to, _ in choices or [({state: Fraction(1)}, Fraction(0))]:
+            for to in one:
                 for column in sorted(to):
-                    if to[column]:
-                        builder.add_next_value(row, column, self._value(to[column]))
+                    builder.add_next_value(row, column, self._value(to[column]))
                 row += 1
         return builder.build()
 

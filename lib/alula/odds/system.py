@@ -24,6 +24,8 @@ class Kind(Enum):
     """A fault comes."""
     MENDED = "mended"
     """A fault is over."""
+    WAIT = "wait"
+    """The tree has waited long enough: for a time that its file says, or for the progress of a skill."""
     SOON = "soon"
     """It comes some time, if nothing else does; no figure says when."""
     ANY = "any"
@@ -46,6 +48,7 @@ class Step(Generic[State]):
         name: of the skill that ends, ``skillset.skill``, or of the fault; of the others, what a reader calls it.
         result: how an execution ends.
         uses: what is used from here on: skills that start, as ``skillset.skill``, and TAKE_OFF.
+        seconds: how long a WAIT is; 0: the figures of the skill ``name`` say so.
     """
 
     kind: Kind
@@ -53,6 +56,7 @@ class Step(Generic[State]):
     target: State
     result: str = ""
     uses: tuple[str, ...] = ()
+    seconds: float = 0.0
 
 
 class LabelledSystem(Protocol[State]):

@@ -23,7 +23,7 @@ from pathlib import Path
 from alula.missions.director import Director, Outcome
 from alula.missions.filed.part import MissionPart
 from alula.missions.filed.plan import STOP_HERE, FiledMission, plan_of_file
-from alula.missions.plan import InputError
+from alula.missions.plan import InputError, Inputs
 from alula.missions.skill_types import OUTCOME_PORT
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
@@ -73,8 +73,11 @@ class System:
         failures: Failures = Failures(),  # noqa: B008 - a value
         deadline: Deadline | None = None,
         few: int = FEW,
+        known: Inputs | None = None,
     ) -> System:
         """Read a mission's file; attempts and rounds are counted exactly up to ``few``.
+
+        With ``known`` inputs the robot's own nodes do what they do; without, they may answer all that they declare.
 
         Raises InputError where the file can't be used, UndecidedError where the search can't look at it.
         """
@@ -82,8 +85,9 @@ class System:
         skillsets = [one for one in models if one.name in _named(files)]
         oracle = Oracle()
         robot = Robot(oracle)
-        inputs = {port.name: UNKNOWN for port in _ports(files)}
-        plan = plan_of_file(path, path.stem, skillsets, inputs, opaque(robot, part))
+        inputs = {port.name: UNKNOWN for port in _ports(files)} if known is None else known
+        nodes = opaque(robot, part) if known is None else MissionPart(part.nodes, memory=Memory)
+        plan = plan_of_file(path, path.stem, skillsets, inputs, nodes)
         clients = {one.name: Client(robot, one) for one in skillsets}
         oracle.begin(lambda _: None)
         mission, board = plan.make(clients, robot.clock_ns, plan.parameters)  # type: ignore[arg-type]  # a client as far as missions use it
@@ -92,7 +96,10 @@ class System:
         stop = mission.stop_tree() if STOP_HERE in files.trees else None
         trees = (mission.tree, *([stop] if stop else []))
         director = Director(OneStop(mission, stop), board)
-        unread = [*(name for name, _ in part.nodes), *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills)]
+        unread = [
+            *(name for name, _ in part.nodes if known is None),
+            *(f"{one.name}.{skill.name}" for one in skillsets for skill in one.skills),
+        ]
         read = what_is_read(files, unread, plan.parameters, oracle)
         body = Body(robot, director, board, trees, {one.name: one for one in skillsets}, read, few)
         ticker = Ticker(body, oracle)

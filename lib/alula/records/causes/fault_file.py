@@ -15,8 +15,8 @@ from alula.records.causes.effects import EffectsByFault, FaultEffects
 from alula.records.errors import AnalysisError
 from alula.records.models import robot_skillsets
 
-EFFECTS, FIGURES = ("faults", "processes"), "skills"
-SECTIONS = (*EFFECTS, FIGURES)
+EFFECTS, ARROWS, FIGURES = ("faults", "processes"), "arrows", "skills"
+SECTIONS = (*EFFECTS, ARROWS, FIGURES)
 PARTS = ("states", "later", "ends", "told")
 ODDS = ("happens", "lasts", "source")
 """What an entry says besides about how often it comes: `alula.odds.reading` reads it, and the section of figures."""
@@ -69,7 +69,7 @@ def load_effects(path: Path, skillsets: Sequence[Skillset]) -> EffectsByFault:
     ends = {f"{one.name}.{skill.name}": _ends(skill) for one in skillsets for skill in one.skills}
     known: dict[str, FaultEffects] = {}
     for section, part in sections.items():
-        if section == FIGURES:
+        if section not in EFFECTS:
             continue
         for name, entry in part.entries(f"`{section}`").items():
             if name in known:
