@@ -31,7 +31,7 @@ from alula.live.spec import FILE, RequestError, RunSpec
 from alula.records.conformance import Monitor
 from alula.records.models import models_of
 from alula.report.deaths import Death, describe_exit, note_death
-from alula.report.ends import FRONT, Ended, ended_by_signal, note_end
+from alula.report.ends import FRONT, ReportedEnd, ended_by_signal, note_end
 from alula.report.live import LiveEvents
 from alula_flight.command_line import parse, with_domain
 from alula_flight.console_page import console_page
@@ -115,7 +115,7 @@ class Front:
         """Let the mission bring the robot to rest; it lives in a session of its own and knows nothing of its parents."""
         out = Path(self._spec.out_dir)
         note_death(out, Death("supervisor", describe_exit(code), None))
-        note_end(out, Ended(FRONT, "the supervisor died"))
+        note_end(out, ReportedEnd(FRONT, "the supervisor died"))
         self._say("the supervisor died; the mission brings the robot to rest")
         missions = [process for process in processes_of_run(self._spec.run_id) if node_name(process) == MISSION_NODE]
         for mission in missions:

@@ -25,7 +25,7 @@ from alula.common.signals import on_end_signal
 from alula.live.part import Consequence, RunPart, part_of_robot
 from alula.live.spec import RunSpec
 from alula.report.deaths import Death, describe_exit, note_death
-from alula.report.ends import SIGNAL, SUPERVISOR, Ended, note_end
+from alula.report.ends import SIGNAL, SUPERVISOR, ReportedEnd, note_end
 from alula_flight.departure import Departure
 from alula_flight.launch import launch_arguments, launch_file
 from alula_flight.mission_clock import MissionClock
@@ -150,14 +150,14 @@ class Supervisor:
     def _ends(self, why: str) -> None:
         """Note that the supervisor ends the run by itself."""
         log.error("the run is ended: %s", why)
-        note_end(self._out, Ended(SUPERVISOR, why, self._clock.now_s))
+        note_end(self._out, ReportedEnd(SUPERVISOR, why, self._clock.now_s))
 
     def _note_abort(self) -> None:
         """Note who has the mission come to rest, and why; what the front has noted before it asked for it stays."""
         if self._front_died:
             self._ends("the front has died")
         elif self._asked_to_end is not None:
-            note_end(self._out, Ended(SIGNAL, f"{self._asked_to_end.name} to the supervisor", self._clock.now_s))
+            note_end(self._out, ReportedEnd(SIGNAL, f"{self._asked_to_end.name} to the supervisor", self._clock.now_s))
         else:
             self._ends(self._watch.worst_death)
 

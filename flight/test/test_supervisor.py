@@ -13,7 +13,7 @@ import pytest
 from alula.live.part import Consequence, RunPart
 from alula.live.spec import RunSpec
 from alula.report.deaths import read_deaths
-from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, Ended, note_end, read_end
+from alula.report.ends import OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, note_end, read_end
 from alula_flight import mission_clock, supervisor
 from alula_flight.mission_clock import MissionClock
 from alula_flight.outcome import GIVEN_UP
@@ -78,7 +78,7 @@ def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Flight:
 def test_a_clock_that_never_begins_is_the_reason_that_is_told(flight: Flight, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mission_clock, "START_TIMEOUT_S", 0.0)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == Ended(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from the simulator")
+    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the mission clock did not begin within 0 s: nothing came from the simulator")
 
 
 @pytest.mark.parametrize("name", ["simulator", "master"])
@@ -86,24 +86,24 @@ def test_a_death_that_ends_a_run_is_the_reason_that_is_told(name: str, flight: F
     flight.died("driver")
     flight.died(name)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == Ended(SUPERVISOR, f"{name} died (exit code 1)")
+    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, f"{name} died (exit code 1)")
 
 
 def test_a_signal_from_outside_is_named(flight: Flight, tmp_path: Path) -> None:
     flight.signalled(signal.SIGTERM)
     assert flight.ends() == GIVEN_UP
-    assert read_end(tmp_path) == Ended(SIGNAL, "SIGTERM to the supervisor")
+    assert read_end(tmp_path) == ReportedEnd(SIGNAL, "SIGTERM to the supervisor")
 
 
 def test_what_the_operator_asked_the_front_for_is_the_operators(flight: Flight, tmp_path: Path) -> None:
-    note_end(tmp_path, Ended(OPERATOR, "Ctrl-C"))
+    note_end(tmp_path, ReportedEnd(OPERATOR, "Ctrl-C"))
     flight.signalled(signal.SIGINT)
     flight.ends()
-    assert read_end(tmp_path) == Ended(OPERATOR, "Ctrl-C")
+    assert read_end(tmp_path) == ReportedEnd(OPERATOR, "Ctrl-C")
 
 
 def test_a_front_that_has_died_is_named(flight: Flight, tmp_path: Path) -> None:
     flight.supervisor._front = 0  # no process's parent
     flight.signalled(signal.SIGTERM)  # by the kernel
     flight.ends()
-    assert read_end(tmp_path) == Ended(SUPERVISOR, "the front has died")
+    assert read_end(tmp_path) == ReportedEnd(SUPERVISOR, "the front has died")

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from lidar_mapping import Slam, SlamSettings
 from lidar_obstacles import CloudJudge, LidarAhead, LidarSettings, MountCheck
-from perception_core import NS, Motion, PoseBuffer, Sweep, TurnJoiner
+from perception_core import NS, PoseBuffer, Sweep, TurnJoiner, VehicleMotion
 from perception_core.clouds import sweep_of_cloud
 from perception_core.images import GrayConverter
 from perception_core.testing import wall_pair
@@ -26,7 +26,7 @@ from zed_depth import DisparityRange, MatcherSettings, StereoMatcher, StereoPair
 Gray = NDArray[np.uint8]
 Work = Callable[[], object]
 DATA = Path(os.environ.get("ALULA_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
-FORWARD = Motion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+FORWARD = VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
 OPTICAL = np.array([[0.0, 0, 1, 0.3], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 NEAR_M = 0.45
 BASELINE_M = 0.12

@@ -20,11 +20,11 @@ from sensor_msgs.msg import CameraInfo
 
 from lidar_obstacles import LidarSettings
 from lidar_obstacles.core import LidarObstacles
-from perception_core import NS, Ahead, Finding, HealthLimits, HealthWatch, Motion, PoseBuffer, Sweep, Verdict
+from perception_core import NS, Ahead, Finding, HealthLimits, HealthWatch, PoseBuffer, Sweep, VehicleMotion, Verdict
 from perception_core.clouds import sweep_of_cloud
 from perception_core.conversions import matrix_of_transform
 from perception_core.images import GrayConverter
-from perception_core.vehicle import BASE, Vehicle
+from perception_core.vehicle import BASE, KnownVehicle
 from uav_simulator.sensors import degradation
 from uav_simulator.sensors.faults import FAULTS, SensorMode
 from uav_simulator.sensors.lidar import POINT_DTYPE
@@ -46,16 +46,16 @@ class Recording:
 
     name: str
     poses: PoseBuffer = field(default_factory=lambda: PoseBuffer(keep_s=1e6))
-    motions: list[tuple[int, Motion]] = field(default_factory=list)
+    motions: list[tuple[int, VehicleMotion]] = field(default_factory=list)
     mounts: dict[str, Floats] = field(default_factory=dict)
     infos: dict[str, CameraInfo] = field(default_factory=dict)
     pairs: list[StereoPair] = field(default_factory=list)
     sweeps: list[Sweep] = field(default_factory=list)
 
-    def motion(self, stamp_ns: int) -> Motion:
+    def motion(self, stamp_ns: int) -> VehicleMotion:
         """Return what the guidance had last said at a moment."""
         at = bisect.bisect(self.motions, stamp_ns, key=lambda known: known[0])
-        return self.motions[at - 1][1] if at else Motion()
+        return self.motions[at - 1][1] if at else VehicleMotion()
 
 
 def read(path: Path) -> Recording:
@@ -72,7 +72,7 @@ def read(path: Path) -> Recording:
             elif topic.endswith("/state"):
                 v, t = message.velocity_enu_m_s, message.target_enu_m
                 target = (t.x, t.y, t.z) if message.reference == "position" else None
-                recording.motions.append((message.header.stamp.to_nsec(), Motion((v.x, v.y, v.z), target)))
+                recording.motions.append((message.header.stamp.to_nsec(), VehicleMotion((v.x, v.y, v.z), target)))
             elif topic == "/tf_static":
                 recording.mounts |= {each.child_frame_id.lstrip("/"): matrix_of_transform(each.transform) for each in message.transforms}
             elif topic.endswith("camera_info"):
@@ -136,7 +136,7 @@ class RecordingHost:
         """Take nothing."""
 
 
-def _know(vehicle: Vehicle, recording: Recording) -> None:
+def _know(vehicle: KnownVehicle, recording: Recording) -> None:
     vehicle.poses = recording.poses
     for frame, mount in recording.mounts.items():
         vehicle.set_mount(BASE, frame, mount)

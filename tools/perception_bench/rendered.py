@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception_bench.recordings import Recording
-from perception_core import NS, Motion, Sweep
+from perception_core import NS, Sweep, VehicleMotion
 from uav_simulator import ros_messages
 from uav_simulator.autopilot.estimator import Estimator
 from uav_simulator.frames import Quat, Vec3, wrap_pi
@@ -40,7 +40,7 @@ GRAVITY_M_S2 = 9.81
 
 
 @dataclass(frozen=True)
-class Moment:
+class RenderedMoment:
     """Where the vehicle truly is, how fast, and where its nose points."""
 
     position: Vec3
@@ -60,7 +60,7 @@ class Body:
     rates: Vec3 = (0.0, 0.0, 0.0)
 
 
-def flight(route: tuple[Vec3, ...]) -> Iterator[Moment]:
+def flight(route: tuple[Vec3, ...]) -> Iterator[RenderedMoment]:
     """Yield the moments of a flight along a route, every 20 ms."""
     ground = (route[0][0], route[0][1], 0.0)
     landing = (route[-1][0], route[-1][1], 0.0)
@@ -72,7 +72,7 @@ def flight(route: tuple[Vec3, ...]) -> Iterator[Moment]:
         if level:
             turn = wrap_pi(_bearing(start, end) - yaw)
             for k in range(int(abs(turn) / TURN_RAD_S / TICK_S)):
-                yield Moment(start, (0.0, 0.0, 0.0), yaw + math.copysign(TURN_RAD_S * TICK_S * (k + 1), turn), on_ground=False)
+                yield RenderedMoment(start, (0.0, 0.0, 0.0), yaw + math.copysign(TURN_RAD_S * TICK_S * (k + 1), turn), on_ground=False)
             yaw += turn
         yield from _leg(start, end, yaw, SPEED_M_S if level else CLIMB_M_S)
     yield from _standing(landing, yaw, STANDS_S)
@@ -82,12 +82,12 @@ def _bearing(start: Vec3, end: Vec3) -> float:
     return math.atan2(end[1] - start[1], end[0] - start[0])
 
 
-def _standing(place: Vec3, yaw: float, seconds: float) -> Iterator[Moment]:
+def _standing(place: Vec3, yaw: float, seconds: float) -> Iterator[RenderedMoment]:
     for _ in range(int(seconds / TICK_S)):
-        yield Moment(place, (0.0, 0.0, 0.0), yaw, on_ground=True)
+        yield RenderedMoment(place, (0.0, 0.0, 0.0), yaw, on_ground=True)
 
 
-def _leg(start: Vec3, end: Vec3, yaw: float, speed_m_s: float) -> Iterator[Moment]:
+def _leg(start: Vec3, end: Vec3, yaw: float, speed_m_s: float) -> Iterator[RenderedMoment]:
     length = math.dist(start, end)
     way, speed = 0.0, 0.0
     while length - way > 0.005:
@@ -96,7 +96,7 @@ def _leg(start: Vec3, end: Vec3, yaw: float, speed_m_s: float) -> Iterator[Momen
         way = min(length, way + speed * TICK_S)
         x, y, z = (a + (b - a) * way / length for a, b in zip(start, end, strict=True))
         vx, vy, vz = ((b - a) / length * speed for a, b in zip(start, end, strict=True))
-        yield Moment((x, y, z), (vx, vy, vz), yaw, on_ground=False)
+        yield RenderedMoment((x, y, z), (vx, vy, vz), yaw, on_ground=False)
 
 
 def render(world: str, seed: int, imperfections: str) -> Recording:
@@ -124,7 +124,7 @@ def render(world: str, seed: int, imperfections: str) -> Recording:
         recording.poses.add(stamp_ns, told.position, (x, y, z, w))
         if tick % MEASURE_TICKS:
             continue
-        recording.motions.append((stamp_ns, Motion(told.velocity)))
+        recording.motions.append((stamp_ns, VehicleMotion(told.velocity)))
         recording.pairs.append(StereoPair(stamp_ns, *stereo.render(Pose(stamp_ns / NS, body.position, body.attitude))))
         points = lidar.scan(track, stamp_ns / NS - lidar.spec.period_s)
         start_ns = stamp_ns - round(lidar.spec.period_s * NS)

@@ -20,7 +20,7 @@ from alula.common.scenarios import scenario_names
 from alula.console.link import ActError
 from alula.live.options import RunOption, entry, words_of
 from alula.live.spec import RequestError
-from alula.report.ends import OPERATOR, Ended, note_end
+from alula.report.ends import OPERATOR, ReportedEnd, note_end
 
 START_S = 20.0
 LOOK_S = 0.05
@@ -150,7 +150,7 @@ def start(wanted: WantedRun) -> Path:
 
 def everything_off(folder: Path) -> str:
     """End all processes of a run at once, without landing; return what was done."""
-    note_end(folder, Ended(OPERATOR, "everything off"))
+    note_end(folder, ReportedEnd(OPERATOR, "everything off"))
     run_id = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["run_id"])
     ended = end_run(run_id, timeout_s=0.0)
     return f"{len(ended)} processes were ended at once"

@@ -44,23 +44,23 @@ class StateChange:
 
 
 @dataclass(frozen=True)
-class Execution:
+class NumberedExecution:
     """An execution of a skill; ``number`` counts the starts of the skill in the run, from 1."""
 
     skill: str
     number: int
 
     @staticmethod
-    def from_json(plain: Mapping[str, Any]) -> Execution:
+    def from_json(plain: Mapping[str, Any]) -> NumberedExecution:
         """Return the execution that a step's JSON names."""
-        return Execution(plain["skill"], plain["execution"])
+        return NumberedExecution(plain["skill"], plain["execution"])
 
 
 @dataclass(frozen=True)
-class Ended:
+class CounterexampleEnd:
     """An execution ended. ``name`` is the result or the invariant, empty where there is none; ``state`` as in Figure 5."""
 
-    execution: Execution
+    execution: NumberedExecution
     state: str
     name: str = ""
 
@@ -76,14 +76,14 @@ class CounterexampleStep:
     kind: StepKind
     text: str
     subject: tuple[str, ...] = ()
-    execution: Execution | None = None
+    execution: NumberedExecution | None = None
     changes: tuple[StateChange, ...] = ()
-    ended: tuple[Ended, ...] = ()
+    ended: tuple[CounterexampleEnd, ...] = ()
     refused: bool = False
     data: tuple[tuple[Path, Value | None], ...] = ()
     time_s: float = 0.0
     states: tuple[tuple[str, str], ...] = ()
-    running: tuple[Execution, ...] = ()
+    running: tuple[NumberedExecution, ...] = ()
     loop: bool = False
 
     def as_json(self) -> dict[str, object]:
@@ -112,14 +112,14 @@ class CounterexampleStep:
             StepKind(plain["kind"]),
             plain["text"],
             subject=tuple(plain["subject"]),
-            execution=Execution.from_json(plain) if plain["skill"] else None,
+            execution=NumberedExecution.from_json(plain) if plain["skill"] else None,
             changes=tuple(StateChange(one["resource"], one["from"], one["to"]) for one in plain["changes"]),
-            ended=tuple(Ended(Execution.from_json(one), one["state"], one["name"]) for one in plain["ended"]),
+            ended=tuple(CounterexampleEnd(NumberedExecution.from_json(one), one["state"], one["name"]) for one in plain["ended"]),
             refused=plain["refused"],
             data=tuple((tuple(path.split(".")), value) for path, value in plain["data"].items()),
             time_s=plain["time_s"],
             states=tuple(plain["states"].items()),
-            running=tuple(Execution.from_json(one) for one in plain["running"]),
+            running=tuple(NumberedExecution.from_json(one) for one in plain["running"]),
             loop=plain["loop"],
         )
 

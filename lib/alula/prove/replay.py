@@ -6,7 +6,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from alula.language.counterexamples import CounterexampleStep, Ended, Execution, Path, StateChange, StepKind, Value, Values, messages
+from alula.language.counterexamples import (
+    CounterexampleEnd,
+    CounterexampleStep,
+    NumberedExecution,
+    Path,
+    StateChange,
+    StepKind,
+    Value,
+    Values,
+    messages,
+)
 from alula.model import semantics
 from alula.model.conditions import judge
 from alula.model.deadlines import nanoseconds, waits
@@ -276,7 +286,7 @@ class Replay:
         *,
         subject: tuple[str, ...] = (),
         step: Step | None = None,
-        execution: Execution | None = None,
+        execution: NumberedExecution | None = None,
         refused: bool = False,
         data: tuple[tuple[Path, Value | None], ...] = (),
         time_s: float = 0.0,
@@ -284,7 +294,7 @@ class Replay:
         happenings = step.happenings if step is not None else ()
         changes = tuple(StateChange(one.resource, one.source, one.target) for one in words.changes_of(happenings))
         ended = tuple(
-            Ended(self._execution(one.execution), one.state.value, one.result)
+            CounterexampleEnd(self._execution(one.execution), one.state.value, one.result)
             for one in happenings
             if isinstance(one, Entered) and one.state is not ExecutionState.RUNNING
         )
@@ -294,8 +304,8 @@ class Replay:
             CounterexampleStep(kind, text, subject, execution, changes, ended, refused, data, time_s, states=states, running=running)
         )
 
-    def _execution(self, execution: Running) -> Execution:
-        return Execution(execution.skill, int(execution.id.rpartition("-")[2]))
+    def _execution(self, execution: Running) -> NumberedExecution:
+        return NumberedExecution(execution.skill, int(execution.id.rpartition("-")[2]))
 
     def _name(self, execution: Running) -> str:
         """Call an execution by its skill, and by its number where several run."""

@@ -14,7 +14,7 @@ OPERATOR, SUPERVISOR, FRONT, SIGNAL = "operator", "supervisor", "front", "signal
 
 
 @dataclass(frozen=True)
-class Ended:
+class ReportedEnd:
     """``why`` in words for a person; ``when_s``: absolute mission clock, None where it is not known."""
 
     by: str
@@ -27,19 +27,19 @@ class Ended:
         return f"{told.get(self.by, f'ended by the {self.by}')}: {self.why}"
 
 
-def ended_by_signal(number: signal.Signals | None) -> Ended:
+def ended_by_signal(number: signal.Signals | None) -> ReportedEnd:
     """Return what a signal to ``alula run`` means: SIGINT is the operator's Ctrl-C."""
-    return Ended(SIGNAL, f"{number.name} to alula run") if number not in {None, signal.SIGINT} else Ended(OPERATOR, "Ctrl-C")
+    return ReportedEnd(SIGNAL, f"{number.name} to alula run") if number not in {None, signal.SIGINT} else ReportedEnd(OPERATOR, "Ctrl-C")
 
 
-def note_end(out: Path, ended: Ended) -> None:
+def note_end(out: Path, ended: ReportedEnd) -> None:
     """Write down who ends the run; it counts unless somebody else has done so already."""
     note(out, END, asdict(ended))
 
 
-def read_end(out: Path) -> Ended | None:
+def read_end(out: Path) -> ReportedEnd | None:
     """Return who ended the run; None: nobody did, or it is not known."""
     for values in read(out, END):
         with contextlib.suppress(TypeError):
-            return Ended(**values)
+            return ReportedEnd(**values)
     return None

@@ -19,7 +19,7 @@ from alula.runtime.core.events import EngineEvent, ExecutionEvent, TransitionEve
 
 
 @dataclass(frozen=True)
-class PastExecution:
+class RecordedExecution:
     """A skill's execution from request to end; ``outcome`` is the last state seen, so RUNNING or REQUESTED if no end was.
 
     ``result_kind`` is as in the record of an event.
@@ -42,7 +42,7 @@ class PastExecution:
 class History:
     """Everything that happened in the skillsets, in the order of time."""
 
-    executions: tuple[PastExecution, ...] = ()
+    executions: tuple[RecordedExecution, ...] = ()
     transitions: tuple[TransitionEvent, ...] = ()
     events: tuple[EngineEvent, ...] = ()
     places: Places = field(default_factory=Places)
@@ -50,7 +50,7 @@ class History:
     first_s: float | None = None
     last_s: float | None = None
 
-    def of_skill(self, skill: str) -> list[PastExecution]:
+    def of_skill(self, skill: str) -> list[RecordedExecution]:
         """Return the executions of a skill, whatever skillset it belongs to."""
         return [execution for execution in self.executions if execution.skill == skill]
 
@@ -115,7 +115,7 @@ def gaps(events: Sequence[EngineEvent]) -> Iterator[str]:
 
 def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | None = None) -> History:
     """Put the events of each execution together. The first terminal state counts; another one is noted as a problem."""
-    executions: dict[tuple[str, str, str], PastExecution] = {}
+    executions: dict[tuple[str, str, str], RecordedExecution] = {}
     transitions: list[TransitionEvent] = []
     stamps: list[float] = []
     for event in events:
@@ -139,11 +139,13 @@ def fold(events: Sequence[EngineEvent], problems: Problems, places: Places | Non
     )
 
 
-def _begin(event: ExecutionEvent) -> PastExecution:
-    return PastExecution(event.skillset, event.skill, event.id, mapping(event.inputs), event.stamp_s, None, None, event.state.value, "", "")
+def _begin(event: ExecutionEvent) -> RecordedExecution:
+    return RecordedExecution(
+        event.skillset, event.skill, event.id, mapping(event.inputs), event.stamp_s, None, None, event.state.value, "", ""
+    )
 
 
-def _advance(execution: PastExecution, event: ExecutionEvent) -> PastExecution:
+def _advance(execution: RecordedExecution, event: ExecutionEvent) -> RecordedExecution:
     return replace(
         execution,
         inputs=execution.inputs or mapping(event.inputs),

@@ -12,7 +12,7 @@ from alula.model.execution_state import ExecutionState
 from alula.records.causes.alarms import Alarm, Alarms
 from alula.records.causes.failures import skill_failures
 from alula.records.causes.faults import EARLY_S
-from alula.report.history import History, PastExecution
+from alula.report.history import History, RecordedExecution
 from alula.report.observed import Observed
 from alula.report.phases import Phases
 from alula.report.responses import FaultResponse
@@ -74,7 +74,7 @@ def _fallback(skill: str, history: History, one: FaultResponse) -> float | None:
     others = [failure for failure in skill_failures(history.events) if failure.at > first.at and failure not in one.traced.failures]
     other_s = min((failure.end.stamp_s for failure in others), default=math.inf)
 
-    def responds(execution: PastExecution) -> bool:
+    def responds(execution: RecordedExecution) -> bool:
         in_branch = one.response.branch in history.places.started.get(execution.id, ())
         return execution.running_s is not None and (in_branch or execution.running_s < other_s)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from alula.common.robots import page_words
 from alula.report.deaths import Death
-from alula.report.ends import SIGNAL, Ended, read_end
+from alula.report.ends import SIGNAL, ReportedEnd, read_end
 from alula.report.run_log import read_waits
 
 MEANING = {
@@ -43,11 +43,11 @@ def was_ended(summary: Mapping[str, Any]) -> bool:
     return outcome in {None, "running"} or (outcome == "aborted" and str(summary.get("reason")).startswith(TOLD_TO_END))
 
 
-def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, ended: Ended | None) -> str:
+def outcome_words(summary: Mapping[str, Any], died: Sequence[Death], out: Path, ended: ReportedEnd | None) -> str:
     """Return how the mission ended, in words; where its files are lost, by the exit code of its process, or by what died."""
     outcome, code, reason = summary.get("outcome"), summary.get("mission_exit"), summary.get("reason")
     if outcome == "aborted" and ended is None and was_ended(summary):
-        ended = Ended(SIGNAL, str(reason))
+        ended = ReportedEnd(SIGNAL, str(reason))
     if ended is not None and was_ended(summary):
         return f"mission {ended.sentence()}"
     if outcome == "aborted" and str(reason).startswith(outcome):  # as "aborted by the operator" of the page

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
-from alula.language.counterexamples import Counterexample, CounterexampleStep, Execution, messages
+from alula.language.counterexamples import Counterexample, CounterexampleStep, NumberedExecution, messages
 from alula.language.counterexamples import StepKind as Kind
 from alula.language.outside import opened
 from alula.model.model import Skillset
@@ -92,7 +92,7 @@ class _Player:
         self._client.wait_ready(READY_S)
         for function in functions.values():
             function.now_ns = lambda: world.now_ns
-        self._executions: dict[Execution, _Known] = {}
+        self._executions: dict[NumberedExecution, _Known] = {}
         self._data: dict[str, object] = {}
         self._periods_s = {skill.name: skill.progress.period_s for skill in skillset.skills if skill.progress is not None}
         periods_s = [*self._periods_s.values(), *(data.period_s for data in skillset.data if data.period_s is not None)]

@@ -13,7 +13,7 @@ import pytest
 
 from alula.commands import run
 from alula.common.record import FILE
-from alula.report.ends import OPERATOR, Ended, read_end
+from alula.report.ends import OPERATOR, ReportedEnd, read_end
 
 
 @pytest.mark.parametrize(
@@ -65,6 +65,6 @@ def test_ctrl_c_is_the_operators(tmp_path: Path) -> None:
     words = [sys.executable, "-c", script, "mapping", "--mock", "--out", str(out)]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120, env=dict(os.environ))
     assert done.returncode == 1, done.stderr
-    assert read_end(out) == Ended(OPERATOR, "Ctrl-C")
+    assert read_end(out) == ReportedEnd(OPERATOR, "Ctrl-C")
     assert "mission aborted by the operator: Ctrl-C" in done.stdout
     assert json.loads((out / "mission.json").read_text())["reason"] == f"told to end by {signal.SIGINT.name}"

@@ -9,7 +9,7 @@ import os
 import pytest
 
 from alula.commands import check
-from alula.language.counterexamples import Execution, StepKind
+from alula.language.counterexamples import NumberedExecution, StepKind
 from alula.language.models import check_files
 from alula.prove import prove
 
@@ -245,7 +245,7 @@ def test_a_counterexample_names_the_values_that_decide(most, tmp_path):
     assert path == ("fps",)
     assert value < 10
     assert 10 <= between.data[0][1] < 12
-    assert [(e.execution, e.state, e.name) for e in start.ended] == [(Execution("watch", 1), "RESOURCE_INVARIANT_VIOLATED", "sees")]
+    assert [(e.execution, e.state, e.name) for e in start.ended] == [(NumberedExecution("watch", 1), "RESOURCE_INVARIANT_VIOLATED", "sees")]
     assert start.running == ()
 
 

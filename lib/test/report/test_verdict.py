@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from alula.report.deaths import Death
-from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, Ended, ended_by_signal, note_end, read_end
+from alula.report.ends import FRONT, OPERATOR, SIGNAL, SUPERVISOR, ReportedEnd, ended_by_signal, note_end, read_end
 from alula.report.run_log import FILE, note_wait
 from alula.report.verdict import verdict_lines
 
@@ -84,26 +84,28 @@ NO_CLOCK = "the mission clock did not begin within 120 s: nothing came from Ardu
 @pytest.mark.parametrize(
     ("outcome", "reason", "ended", "told"),
     [
-        ("aborted", SIGINT, Ended(SUPERVISOR, NO_CLOCK), f"mission ended by the supervisor: {NO_CLOCK}"),
-        ("aborted", SIGINT, Ended(OPERATOR, "Ctrl-C"), "mission aborted by the operator: Ctrl-C"),
-        ("aborted", SIGINT, Ended(SIGNAL, "SIGTERM to alula run"), "mission aborted from outside: SIGTERM to alula run"),
+        ("aborted", SIGINT, ReportedEnd(SUPERVISOR, NO_CLOCK), f"mission ended by the supervisor: {NO_CLOCK}"),
+        ("aborted", SIGINT, ReportedEnd(OPERATOR, "Ctrl-C"), "mission aborted by the operator: Ctrl-C"),
+        ("aborted", SIGINT, ReportedEnd(SIGNAL, "SIGTERM to alula run"), "mission aborted from outside: SIGTERM to alula run"),
         ("aborted", SIGTERM, None, "mission aborted from outside: told to end by SIGTERM"),
         ("aborted", "aborted by the operator", None, "mission aborted by the operator"),
         ("aborted", "the tree raised ValueError: x", None, "mission aborted: the tree raised ValueError: x"),
-        (None, None, Ended(SUPERVISOR, "uav_simulator died"), "mission ended by the supervisor: uav_simulator died"),
-        ("running", None, Ended(FRONT, "the supervisor died"), "mission ended by the front: the supervisor died"),
+        (None, None, ReportedEnd(SUPERVISOR, "uav_simulator died"), "mission ended by the supervisor: uav_simulator died"),
+        ("running", None, ReportedEnd(FRONT, "the supervisor died"), "mission ended by the front: the supervisor died"),
     ],
 )
-def test_whoever_ends_a_mission_is_told_by_name(outcome: str | None, reason: str | None, ended: Ended | None, told: str, tmp_path: Path):
+def test_whoever_ends_a_mission_is_told_by_name(
+    outcome: str | None, reason: str | None, ended: ReportedEnd | None, told: str, tmp_path: Path
+):
     if ended is not None:
         note_end(tmp_path, ended)
-        note_end(tmp_path, Ended(OPERATOR, "who came later"))
+        note_end(tmp_path, ReportedEnd(OPERATOR, "who came later"))
     lines = verdict_lines({"outcome": outcome, "reason": reason, "mission_exit": 1, "landed": None}, [], tmp_path)
     assert lines == ["", told]
 
 
 def test_a_mission_that_had_come_to_its_end_keeps_its_outcome(tmp_path: Path) -> None:
-    note_end(tmp_path, Ended(OPERATOR, "Ctrl-C"))
+    note_end(tmp_path, ReportedEnd(OPERATOR, "Ctrl-C"))
     lines = verdict_lines({"outcome": "accomplished", "landed": None}, [], tmp_path)
     assert lines == ["", "mission accomplished", "  the run was aborted by the operator: Ctrl-C"]
 
@@ -118,7 +120,7 @@ def test_what_a_run_still_waited_for_at_its_end_is_told(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_gone_or_holds_nonsense_ends_nothing_else(tmp_path: Path) -> None:
-    note_end(tmp_path / "gone", Ended(OPERATOR, "Ctrl-C"))
+    note_end(tmp_path / "gone", ReportedEnd(OPERATOR, "Ctrl-C"))
     assert read_end(tmp_path / "gone") is None
     for nonsense in ("", "[]", '{"kind": "end", "by": 1}', '{"kind": "end", "who": "x"}'):
         (tmp_path / FILE).write_text(nonsense, encoding="utf-8")
@@ -126,8 +128,8 @@ def test_a_folder_that_is_gone_or_holds_nonsense_ends_nothing_else(tmp_path: Pat
 
 
 def test_a_signal_to_the_command_is_the_operators_when_it_is_ctrl_c() -> None:
-    assert ended_by_signal(signal.SIGINT) == Ended(OPERATOR, "Ctrl-C")
-    assert ended_by_signal(signal.SIGHUP) == Ended(SIGNAL, "SIGHUP to alula run")
+    assert ended_by_signal(signal.SIGINT) == ReportedEnd(OPERATOR, "Ctrl-C")
+    assert ended_by_signal(signal.SIGHUP) == ReportedEnd(SIGNAL, "SIGHUP to alula run")
 
 
 def test_an_outcome_is_told_with_its_reason() -> None:

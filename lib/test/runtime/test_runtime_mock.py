@@ -14,7 +14,7 @@ from alula.model.execution_state import ExecutionState
 from alula.model.model import Data, Parameter, Result, ResultKind
 from alula.runtime.core.errors import SkillRuntimeError
 from alula.runtime.core.events import event_record
-from alula.runtime.mock import Behaviour, BehaviourError, Change, Ending, Formula, FormulaError, Rule, load_behaviour, mock_world
+from alula.runtime.mock import Behaviour, BehaviourError, Ending, Formula, FormulaError, MockChange, Rule, load_behaviour, mock_world
 
 S = ExecutionState
 FLYING = flying_skillset(data=(Data("battery", "float64", period_s=1.0), Data("pose", "Pose")))
@@ -290,7 +290,7 @@ def test_a_formula_without_a_value_ends_the_execution_and_says_so(read):
 
 
 def test_a_test_writes_its_behaviour_in_python():
-    drops = Change(lambda names: names["delay"] / 2, {("flying", "sdk"): "UNAVAILABLE"})
+    drops = MockChange(lambda names: names["delay"] / 2, {("flying", "sdk"): "UNAVAILABLE"})
     rules = (Rule(call=1, delay=lambda names: names["height"] * 2, changes=(drops,)), Rule(ending=Ending(refuse="enough")))
     mocked = Mocked(Behaviour(rules={("flying", "takeoff"): rules[:1]}))
     assert mocked.call(4.0) == (("RESOURCE_INVARIANT_VIOLATED", "keep_sdk"), 4.0)
@@ -391,7 +391,7 @@ RULES = st.builds(
     | st.sampled_from(
         [Ending((("DONE", 1.0), ("BLOCKED", 1.0))), Ending(), Ending(refuse="no"), Ending(crash="bang"), Ending((("SAFE", 1.0),))]
     ),
-    changes=st.none() | st.just((Change(Formula("delay / 2"), {("flying", "sdk"): "UNAVAILABLE"}),)),
+    changes=st.none() | st.just((MockChange(Formula("delay / 2"), {("flying", "sdk"): "UNAVAILABLE"}),)),
 )
 
 

@@ -36,7 +36,7 @@ FIGURES: Mapping[str, tuple[tuple[str, ...], str]] = {
 
 
 @dataclass(frozen=True)
-class Decision:
+class ComparedDecision:
     """The mission starts or interrupts a skill, ``at_s`` seconds after lift-off."""
 
     what: str
@@ -49,7 +49,7 @@ class Side:
 
     name: str
     outcome: str
-    decisions: Sequence[Decision]
+    decisions: Sequence[ComparedDecision]
     spans: Sequence[tuple[str, float, float]]
     figures: Mapping[str, float | None]
 
@@ -88,7 +88,7 @@ def _first_difference(ours: Sequence[str], theirs: Sequence[str]) -> int | None:
     return next((at for at, (one, other) in pairs if one != other), None)
 
 
-def decisions_of(run: RecordedRun) -> list[Decision]:
+def decisions_of(run: RecordedRun) -> list[ComparedDecision]:
     """Return what the mission has asked of the skills: starts and interruptions, without their inputs."""
     asked: list[ExecutionEvent] = []
     seen: set[str] = set()
@@ -96,7 +96,7 @@ def decisions_of(run: RecordedRun) -> list[Decision]:
         if isinstance(event, ExecutionEvent) and (kind := _kind(event)) and f"{kind} {event.id}" not in seen:
             seen.add(f"{kind} {event.id}")
             asked.append(event)
-    return [Decision(f"{_kind(event)} {event.skillset}.{event.skill}", run.time_s(event)) for event in _ordered(asked)]
+    return [ComparedDecision(f"{_kind(event)} {event.skillset}.{event.skill}", run.time_s(event)) for event in _ordered(asked)]
 
 
 def _kind(event: ExecutionEvent) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from alula.records.replay.recorded import Decision, Knowledge, Recorded
+from alula.records.replay.recorded import Knowledge, Recorded, RecordedDecision
 
 TOLERANCE = 1e-6
 """How far numbers of inputs may be apart, relative to the larger one, or absolute below 1."""
@@ -20,8 +20,8 @@ class Difference:
     """The first decision that is not as it was; ``then`` or ``now`` None: none was made. ``why`` says what else is not."""
 
     t_s: float
-    then: Decision | None
-    now: Decision | None
+    then: RecordedDecision | None
+    now: RecordedDecision | None
     knew_then: Knowledge = field(default_factory=Knowledge)
     knew_now: Knowledge = field(default_factory=Knowledge)
     why: str = ""
@@ -62,12 +62,12 @@ class Comparison:
         self._below: tuple[float, str] | None = None
 
     @property
-    def expected(self) -> Decision | None:
+    def expected(self) -> RecordedDecision | None:
         """The decision of the record that comes next; None after the last, and after a difference."""
         decisions = self._recorded.decisions
         return decisions[self._next] if self.difference is None and self._next < len(decisions) else None
 
-    def decided(self, now: Decision, recorded_id: str | None) -> Decision | None:
+    def decided(self, now: RecordedDecision, recorded_id: str | None) -> RecordedDecision | None:
         """Take a decision; return the same one of the record, None where there is none. ``recorded_id``: of what it interrupts."""
         then = self.expected
         if then is None:
@@ -103,11 +103,11 @@ class Comparison:
         elif self.difference is None and self._below is not None:
             self.difference = self._made(self._below[0], None, None, self._below[1])
 
-    def _differ(self, then: Decision | None, now: Decision | None, why: str = "") -> None:
+    def _differ(self, then: RecordedDecision | None, now: RecordedDecision | None, why: str = "") -> None:
         t_s = now.t_s if now is not None else then.t_s if then is not None else 0.0
         self.difference = self._made(t_s, then, now, why)
 
-    def _made(self, t_s: float, then: Decision | None, now: Decision | None, why: str) -> Difference:
+    def _made(self, t_s: float, then: RecordedDecision | None, now: RecordedDecision | None, why: str) -> Difference:
         knew_then = Knowledge() if then is None else self._recorded.knowledge(then)
         about = now or then
         knew_now = self._knowledge(f"{about.skillset}.{about.skill}" if about is not None else "")
@@ -116,7 +116,7 @@ class Comparison:
         return Difference(t_s, then, now, knew_then, knew_now, why)
 
 
-def _apart_in(then: Decision, now: Decision, recorded_id: str | None) -> str:
+def _apart_in(then: RecordedDecision, now: RecordedDecision, recorded_id: str | None) -> str:
     """Return what is not the same, empty where all is."""
     if (then.kind, then.skillset, then.skill) != (now.kind, now.skillset, now.skill):
         return "another request"

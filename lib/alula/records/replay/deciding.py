@@ -17,7 +17,7 @@ from alula.model.model import Skillset
 from alula.records.replay.recorded import Recorded, ReplayError
 from alula.records.replay.replay import Replay, Result
 from alula.records.replay.request import behaviour_for, faults_for, parameters_for, plan_for, skillsets_for
-from alula.records.replay.vehicle import RecordedSkills, Vehicle
+from alula.records.replay.robot import RecordedSkills, ReplayedRobot
 from alula.runtime.mock import Behaviour
 
 BAG = "functional.bag"
@@ -33,7 +33,7 @@ class RecordedMission:
     behaviour: Behaviour
 
 
-Answers = tuple[Vehicle, Iterable[Entry]]
+Answers = tuple[ReplayedRobot, Iterable[Entry]]
 """What answers the tree, and what it is told, in the order of time."""
 MakeAnswers = Callable[[RecordedMission], Answers]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from alula.model.execution_state import ExecutionState
 from alula.records.replay.comparison import alike
-from alula.records.replay.recorded import Answer, Recorded
+from alula.records.replay.recorded import Recorded, RecordedEnd
 from alula.runtime.mock import Behaviour, Ending, Rule
 
 
@@ -21,7 +21,7 @@ def fitted(recorded: Recorded) -> Behaviour:
     return Behaviour(rules={place: tuple(found) for place, found in rules.items()})
 
 
-def _rule(answer: Answer, duration_s: float) -> Rule:
+def _rule(answer: RecordedEnd, duration_s: float) -> Rule:
     inputs = dict(answer.inputs)
 
     def same(names: Mapping[str, Any]) -> bool:

@@ -21,7 +21,7 @@ class ReplayError(Exception):
 
 
 @dataclass(frozen=True)
-class Decision:
+class RecordedDecision:
     """A request of the tree. ``id`` is the execution's; it differs from run to run."""
 
     number: int
@@ -48,7 +48,7 @@ class Knowledge:
 
 
 @dataclass(frozen=True)
-class Answer:
+class RecordedEnd:
     """What became of an execution, and when."""
 
     skillset: str
@@ -84,8 +84,8 @@ class Recorded:
     path: Path
     entries: Sequence[Entry]
     mission: Mapping[str, Any]
-    decisions: Sequence[Decision]
-    answers: Mapping[str, Answer]
+    decisions: Sequence[RecordedDecision]
+    answers: Mapping[str, RecordedEnd]
     whole: bool
 
     @property
@@ -125,7 +125,7 @@ class Recorded:
         """Tell whether it says what the tree was told, and not only what happened."""
         return any(entry.topic == REPORTS for entry in self.entries)
 
-    def knowledge(self, decision: Decision) -> Knowledge:
+    def knowledge(self, decision: RecordedDecision) -> Knowledge:
         """Return what was known when a decision was made."""
         resources: dict[str, str] = {}
         blackboard: dict[str, Any] = {}
@@ -184,18 +184,18 @@ def _check(entries: Iterable[Entry]) -> None:
             str(value["skillset"]), str(value["data"]), value["value"]
 
 
-def _decisions(entries: Iterable[Entry]) -> Iterable[Decision]:
+def _decisions(entries: Iterable[Entry]) -> Iterable[RecordedDecision]:
     for entry in entries:
         if entry.topic == DECISIONS:
             value = entry.value
             words = (str(value[name]) for name in ("kind", "skillset", "skill", "id"))
             kind, skillset, skill, id_ = words
-            yield Decision(int(value["number"]), entry.stamp_s, kind, skillset, skill, id_, dict(value["inputs"]))
+            yield RecordedDecision(int(value["number"]), entry.stamp_s, kind, skillset, skill, id_, dict(value["inputs"]))
 
 
-def _answers(entries: Iterable[Entry]) -> dict[str, Answer]:
+def _answers(entries: Iterable[Entry]) -> dict[str, RecordedEnd]:
     """Put together what is known of each execution."""
-    answers: dict[str, Answer] = {}
+    answers: dict[str, RecordedEnd] = {}
     for entry in entries:
         event = event_of(entry) if entry.topic == EVENTS else None
         if isinstance(event, ExecutionEvent):
@@ -203,14 +203,14 @@ def _answers(entries: Iterable[Entry]) -> dict[str, Answer]:
     return answers
 
 
-def _advance(before: Answer | None, event: ExecutionEvent) -> Answer:
+def _advance(before: RecordedEnd | None, event: ExecutionEvent) -> RecordedEnd:
     inputs = event.inputs if isinstance(event.inputs, Mapping) else {}
-    answer = before or Answer(event.skillset, event.skill, event.id, dict(inputs), event.stamp_s)
+    answer = before or RecordedEnd(event.skillset, event.skill, event.id, dict(inputs), event.stamp_s)
     if answer.state.terminal:
         return answer
     ended_s = event.stamp_s if event.state.terminal else None
     values = {"state": event.state, "result": event.result, "message": event.message, "outputs": dict(event.outputs), "ended_s": ended_s}
-    return Answer(**{**vars(answer), **values})
+    return RecordedEnd(**{**vars(answer), **values})
 
 
 def _short(value: Any) -> str:

@@ -23,8 +23,8 @@ from alula.missions.plan import MissionPlan
 from alula.missions.record import MissionRecord
 from alula.missions.skillset import MissionClient, Recorder
 from alula.records.replay.comparison import Comparison, Difference
-from alula.records.replay.recorded import Decision, Knowledge, Recorded, ReplayError
-from alula.records.replay.vehicle import Vehicle
+from alula.records.replay.recorded import Knowledge, Recorded, RecordedDecision, ReplayError
+from alula.records.replay.robot import ReplayedRobot
 from alula.records.tree import path_to
 from alula.runtime.client import Client
 from alula.runtime.core.events import EngineEvent
@@ -45,7 +45,7 @@ class Result:
     mission clock, as ``lift_off_s``, which is known with a record only.
     """
 
-    decisions: Sequence[Decision]
+    decisions: Sequence[RecordedDecision]
     difference: Difference | None
     end: End | None
     notes: Sequence[str]
@@ -87,7 +87,7 @@ class Replay:
     def __init__(
         self,
         recorded: Recorded,
-        vehicle: Vehicle,
+        vehicle: ReplayedRobot,
         entries: Iterable[Entry],
         plan: MissionPlan,
         *,
@@ -102,7 +102,7 @@ class Replay:
         self._rate = rate
         self._ticked = recorded.started
         self.vehicle = vehicle
-        self.decisions: list[Decision] = []
+        self.decisions: list[RecordedDecision] = []
         self._world = self.vehicle.world
         clock_ns = lambda: self._world.clock.now_ns  # noqa: E731
         self._record = None if record is None else record(clock_ns)
@@ -206,7 +206,7 @@ class Replay:
     def decision(self, kind: str, skillset: str, skill: str, execution_id: str, inputs: Mapping[str, object]) -> None:
         """Hold a request of the tree against the record."""
         said: dict[str, Any] = to_plain(inputs)
-        now = Decision(len(self.decisions) + 1, self._world.now_s, kind, skillset, skill, execution_id, said)
+        now = RecordedDecision(len(self.decisions) + 1, self._world.now_s, kind, skillset, skill, execution_id, said)
         if self._may_go_on():  # else this is the rest of the tick that has decided otherwise
             self.decisions.append(now)
         then = self._comparison.decided(now, self.vehicle.recorded_id(execution_id))

@@ -1,6 +1,6 @@
 """Mocks: skills whose behaviour is a script, over the same managers and the same interface as the real ones."""
 
-from alula.runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, MockFault, Rule, TimelineEvent, Value
+from alula.runtime.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Rule, TimelineEvent, Value
 from alula.runtime.mock.errors import BehaviourError
 from alula.runtime.mock.formula import Formula, FormulaError
 from alula.runtime.mock.host import MockHost
@@ -15,13 +15,13 @@ __all__ = [
     "NEVER",
     "Behaviour",
     "BehaviourError",
-    "Change",
     "Choice",
     "DataScript",
     "Ending",
     "Formula",
     "FormulaError",
     "LocalMockHost",
+    "MockChange",
     "MockFault",
     "MockHost",
     "MockRobot",

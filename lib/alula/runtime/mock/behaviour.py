@@ -38,7 +38,7 @@ NEVER = Ending()
 
 
 @dataclass(frozen=True)
-class Change:
+class MockChange:
     """Extern transitions after a while, in seconds: what the functional layer finds out."""
 
     after_s: Value
@@ -61,7 +61,7 @@ class Rule:
     ending: Ending | None = None
     progress: Value | tuple[tuple[float, float], ...] | None = None
     outputs: Mapping[str, Value] | None = None
-    changes: tuple[Change, ...] | None = None
+    changes: tuple[MockChange, ...] | None = None
     moves: Mapping[str, Value] | None = None
     source: str = ""
 
@@ -74,7 +74,7 @@ class Script:
     ending: Ending
     progress: Value | tuple[tuple[float, float], ...]
     outputs: Mapping[str, Value]
-    changes: tuple[Change, ...]
+    changes: tuple[MockChange, ...]
     moves: Mapping[str, Value]
 
 
@@ -99,7 +99,7 @@ class MockFault:
     states: Mapping[Place, str]
     delay: Value = 0.0
     anchor: tuple[Place, str] | None = None
-    changes: tuple[Change, ...] = ()
+    changes: tuple[MockChange, ...] = ()
     ends: Mapping[Place, str] = field(default_factory=dict)
     source: str = ""
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from alula.common.located_yaml import Located, choices, read_yaml
 from alula.model.model import Skill, Skillset
-from alula.runtime.mock.behaviour import NEVER, Behaviour, Change, DataScript, Ending, MockFault, Place, Rule, TimelineEvent, Value
+from alula.runtime.mock.behaviour import NEVER, Behaviour, DataScript, Ending, MockChange, MockFault, Place, Rule, TimelineEvent, Value
 from alula.runtime.mock.errors import BehaviourError
 from alula.runtime.mock.formula import Formula, FormulaError
 
@@ -141,9 +141,9 @@ class _Reader:
 
     # --- the clock ---------------------------------------------------------------------------------------------------
 
-    def _change(self, part: Located, known: Collection[str]) -> Change:
+    def _change(self, part: Located, known: Collection[str]) -> MockChange:
         said = part.record("a change", ("after", "set"))
-        return Change(self._duration(self._needed(part, said, "after"), known), self._states(self._needed(part, said, "set")))
+        return MockChange(self._duration(self._needed(part, said, "after"), known), self._states(self._needed(part, said, "set")))
 
     def _timeline_event(self, part: Located) -> TimelineEvent:
         said = part.record("an entry of the timeline", ("after", "since", "set"))

@@ -20,12 +20,12 @@ from lidar_mapping import (
     ImuReading,
     InertialFilter,
     InertialNoise,
+    InertialState,
     Keyframes,
     LidarInertialOdometry,
     OdometrySettings,
     Patches,
     RegistrationSettings,
-    State,
     Surface,
     downsample,
     flat_patches,
@@ -39,11 +39,11 @@ ROOT = Path(__file__).resolve().parents[4]
 DATA = Path(os.environ.get("ALULA_DATA", ROOT.parent / "shared" / "data"))
 small = st.floats(-0.3, 0.3)
 vectors = st.tuples(small, small, small).map(np.array)
-IDENTITY = State(np.eye(3), np.zeros(3), np.zeros(3))
+IDENTITY = InertialState(np.eye(3), np.zeros(3), np.zeros(3))
 
 
 def filter_at(position=(0.0, 0.0, 2.0), *, sigma_m=0.1, sigma_rad=0.02) -> InertialFilter:
-    found = InertialFilter(InertialNoise(start_attitude_rad=sigma_rad), 0, State(np.eye(3), np.zeros(3), np.array(position)))
+    found = InertialFilter(InertialNoise(start_attitude_rad=sigma_rad), 0, InertialState(np.eye(3), np.zeros(3), np.array(position)))
     found.covariance[6:9, 6:9] = np.eye(3) * sigma_m**2
     return found
 
@@ -52,13 +52,13 @@ def filter_at(position=(0.0, 0.0, 2.0), *, sigma_m=0.1, sigma_rad=0.02) -> Inert
 @settings(max_examples=40)
 def test_an_error_leads_from_one_state_to_the_other(turn, velocity, position, gyro, accel, autopilot, drift) -> None:
     error = np.concatenate([turn, velocity, position, gyro, accel, autopilot, drift])
-    start = State(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro, gyro[::-1], drift[::-1])
+    start = InertialState(Rotation.from_rotvec(turn[::-1]).as_matrix(), position, velocity, accel, gyro, gyro[::-1], drift[::-1])
     assert start.plus(error).minus(start) == pytest.approx(error, abs=1e-9)
 
 
 def test_propagation_follows_a_known_motion_and_grows_uncertain() -> None:
     rate, speed = 0.5, 2.0  # rad/s about z, m/s: a circle of 4 m
-    found = InertialFilter(InertialNoise(), 0, State(np.eye(3), np.array([speed, 0.0, 0.0]), np.zeros(3)))
+    found = InertialFilter(InertialNoise(), 0, InertialState(np.eye(3), np.array([speed, 0.0, 0.0]), np.zeros(3)))
     before = found.covariance.copy()
     for k in range(1, 1001):
         found.propagate(ImuReading(k * 2_000_000, np.array([0.0, 0.0, rate]), np.array([0.0, speed * rate, 9.81])))
@@ -253,7 +253,7 @@ def test_a_sweep_in_the_hand_is_straightened_within_four_centimetres(number) -> 
     found = odometry()
     speeds = np.diff(poses[:, :3, 3], axis=0) / np.diff(moments)[:, None]
     forces = np.vstack([np.zeros((1, 3)), np.diff(speeds, axis=0) / np.diff(moments)[1:, None]]) + np.array([0.0, 0.0, 9.81])
-    found.filter.state = State(poses[0][:3, :3], speeds[0], poses[0][:3, 3])
+    found.filter.state = InertialState(poses[0][:3, :3], speeds[0], poses[0][:3, 3])
     found.filter.history[-1] = (0, found.filter.state)
     readings = []
     for before, after, force, moment, then in zip(poses, poses[1:], forces, moments, moments[1:], strict=False):

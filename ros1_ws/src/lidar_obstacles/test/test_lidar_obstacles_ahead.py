@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from lidar_obstacles import LidarAhead, LidarSettings
-from perception_core import NS, Motion, PoseBuffer, Sweep
+from perception_core import NS, PoseBuffer, Sweep, VehicleMotion
 from perception_core.testing import box_cloud
 
 T_BASE_LIDAR = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # spins across the nose
@@ -46,11 +46,11 @@ def test_sideways_flight_sees_what_is_beside_the_nose_whatever_the_yaw(yaw, dist
     cloud = box_cloud((distance, 0.0, 0.0), seed=seed)
     cloud[:, [1, 2]] = cloud[:, [2, 1]]  # the cloud's ground is below: sensor y is up
     left = (-np.sin(yaw), np.cos(yaw), 0.0)
-    found = look(sweep(cloud), crab(yaw), Motion(velocity_enu_m_s=tuple(0.8 * np.array(left))))
+    found = look(sweep(cloud), crab(yaw), VehicleMotion(velocity_enu_m_s=tuple(0.8 * np.array(left))))
     assert found is not None
     assert found.distance_m == pytest.approx(distance - 0.25, abs=0.15)
     assert np.array(found.point_enu_m)[:2] @ np.array(left)[:2] == pytest.approx(found.distance_m, abs=0.1)
-    right = Motion(velocity_enu_m_s=tuple(-0.8 * np.array(left)))
+    right = VehicleMotion(velocity_enu_m_s=tuple(-0.8 * np.array(left)))
     assert look(sweep(cloud), crab(yaw), right) is None
 
 
@@ -60,7 +60,7 @@ def test_what_has_no_time_is_an_obstacle_all_the_same(timeless) -> None:
     cloud[:, [1, 2]] = cloud[:, [2, 1]]
     times = np.linspace(-0.02, 0.02, len(cloud))
     times[:timeless] = np.nan  # none, the box's, or all
-    found = look(sweep(cloud, times), crab(), Motion(velocity_enu_m_s=(0.0, 1.0, 0.0)))
+    found = look(sweep(cloud, times), crab(), VehicleMotion(velocity_enu_m_s=(0.0, 1.0, 0.0)))
     assert found is not None
     assert found.distance_m == pytest.approx(5.75, abs=0.15)
 
@@ -69,14 +69,14 @@ def test_own_returns_and_ground_are_no_obstacle() -> None:
     cloud = box_cloud((99.0, 0.0, 0.0), seed=3)[60:]
     cloud[:, [1, 2]] = cloud[:, [2, 1]]
     for target in ((0.0, 20.0, 3.0), (0.0, -20.0, 3.0), (20.0, 0.0, 3.0)):
-        assert look(sweep(cloud), crab(), Motion(target_enu_m=target)) is None
+        assert look(sweep(cloud), crab(), VehicleMotion(target_enu_m=target)) is None
 
 
 def test_a_sweep_in_motion_is_measured_from_its_end() -> None:
     velocity = (0.0, 2.0, 0.0)
     times = np.linspace(0.0, 0.1, 50)
     wall = np.column_stack([6.0 - 2.0 * times, np.linspace(-0.3, 0.3, 50), np.linspace(-0.3, 0.3, 50)])
-    found = look(sweep(wall, times), crab(velocity=velocity), Motion(velocity_enu_m_s=velocity))
+    found = look(sweep(wall, times), crab(velocity=velocity), VehicleMotion(velocity_enu_m_s=velocity))
     assert found is not None
     assert found.distance_m == pytest.approx(5.8, abs=0.01)
 
@@ -85,18 +85,18 @@ def test_where_the_lidar_does_not_look_is_unknown_and_not_free() -> None:
     rng = np.random.default_rng(5)
     # The scan plane is across the nose: nothing but the two sides, a floor of 30 degrees' width below, and no return from ahead.
     sides = np.column_stack([rng.choice([-6.0, 6.0], 500), rng.uniform(-2, 2, 500), rng.uniform(-1.5, 1.5, 500)])
-    forward = ahead(sweep(sides), crab(), Motion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
+    forward = ahead(sweep(sides), crab(), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0)))
     assert forward.nearest is None
     assert forward.unknown == "the LiDAR does not look where the vehicle goes: 0 returns from there"
-    assert ahead(sweep(sides), crab(), Motion(velocity_enu_m_s=(1.0, 0.0, 0.0)), min_ahead=0).unknown == ""
-    assert ahead(sweep(sides), crab(), Motion(velocity_enu_m_s=(0.0, 1.0, 0.0))).nearest is not None
+    assert ahead(sweep(sides), crab(), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0)), min_ahead=0).unknown == ""
+    assert ahead(sweep(sides), crab(), VehicleMotion(velocity_enu_m_s=(0.0, 1.0, 0.0))).nearest is not None
 
 
 @pytest.mark.parametrize("distance_m", [1.15, 1.5, 3.0])
 def test_what_is_just_outside_of_the_vehicle_is_an_obstacle(distance_m) -> None:
     rng = np.random.default_rng(6)
     pole = np.column_stack([distance_m + rng.normal(0, 0.01, 60), rng.uniform(-0.4, 0.4, 60), rng.normal(0, 0.02, 60)])
-    found = look(sweep(pole), crab(), Motion(target_enu_m=(0.0, 20.0, 3.0)))
+    found = look(sweep(pole), crab(), VehicleMotion(target_enu_m=(0.0, 20.0, 3.0)))
     assert found is not None
     assert found.distance_m == pytest.approx(distance_m, abs=0.05)
 
@@ -105,7 +105,7 @@ def test_where_returns_were_just_lost_is_unknown_unless_an_obstacle_is_seen() ->
     rng = np.random.default_rng(8)
     # The vehicle flies to its left, which is the sensor's x: sector 18 of 36 begins there. Far walls on both sides.
     walls = np.column_stack([rng.choice([-20.0, 20.0], 900), rng.uniform(-9, 9, 900), rng.uniform(-5, 5, 900)])
-    left, right = Motion(velocity_enu_m_s=(0.0, 1.0, 0.0)), Motion(velocity_enu_m_s=(0.0, -1.0, 0.0))
+    left, right = VehicleMotion(velocity_enu_m_s=(0.0, 1.0, 0.0)), VehicleMotion(velocity_enu_m_s=(0.0, -1.0, 0.0))
     looker = LidarAhead(LidarSettings().ahead)
 
     def look_with(gone_sectors, motion, points=walls):
@@ -138,7 +138,7 @@ def yard(*, elevations_deg, columns=720, gap_deg=None) -> np.ndarray:
 
 
 def forward(points) -> str:
-    looker, motion = LidarAhead(LidarSettings().ahead), Motion(velocity_enu_m_s=(1.0, 0.0, 0.0))
+    looker, motion = LidarAhead(LidarSettings().ahead), VehicleMotion(velocity_enu_m_s=(1.0, 0.0, 0.0))
     ahead = looker.look(sweep(points), T_base_lidar=np.eye(4), poses=crab(position=(0.0, 0.0, 2.0)), motion=motion)
     assert ahead.nearest is None
     return ahead.unknown
@@ -203,7 +203,7 @@ def test_obstacles_of_a_real_street_are_where_trying_all_finds_them(scan) -> Non
     found: list[tuple[float | None, float | None]] = []
     for towards_deg in range(0, 360, 20):
         turn = np.radians(towards_deg)
-        motion = Motion(velocity_enu_m_s=(float(np.cos(turn)), float(np.sin(turn)), 0.0))
+        motion = VehicleMotion(velocity_enu_m_s=(float(np.cos(turn)), float(np.sin(turn)), 0.0))
         seen = LidarAhead(settings.ahead).look(sweep(points), T_base_lidar=np.eye(4), poses=crab(position=(0.0, 0.0, 1.73)), motion=motion)
         found.append(
             (None if seen.nearest is None else seen.nearest.distance_m, by_trying_all(points.astype(float), towards_deg, settings))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lidar_obstacles import GroundModel, GroundSettings, LidarAhead, LidarSettings
-from perception_core import NS, Motion, PoseBuffer, Sweep
+from perception_core import NS, PoseBuffer, Sweep, VehicleMotion
 from perception_core.corridor import corridor_coordinates
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -42,7 +42,7 @@ def look(points, *, height_m, speed=1.0, **changes):
     poses.add(NS, (0.0, 0.0, height_m), (0.0, 0.0, 0.0, 1.0))
     sweep = Sweep(NS, (points - [0.0, 0.0, height_m]).astype(np.float32), np.zeros(len(points), np.float32))
     ahead = LidarAhead(LidarSettings(**changes).ahead)
-    return ahead.look(sweep, T_base_lidar=np.eye(4), poses=poses, motion=Motion(velocity_enu_m_s=(speed, 0.0, 0.0))).nearest
+    return ahead.look(sweep, T_base_lidar=np.eye(4), poses=poses, motion=VehicleMotion(velocity_enu_m_s=(speed, 0.0, 0.0))).nearest
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 2.0, 4.0, 6.0, 8.0])

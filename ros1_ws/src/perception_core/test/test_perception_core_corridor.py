@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception_core import Corridor, Motion, Support, direction_of_motion, nearest_obstacle
+from perception_core import Corridor, Support, VehicleMotion, direction_of_motion, nearest_obstacle
 
 EAST = np.array([1.0, 0.0, 0.0])
 ORIGIN = np.array([0.0, 0.0, 3.0])
@@ -100,10 +100,10 @@ def test_points_without_depth_are_left_out() -> None:
 
 def test_direction_is_of_the_velocity_then_of_the_target_then_of_the_nose() -> None:
     nose = np.array([0.0, 1.0, 0.1])
-    sideways = Motion(velocity_enu_m_s=(-1.0, 0.0, 0.3), target_enu_m=(9.0, 0.0, 3.0))
+    sideways = VehicleMotion(velocity_enu_m_s=(-1.0, 0.0, 0.3), target_enu_m=(9.0, 0.0, 3.0))
     assert direction_of_motion(ORIGIN, nose, sideways) == pytest.approx([-1.0, 0.0, 0.0])
-    slow = Motion(velocity_enu_m_s=(-0.1, 0.0, 2.0), target_enu_m=(9.0, 0.0, 5.0))
+    slow = VehicleMotion(velocity_enu_m_s=(-0.1, 0.0, 2.0), target_enu_m=(9.0, 0.0, 5.0))
     assert direction_of_motion(ORIGIN, nose, slow) == pytest.approx([1.0, 0.0, 0.0])
-    there = Motion(target_enu_m=(0.1, 0.0, 9.0))
+    there = VehicleMotion(target_enu_m=(0.1, 0.0, 9.0))
     assert direction_of_motion(ORIGIN, nose, there) == pytest.approx([0.0, 1.0, 0.0])
-    assert direction_of_motion(ORIGIN, nose, Motion()) == pytest.approx([0.0, 1.0, 0.0])
+    assert direction_of_motion(ORIGIN, nose, VehicleMotion()) == pytest.approx([0.0, 1.0, 0.0])

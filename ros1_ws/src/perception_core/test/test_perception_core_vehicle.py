@@ -11,12 +11,12 @@ from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
 from perception_core.conversions import GUIDANCE_MAP
-from perception_core.vehicle import Vehicle
+from perception_core.vehicle import KnownVehicle
 
 
 @pytest.fixture
-def vehicle() -> Vehicle:
-    return Vehicle()
+def vehicle() -> KnownVehicle:
+    return KnownVehicle()
 
 
 def state(reference: str = "position") -> GuidanceState:
@@ -30,7 +30,7 @@ def transform(parent: str, child: str, yaw_rad: float, x: float, y: float) -> TF
     return TFMessage(transforms=[item])
 
 
-def test_motion_is_turned_from_the_guidances_map_into_the_frame_of_the_poses(vehicle: Vehicle) -> None:
+def test_motion_is_turned_from_the_guidances_map_into_the_frame_of_the_poses(vehicle: KnownVehicle) -> None:
     vehicle._on_transforms(transform("map", "odom", 1.0, 50.0, 0.0))
     vehicle._on_transforms(transform("odom", GUIDANCE_MAP, math.pi / 2, 2.0, -1.0))
     vehicle._on_state(state())
@@ -40,7 +40,7 @@ def test_motion_is_turned_from_the_guidances_map_into_the_frame_of_the_poses(veh
     assert vehicle.motion.target_enu_m is None
 
 
-def test_a_sensor_is_found_through_all_frames_between_and_with_a_slash_before_its_name(vehicle: Vehicle) -> None:
+def test_a_sensor_is_found_through_all_frames_between_and_with_a_slash_before_its_name(vehicle: KnownVehicle) -> None:
     vehicle._on_static(transform("camera", "zed_left", 0.0, 0.1, 0.0))
     with pytest.raises(LookupError, match="no transform from base_link to 'zed_left'"):
         vehicle.mount("zed_left")
@@ -52,7 +52,7 @@ def test_a_sensor_is_found_through_all_frames_between_and_with_a_slash_before_it
         vehicle.mount("zed_left")
 
 
-def test_a_transform_that_is_no_motion_moves_nothing(vehicle: Vehicle) -> None:
+def test_a_transform_that_is_no_motion_moves_nothing(vehicle: KnownVehicle) -> None:
     vehicle._on_transforms(transform("odom", "guidance_map", math.pi / 2, 1.0, 2.0))
     told = vehicle.T_odom_map()
     vehicle._on_transforms(transform("odom", "guidance_map", 0.0, math.nan, 0.0))
@@ -62,7 +62,7 @@ def test_a_transform_that_is_no_motion_moves_nothing(vehicle: Vehicle) -> None:
     assert vehicle.T_odom_map() is told
 
 
-def test_without_a_correction_as_in_recordings_of_before_the_motion_is_what_the_guidance_says(vehicle: Vehicle) -> None:
+def test_without_a_correction_as_in_recordings_of_before_the_motion_is_what_the_guidance_says(vehicle: KnownVehicle) -> None:
     vehicle._on_state(state())
     assert vehicle.motion.velocity_enu_m_s == (1.0, 0.0, 0.5)
     assert vehicle.motion.target_enu_m == (10.0, 0.0, 3.0)

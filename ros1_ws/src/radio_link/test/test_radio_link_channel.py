@@ -12,7 +12,7 @@ from radio_link.channel import NS, OVERHEAD_BYTES, Channel, Condition
 from radio_link.conditions import PRESETS, Quality
 from radio_link.laws import LAWS, LinkBudget, condition_by_law, free_space_db, obstructed_db, two_ray_db
 from radio_link.radio import FAULTS, Radio, by_zones
-from radio_link.vehicle import Vehicle
+from radio_link.vehicle import RadioCarrier
 
 from alula.common.faults import parse_faults
 from uav_simulator.world.radio import BoxVolume, CylinderVolume, RadioQuality, RadioZone
@@ -177,7 +177,7 @@ def test_every_law_gives_less_behind_a_wall_or_farther_away(name: str):
 
 
 def test_without_a_simulator_the_guidance_says_where_the_vehicle_is_and_when_it_lifted_off():
-    vehicle = Vehicle()
+    vehicle = RadioCarrier()
     vehicle.guided((0.0, 0.0, 0.0), 0, 1.0)
     vehicle.guided((0.0, 0.0, 0.0), 1, 2.0)
     assert vehicle.lift_off_s is None
@@ -187,13 +187,13 @@ def test_without_a_simulator_the_guidance_says_where_the_vehicle_is_and_when_it_
 
 
 def test_guidance_that_is_heard_in_the_air_first_tells_of_no_lift_off():
-    vehicle = Vehicle()
+    vehicle = RadioCarrier()
     vehicle.guided((0.0, 0.0, 5.0), 2, 3.0)
     assert vehicle.lift_off_s is None
 
 
 def test_a_simulator_knows_better_than_the_guidance():
-    vehicle = Vehicle()
+    vehicle = RadioCarrier()
     vehicle.simulated_at((1.0, 2.0, 3.0))
     vehicle.simulated_lift_off(None)
     vehicle.guided((9.0, 9.0, 9.0), 1, 4.0)

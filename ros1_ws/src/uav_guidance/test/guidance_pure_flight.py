@@ -9,9 +9,9 @@ from guidance_fake_autopilot import FakeVehicle
 
 from uav_guidance.encoding import command_message, heartbeat_message, interval_message, setpoint_message
 from uav_guidance.follower import Setpoint
-from uav_guidance.guidance import Guidance, Report
-from uav_guidance.requests import Decision, PositionRequest, Request, TakeoffRequest
-from uav_guidance.settings import Settings
+from uav_guidance.guidance import Guidance, GuidanceStatus
+from uav_guidance.requests import GuidanceDecision, PositionRequest, Request, TakeoffRequest
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.vectors import Vec3
 
@@ -19,9 +19,9 @@ from uav_guidance.vectors import Vec3
 class PureFlight:
     """Ticks of 20 ms; the guidance steps at every second or third of them, as the node does at 20 Hz on a clock of 50 Hz."""
 
-    def __init__(self, settings: Settings | None = None) -> None:
+    def __init__(self, settings: GuidanceSettings | None = None) -> None:
         self.vehicle = FakeVehicle(self._receive)
-        self.guidance = Guidance(settings or Settings())
+        self.guidance = Guidance(settings or GuidanceSettings())
         self.setpoints: list[tuple[float, Setpoint]] = []
         self.cut = False
         self.withheld: set[str] = set()
@@ -35,7 +35,7 @@ class PureFlight:
         return self.vehicle.now_s
 
     @property
-    def report(self) -> Report:
+    def report(self) -> GuidanceStatus:
         return self.guidance.report(self.now_s)
 
     @property
@@ -66,7 +66,7 @@ class PureFlight:
         while self.now_s < end_s:
             self.tick()
 
-    def until(self, condition: Callable[[Report], bool], limit_s: float = 60.0) -> float:
+    def until(self, condition: Callable[[GuidanceStatus], bool], limit_s: float = 60.0) -> float:
         """Fly until the condition holds; return for how long."""
         begin_s = self.now_s
         while not condition(self.report):
@@ -75,12 +75,12 @@ class PureFlight:
                 pytest.fail(f"not within {limit_s} s; last: {self.report}")
         return self.now_s - begin_s
 
-    def ask(self, request: Request) -> Decision:
+    def ask(self, request: Request) -> GuidanceDecision:
         decision = self.guidance.ask(request, self.now_s)
         self.step()
         return decision
 
-    def agreed(self, request: Request) -> Decision:
+    def agreed(self, request: Request) -> GuidanceDecision:
         """Ask, and wait for the autopilot's agreement or refusal as the service does."""
         decision = self.ask(request)
         procedure = decision.procedure
@@ -88,7 +88,7 @@ class PureFlight:
             return decision
         self.until(lambda _: procedure.outcome is not None, 20.0)
         assert procedure.outcome is not None
-        return Decision(procedure.outcome.accepted, procedure.outcome.reason, decision.reference_id)
+        return GuidanceDecision(procedure.outcome.accepted, procedure.outcome.reason, decision.reference_id)
 
     def take_off(self, height_m: float = 3.0) -> None:
         self.until(lambda r: r.authority and r.vehicle.ready)
@@ -96,7 +96,7 @@ class PureFlight:
         assert decision.accepted, decision.reason
         self.until(lambda r: r.vehicle.landed == 2 and r.course.remaining_enu_m.norm < 0.1)
 
-    def go(self, x: float, y: float, z: float = 3.0, *, speed: float = 1.5, along: bool = False) -> Decision:
+    def go(self, x: float, y: float, z: float = 3.0, *, speed: float = 1.5, along: bool = False) -> GuidanceDecision:
         return self.ask(PositionRequest(Vec3(x, y, z), speed, along))
 
     def _receive(self, message: object) -> None:

@@ -8,16 +8,16 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from uav_guidance.commands import ANSWER_S, ATTEMPTS, LIFT_OFF_S, Procedure, arm, disarm, set_mode, take_off
 from uav_guidance.requests import AuthorityRequest, HoverRequest, LandRequest, TakeoffRequest
-from uav_guidance.vehicle import Landed, Mode, Vehicle
+from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot
 
 HEARTBEAT, LANDED_STATE = "HEARTBEAT", "EXTENDED_SYS_STATE"
 FAILED = 4
 DONE = [
-    (set_mode(Mode.GUIDED), HEARTBEAT, Vehicle(mode=Mode.STABILIZE), Vehicle(mode=Mode.GUIDED)),
-    (set_mode(Mode.LAND), HEARTBEAT, Vehicle(mode=Mode.GUIDED), Vehicle(mode=Mode.LAND)),
-    (arm(), HEARTBEAT, Vehicle(), Vehicle(armed=True)),
-    (disarm(), HEARTBEAT, Vehicle(armed=True), Vehicle()),
-    (take_off(3.0), LANDED_STATE, Vehicle(landed=Landed.ON_GROUND), Vehicle(landed=Landed.TAKING_OFF)),
+    (set_mode(Mode.GUIDED), HEARTBEAT, VehicleSnapshot(mode=Mode.STABILIZE), VehicleSnapshot(mode=Mode.GUIDED)),
+    (set_mode(Mode.LAND), HEARTBEAT, VehicleSnapshot(mode=Mode.GUIDED), VehicleSnapshot(mode=Mode.LAND)),
+    (arm(), HEARTBEAT, VehicleSnapshot(), VehicleSnapshot(armed=True)),
+    (disarm(), HEARTBEAT, VehicleSnapshot(armed=True), VehicleSnapshot()),
+    (take_off(3.0), LANDED_STATE, VehicleSnapshot(landed=Landed.ON_GROUND), VehicleSnapshot(landed=Landed.TAKING_OFF)),
 ]
 NAMES = [command.name for command, *_ in DONE]
 

@@ -9,7 +9,7 @@ from guidance_fake_autopilot import GUIDED, LAND, LOITER, STABILIZE
 
 from uav_guidance.guidance import Guidance
 from uav_guidance.requests import AuthorityRequest, HoverRequest, LandRequest, PositionRequest, TakeoffRequest
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
 
 MODE, ARM, TAKEOFF = "MAV_CMD_DO_SET_MODE", "MAV_CMD_COMPONENT_ARM_DISARM", "MAV_CMD_NAV_TAKEOFF"
@@ -50,7 +50,7 @@ def test_life_is_any_message(flying):
     assert flying.report.authority
     flying.cut = True
     lost_s = flying.until(lambda r: not r.link, 4.0)
-    assert lost_s == pytest.approx(Settings().link_lost_s, abs=0.1)
+    assert lost_s == pytest.approx(GuidanceSettings().link_lost_s, abs=0.1)
 
 
 def test_a_link_lost_is_told_from_a_take_over(flying, said):
@@ -74,7 +74,7 @@ def test_spooling_up_is_no_lack_of_progress(flight):
 
 
 def test_a_guidance_started_again_in_flight_reports_nothing_before_it_knows(flying):
-    flying.guidance = Guidance(Settings())
+    flying.guidance = Guidance(GuidanceSettings())
     reported = []
     for _ in range(60):
         flying.run(0.05)
@@ -85,10 +85,10 @@ def test_a_guidance_started_again_in_flight_reports_nothing_before_it_knows(flyi
 
 
 def test_a_guidance_without_a_vehicle_says_so_after_a_while():
-    guidance = Guidance(Settings())
+    guidance = Guidance(GuidanceSettings())
     guidance.step(10.0)
     assert guidance.resources() == {}
-    guidance.step(10.0 + Settings().link_lost_s + 0.1)
+    guidance.step(10.0 + GuidanceSettings().link_lost_s + 0.1)
     assert guidance.resources() == {"SDK_authority": "UNAVAILABLE", "homepoint_status": "INVALID"}
 
 

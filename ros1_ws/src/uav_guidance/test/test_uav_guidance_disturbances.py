@@ -9,11 +9,11 @@ from guidance_fake_autopilot import GUIDED, LAND
 from guidance_pure_flight import PureFlight
 
 from uav_guidance.requests import HeadingRequest, HoverRequest, LandRequest, PositionRequest
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
 
 RTL = 6
-LEAD_M = Settings().lead_m(1.5)
+LEAD_M = GuidanceSettings().lead_m(1.5)
 
 
 def farthest_setpoint_m(flight: PureFlight, duration_s: float) -> float:

@@ -9,7 +9,7 @@ from guidance_fake_autopilot import GUIDED, LOITER
 
 from uav_guidance.guidance import Guidance
 from uav_guidance.requests import HeadingRequest, HoverRequest, LandRequest, PositionRequest, TakeoffRequest
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
 
 MODE, ARM, TAKEOFF = "MAV_CMD_DO_SET_MODE", "MAV_CMD_COMPONENT_ARM_DISARM", "MAV_CMD_NAV_TAKEOFF"
@@ -206,7 +206,7 @@ def test_restarted_in_the_air_it_hovers_and_commands_nothing(flying):
     old_id = flying.report.reference_id
     flying.run(4.0)
     commands = list(flying.commands)
-    flying.guidance = Guidance(Settings())
+    flying.guidance = Guidance(GuidanceSettings())
     flying.until(lambda r: r.course.reference == "hover", 1.5)
     assert flying.report.authority
     flying.run(3.0)

@@ -16,7 +16,7 @@ from uav_guidance.frames import quaternion_enu_flu, rotated, turned_about_vertic
 from uav_guidance.guidance import Guidance
 from uav_guidance.localization import NO_CORRECTION, Correction, Localization, Transform
 from uav_guidance.requests import HeadingRequest, TakeoffRequest
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import ZERO, Vec3
 
 STEP_S = 0.05
@@ -43,7 +43,7 @@ def told(
 
 def begun(**changes: float) -> Localization:
     """Return one that has stood on the ground with an identity, for longer than the mapping takes to settle."""
-    localization = Localization(Settings(**changes))
+    localization = Localization(GuidanceSettings(**changes))
     told(localization, Transform(LEVEL, ZERO), -10.0)
     told(localization, Transform(LEVEL, ZERO), 0.0)
     localization.step(ZERO, 0.0, flying=False)
@@ -98,7 +98,7 @@ def test_a_tilt_of_the_transform_does_not_lift_a_vehicle_far_from_the_origin():
 
 @given(st.lists(st.tuples(st.floats(-0.15, 0.15), st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), places), min_size=1, max_size=20))
 def test_place_and_heading_move_at_a_bounded_rate_wherever_the_vehicle_is(steps):
-    limits = Settings(map_jump_m=100.0, map_jump_rad=3.0)
+    limits = GuidanceSettings(map_jump_m=100.0, map_jump_rad=3.0)
     localization = begun(map_jump_m=100.0, map_jump_rad=3.0)
     for count, (yaw, x, y, place) in enumerate(steps, start=1):
         now_s = count * STEP_S
@@ -165,7 +165,7 @@ def test_the_last_correction_is_kept_while_the_mapping_is(kept):
 
 def test_a_guidance_that_has_just_started_takes_what_a_stopped_mapping_holds_but_not_what_a_lost_one_does():
     for problem, shift in (("", 0.5), ("no scan fitted", 0.0)):
-        localization = Localization(Settings())
+        localization = Localization(GuidanceSettings())
         localization.hear_state(running=False, problem=problem, scans=50, now_s=100.0)
         localization.hear_transform(about_vertical(0.0, Vec3(0.5, 0.0, 0.0)))
         localization.step(ZERO, 100.0, flying=True)
@@ -173,7 +173,7 @@ def test_a_guidance_that_has_just_started_takes_what_a_stopped_mapping_holds_but
 
 
 def test_the_first_correction_and_a_far_one_are_taken_at_once_and_told():
-    localization = Localization(Settings())
+    localization = Localization(GuidanceSettings())
     for now_s in (0.0, 5.0, 10.0):
         told(localization, about_vertical(0.0, Vec3(0.6, 0.0, 0.0)), now_s)
     assert localization.step(ZERO, 10.0, flying=True)
@@ -199,7 +199,7 @@ def raised(localization, height_m, now_s, *, flying=True):
 
 def test_a_map_that_slowly_leaves_the_measured_height_is_followed_within_bounds():
     localization = begun()
-    most_m = Settings().map_height_m
+    most_m = GuidanceSettings().map_height_m
     assert raised(localization, 0.5 * most_m, 1.0) == pytest.approx(0.5 * most_m)
     for count in range(1, 30):  # on and on, at last by metres
         assert raised(localization, 0.5 * most_m + 0.1 * count, 20.0 * count) <= most_m + 1e-9
@@ -211,7 +211,7 @@ def test_switched_off_it_returns_to_the_autopilots_position_evenly():
     localization = begun()
     told(localization, about_vertical(0.0, Vec3(0.5, 0.0, 0.0)), 1.0)
     localization.step(ZERO, 1.0, flying=False)
-    localization.tune(Settings(follow_map=False))
+    localization.tune(GuidanceSettings(follow_map=False))
     assert not localization.step(ZERO, 1.05, flying=True)
     assert localization.correction.shift_m.x == pytest.approx(0.49)
     for count in range(60):
@@ -288,7 +288,7 @@ def test_flies_to_the_place_in_the_map_though_the_autopilot_drifts(mapped):
 
 
 def test_switched_off_it_flies_by_the_autopilots_position(mapped):
-    mapped.flight.guidance.tune(Settings(follow_map=False))
+    mapped.flight.guidance.tune(GuidanceSettings(follow_map=False))
     mapped.flight.go(20.0, 0.0)
     mapped.run(25.0, drift_m_s=0.1)
     assert Vec3(*mapped.flight.vehicle.enu).y == pytest.approx(0.0, abs=0.1)
@@ -346,7 +346,7 @@ def test_a_guidance_that_is_started_again_in_flight_begins_with_the_newest_corre
     mapped.flight.go(20.0, 0.0)
     mapped.run(10.0, drift_m_s=0.1)
     flight = mapped.flight
-    flight.guidance = Guidance(Settings())
+    flight.guidance = Guidance(GuidanceSettings())
     place = flight.vehicle.enu
     flight.setpoints.clear()
     mapped.run(3.0)
@@ -377,6 +377,6 @@ def test_an_autopilot_that_counts_from_another_origin_is_found_again_in_the_map(
 def test_the_fence_counts_from_where_home_was_when_the_autopilot_set_it(mapped):
     mapped.T_map_odom = Correction(0.0, Vec3(0.0, 0.9, 0.0))
     mapped.run(8.0)
-    radius_m = Settings().fence_radius_m
+    radius_m = GuidanceSettings().fence_radius_m
     assert not mapped.flight.guidance.fence_reason(Vec3(0.0, radius_m - 0.1, 3.0))
     assert mapped.flight.guidance.fence_reason(Vec3(0.0, radius_m + 0.1, 3.0))

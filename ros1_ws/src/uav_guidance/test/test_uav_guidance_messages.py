@@ -18,7 +18,7 @@ from perception_core.conversions import matrix_of_transform  # noqa: E402
 from uav_guidance.localization import Correction  # noqa: E402
 from uav_guidance.messages import correction_message, map_to_odom, pose_message, sighting  # noqa: E402
 from uav_guidance.vectors import Vec3  # noqa: E402
-from uav_guidance.vehicle import Vehicle  # noqa: E402
+from uav_guidance.vehicle import VehicleSnapshot  # noqa: E402
 
 CORRECTION = Correction(math.pi / 2, Vec3(1.0, 2.0, 0.5))
 
@@ -51,7 +51,7 @@ def test_the_map_as_flown_is_a_frame_of_its_own_that_turns_places_into_odom():
 
 
 def test_the_pose_is_the_autopilots():
-    vehicle = replace(Vehicle(), position_enu_m=Vec3(1.0, 2.0, 3.0), quat_xyzw=(0.0, 0.0, 0.0, 1.0))
+    vehicle = replace(VehicleSnapshot(), position_enu_m=Vec3(1.0, 2.0, 3.0), quat_xyzw=(0.0, 0.0, 0.0, 1.0))
     message = pose_message(vehicle, rospy.Time(7))
     assert message is not None
     assert message.header.frame_id == "odom"

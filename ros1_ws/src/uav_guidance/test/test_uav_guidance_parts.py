@@ -13,13 +13,13 @@ from perception_core.ros.settings import override
 from perception_core.tunable import check_ranges, ranges
 from uav_guidance.commands import ATTEMPTS, Outcome, Procedure, arm, set_mode, take_off
 from uav_guidance.encoding import from_autopilot_to_us
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.stamping import FineClock, StampClock
 from uav_guidance.stillness import StillWatch
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
 from uav_guidance.vectors import Vec3
-from uav_guidance.vehicle import Landed, Mode, Vehicle, mode_name, updated
+from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot, mode_name, updated
 
 # ---- commands
 
@@ -86,17 +86,17 @@ def test_the_reason_is_waited_for_in_the_autopilots_own_time():
     """The mission clock may run ahead of what is read of the link."""
     procedure = Procedure([arm()])
     assert procedure.due(1.0) is not None
-    procedure.on_vehicle("LOCAL_POSITION_NED", Vehicle(boot_ms=50_000))
+    procedure.on_vehicle("LOCAL_POSITION_NED", VehicleSnapshot(boot_ms=50_000))
     procedure.on_answer(400, 4, 1.1)
     assert procedure.due(1.9) is None
     assert procedure.outcome is None, "the autopilot's next 0.4 s were not heard yet"
     procedure.on_text(2, "Arm: Compass not calibrated")
-    procedure.on_vehicle("LOCAL_POSITION_NED", Vehicle(boot_ms=50_400))
+    procedure.on_vehicle("LOCAL_POSITION_NED", VehicleSnapshot(boot_ms=50_400))
     procedure.due(1.9)
     assert procedure.outcome == Outcome(accepted=False, reason="arm failed: Arm: Compass not calibrated")
     silent = Procedure([arm()])
     silent.due(1.0)
-    silent.on_vehicle("LOCAL_POSITION_NED", Vehicle(boot_ms=50_000))
+    silent.on_vehicle("LOCAL_POSITION_NED", VehicleSnapshot(boot_ms=50_000))
     silent.on_answer(400, 4, 1.1)
     silent.due(3.2)
     assert silent.outcome == Outcome(accepted=False, reason="arm failed")
@@ -209,7 +209,7 @@ def test_a_vehicle_that_has_arrived_is_not_still_until_pushed_away():
 
 
 def test_parameters_override_defaults_and_integers_will_do():
-    settings = override(Settings(), {"url": "udpin:127.0.0.1:14550", "fence_radius_m": 30})
+    settings = override(GuidanceSettings(), {"url": "udpin:127.0.0.1:14550", "fence_radius_m": 30})
     assert (settings.url, settings.fence_radius_m, settings.fence_height_m) == ("udpin:127.0.0.1:14550", 30.0, 20.0)
 
 
@@ -225,20 +225,20 @@ def test_parameters_override_defaults_and_integers_will_do():
 )
 def test_wrong_parameters_are_named(parameters, words):
     with pytest.raises(SettingsError) as caught:
-        override(Settings(), parameters)
+        override(GuidanceSettings(), parameters)
     assert words in str(caught.value)
 
 
 def test_every_number_but_the_baud_rate_may_be_changed_in_flight_and_the_defaults_are_in_range():
-    check_ranges(Settings())
-    assert {field.name for field in fields(Settings)} - ranges(Settings).keys() == {"url", "baud"}
+    check_ranges(GuidanceSettings())
+    assert {field.name for field in fields(GuidanceSettings)} - ranges(GuidanceSettings).keys() == {"url", "baud"}
 
 
 # ---- the vehicle
 
 
 def heard(*messages):
-    vehicle = Vehicle()
+    vehicle = VehicleSnapshot()
     for message in messages:
         vehicle = updated(vehicle, message, 12.5)
     return vehicle

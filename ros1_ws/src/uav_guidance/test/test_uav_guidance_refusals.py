@@ -8,7 +8,7 @@ import pytest
 
 from uav_guidance.guidance import Guidance
 from uav_guidance.requests import HeadingRequest, HoverRequest, PositionRequest, TakeoffRequest
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
 
 NAN = math.nan
@@ -49,7 +49,7 @@ def test_refusals_on_the_ground(flight, request_):
 
 
 def test_without_home_there_is_no_fence_and_nothing_inside():
-    guidance = Guidance(Settings())
+    guidance = Guidance(GuidanceSettings())
     assert guidance.fence_reason(Vec3(1.0, 0.0, 3.0)) == "home is not known yet, so the fence is not"
     assert guidance.ask(HoverRequest(), 0.0).reason == "no authority: nothing was heard of the autopilot"
 

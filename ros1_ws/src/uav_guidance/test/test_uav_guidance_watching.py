@@ -9,7 +9,7 @@ from guidance_pure_flight import PureFlight
 
 from uav_guidance.obstacles import Sighting
 from uav_guidance.requests import LandRequest
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
 
 
@@ -156,7 +156,7 @@ def test_standing_vehicle_is_not_stopped(flying):
 
 def test_other_settings_hold_from_the_next_request_and_verdict_on(flying):
     flying.go(20.0, 0.0, speed=1.5)
-    flying.guidance.tune(Settings(max_speed_m_s=1.0, obstacle_stop_m=6.0))
+    flying.guidance.tune(GuidanceSettings(max_speed_m_s=1.0, obstacle_stop_m=6.0))
     assert flying.go(0.0, 0.0, speed=1.5).reason == "speed is 1.5: at most 1 is allowed"
     assert flying.report.course.reference == "position", "what is under way goes on"
     flying.run(2.0)

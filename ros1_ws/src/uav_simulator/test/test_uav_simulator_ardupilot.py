@@ -17,7 +17,7 @@ from uav_simulator.ardupilot.vehicle import ArduPilotVehicle
 from uav_simulator.autopilot.types import LandedState
 from uav_simulator.errors import ConfigError, SimulatorError
 from uav_simulator.pilots import make_pilot
-from uav_simulator.settings import Settings
+from uav_simulator.settings import SimulatorSettings
 from uav_simulator.simulation import Simulation
 from uav_simulator.vehicle.rigid_body import RigidBody
 from uav_simulator.world.config import find_world, load_world
@@ -199,11 +199,11 @@ def test_garbage_is_left_alone_and_a_taken_port_is_named(vehicle):
 
 @pytest.mark.parametrize("kind", ["ardupilot", "followed:udpin:127.0.0.1:0"])
 def test_a_world_whose_home_is_not_its_origin_is_refused_for_an_autopilot_that_counts_from_where_it_stands(kind):
-    settings = Settings(vehicle=kind, ardupilot_port=0)
+    settings = SimulatorSettings(vehicle=kind, ardupilot_port=0)
     make_pilot(settings, (0.0, 0.0, 0.0)).close()
     with pytest.raises(ConfigError, match=r"`home` is \(5, -2, 0\): .* measures from where it is switched on"):
         make_pilot(settings, (5.0, -2.0, 0.0))
-    pilot = make_pilot(Settings(mavlink_port=0), (5.0, -2.0, 0.0))
+    pilot = make_pilot(SimulatorSettings(mavlink_port=0), (5.0, -2.0, 0.0))
     assert pilot.flown.body.position == (5.0, -2.0, 0.0)
     pilot.close()
 

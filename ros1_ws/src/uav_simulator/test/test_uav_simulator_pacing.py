@@ -14,7 +14,7 @@ from uav_simulator.autopilot.udp_link import UdpLink
 from uav_simulator.errors import ConfigError, SimulatorError
 from uav_simulator.pacing import Pacer, header_stamp_s
 from uav_simulator.pilot_hooks import apply_pilot_word
-from uav_simulator.settings import Settings, settings_from_params
+from uav_simulator.settings import SimulatorSettings, settings_from_params
 
 LIMIT_S, TIMEOUT_S = 0.3, 2.0
 
@@ -146,7 +146,7 @@ def test_header_stamps_are_read_from_the_first_bytes():
 
 
 def test_parameters_have_defaults_and_are_converted():
-    assert settings_from_params({}) == Settings()
+    assert settings_from_params({}) == SimulatorSettings()
     settings = settings_from_params({"seed": 3, "rate": 2, "pace_topics": "/a, /b", "boot_before_s": 0})
     assert (settings.seed, settings.rate, settings.pace_topics, settings.boot_before_s) == (3, 2.0, ("/a", "/b"), 0.0)
     assert settings_from_params({"pace_topics": ["/a"]}).pace_topics == ("/a",)

@@ -16,7 +16,7 @@ from video_stream.encoder import Encoder
 from video_stream.levels import LADDER, level_for
 from video_stream.rate import RateController, RateSettings
 from video_stream.recorder import Film
-from video_stream.report import Report
+from video_stream.report import VideoReport
 from video_stream.sender import VideoSender
 from video_stream.wire import NS, TAG_BYTES, Mark, Seal, VideoPacket, WireError, sdp
 
@@ -52,7 +52,7 @@ def test_garbage_is_refused(data: bytes):
     with pytest.raises(WireError):
         VideoPacket.parse(data, SEAL)
     with pytest.raises(WireError):
-        Report.parse(data, SEAL)
+        VideoReport.parse(data, SEAL)
 
 
 @settings(max_examples=300)
@@ -73,13 +73,13 @@ def test_another_key_makes_no_packet_of_ours():
     with pytest.raises(WireError, match="tag"):
         VideoPacket.parse(PACKET.serialize(Seal(b"another")), SEAL)
     with pytest.raises(WireError, match="tag"):
-        Report.parse(Report(1, 2).pack(Seal(b"another")), SEAL)
+        VideoReport.parse(VideoReport(1, 2).pack(Seal(b"another")), SEAL)
 
 
 def test_a_report_comes_back_as_it_was():
-    report = Report(3, 5 * NS, newest_id=9, fps=20.0, quality=0.91, missing=((8, 0), (9, 3)), want_key=True)
+    report = VideoReport(3, 5 * NS, newest_id=9, fps=20.0, quality=0.91, missing=((8, 0), (9, 3)), want_key=True)
     data = report.pack(SEAL)
-    assert Report.parse(data, SEAL) == report
+    assert VideoReport.parse(data, SEAL) == report
     assert len(data) < TAG_BYTES + 120, "small enough for a narrow way up"
 
 
@@ -105,7 +105,7 @@ def drive(control: RateController, seconds: float, **report: float) -> float:
     begun = getattr(control, "clock", 0)
     for step in range(int(seconds * 20)):
         now_ns = begun + step * STEP_NS
-        control.on_report(Report(step + 1, now_ns, **{"received_bps": control.target_bps, **report}), now_ns)
+        control.on_report(VideoReport(step + 1, now_ns, **{"received_bps": control.target_bps, **report}), now_ns)
         control.on_time(now_ns)
     control.clock = begun + int(seconds * 20) * STEP_NS
     return control.clock
@@ -197,10 +197,10 @@ def test_frames_are_identified_and_sent_again_once():
     frames = [sender.frame(picture(n, 640, 360), n * STEP_NS, n * STEP_NS) for n in range(3)]
     packets = [VideoPacket.parse(data, SEAL) for frame in frames if frame for data in frame.datagrams]
     assert [(p.mark.frame_id, p.mark.index) for p in packets] == [(f.frame_id, i) for f in frames if f for i in range(len(f.datagrams))]
-    wanted = Report(1, 3 * STEP_NS, newest_id=2, missing=((0, 0), (99, 0), (0, 9999))).pack(SEAL)
+    wanted = VideoReport(1, 3 * STEP_NS, newest_id=2, missing=((0, 0), (99, 0), (0, 9999))).pack(SEAL)
     assert sender.feedback(wanted, 3 * STEP_NS) == [frames[0].datagrams[0]]
     assert sender.feedback(wanted, 4 * STEP_NS) == [], "a replayed report"
-    again = Report(2, 4 * STEP_NS, newest_id=2, missing=((0, 0),)).pack(SEAL)
+    again = VideoReport(2, 4 * STEP_NS, newest_id=2, missing=((0, 0),)).pack(SEAL)
     assert sender.feedback(again, 4 * STEP_NS) == [], "it may still be under way"
 
 
@@ -208,13 +208,13 @@ def test_a_wanted_key_frame_is_made():
     sender = VideoSender(SEAL)
     assert sender.frame(picture(0), 0, 0).key
     assert not sender.frame(picture(1), STEP_NS, STEP_NS).key
-    sender.feedback(Report(1, 2 * STEP_NS, newest_id=1, want_key=True).pack(SEAL), 2 * STEP_NS)
+    sender.feedback(VideoReport(1, 2 * STEP_NS, newest_id=1, want_key=True).pack(SEAL), 2 * STEP_NS)
     assert sender.frame(picture(2), 2 * STEP_NS, 2 * STEP_NS).key
 
 
 def test_a_full_radio_is_given_time_but_asked_now_and_then():
     sender = VideoSender(SEAL)
-    sender.feedback(Report(1, 0, newest_id=-1).pack(SEAL), 0)
+    sender.feedback(VideoReport(1, 0, newest_id=-1).pack(SEAL), 0)
     sent = [n for n in range(40) if sender.frame(picture(n), n * STEP_NS, n * STEP_NS) is not None]
     gaps = np.diff(sent)
     assert max(gaps) * 0.05 <= 0.45, "a frame has to find out that the way is free again"
@@ -240,7 +240,7 @@ def test_random_orders_of_events_never_break_the_sender():
     for number in range(60):
         now_ns += chance.randrange(1, NS // 4)
         sender.frame(picture(number, 64, 48), now_ns, now_ns)
-        report = Report(
+        report = VideoReport(
             chance.randrange(100),
             now_ns - chance.randrange(NS),
             newest_id=chance.randrange(-1, number + 1),

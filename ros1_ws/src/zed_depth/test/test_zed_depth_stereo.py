@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from perception_core import NS, Corridor, Motion, PoseBuffer, PoseUnavailableError
+from perception_core import NS, Corridor, PoseBuffer, PoseUnavailableError, VehicleMotion
 from perception_core.testing import wall_pair
 from zed_depth import (
     DisparityRange,
@@ -107,14 +107,14 @@ def test_obstacle_is_where_the_wall_stands_in_the_map() -> None:
     depth = depth_of(disparity(*wall_pair(8.0, seed=5)), ZED)
     ahead = ZedSettings().ahead
 
-    def look(stamp_ns, motion=Motion()):  # noqa: B008 -- a frozen value
+    def look(stamp_ns, motion=VehicleMotion()):  # noqa: B008 -- a frozen value
         return look_ahead(depth, stamp_ns, geometry=ZED, T_base_camera=optical, poses=poses, motion=motion, settings=ahead)
 
     found = look(NS).nearest
     assert found is not None
     assert found.distance_m == pytest.approx(3.9, abs=0.2)
     assert found.point_enu_m[1] == pytest.approx(8.9, abs=0.3)
-    back = look(NS, Motion(velocity_enu_m_s=(0.0, -1.0, 0.0)))
+    back = look(NS, VehicleMotion(velocity_enu_m_s=(0.0, -1.0, 0.0)))
     assert (back.nearest, back.unknown) == (None, "the camera does not look where the vehicle goes")
     depth[:] = np.nan
     blind = look(NS)

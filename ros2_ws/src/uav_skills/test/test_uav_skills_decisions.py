@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uav_skills import checks, decisions
-from uav_skills.decisions import IN_AIR, ON_GROUND, Verdict
+from uav_skills.decisions import IN_AIR, ON_GROUND, SkillEnd
 
 
 @dataclass
@@ -70,9 +70,9 @@ def test_goto(change, result):
 
 def test_a_blocked_flight_tells_of_the_obstacle():
     verdict = decisions.decide_goto(State(still_s=6.0, obstacle_stop=True, obstacle_m=2.4))
-    assert verdict == Verdict("BLOCKED", "held back for 6.0 s by an obstacle 2.4 m ahead")
+    assert verdict == SkillEnd("BLOCKED", "held back for 6.0 s by an obstacle 2.4 m ahead")
     verdict = decisions.decide_goto(State(still_s=6.0, obstacle_stop=True, unwatched=True))
-    assert verdict == Verdict("BLOCKED", "held back for 6.0 s: no sensor watches the way ahead")
+    assert verdict == SkillEnd("BLOCKED", "held back for 6.0 s: no sensor watches the way ahead")
 
 
 @pytest.mark.parametrize(
@@ -114,15 +114,15 @@ def test_a_reference_that_was_dropped_is_not_ours_although_it_keeps_its_id():
 
 def test_silence_and_time():
     assert decisions.decide_watch(2.0, "ZED") is None
-    assert decisions.decide_watch(2.1, "ZED") == Verdict("LOST", "no obstacle message of the ZED for 2.1 s")
+    assert decisions.decide_watch(2.1, "ZED") == SkillEnd("LOST", "no obstacle message of the ZED for 2.1 s")
     assert decisions.decide_stream(1.0, told_idle=True) is None
-    assert decisions.decide_stream(1.1, told_idle=False) == Verdict("LOST", "nothing was heard of the video encoder for 1.1 s")
-    assert decisions.decide_stream(1.1, told_idle=True) == Verdict("LOST", "the video encoder was started again and sends nothing")
+    assert decisions.decide_stream(1.1, told_idle=False) == SkillEnd("LOST", "nothing was heard of the video encoder for 1.1 s")
+    assert decisions.decide_stream(1.1, told_idle=True) == SkillEnd("LOST", "the video encoder was started again and sends nothing")
     assert decisions.decide_mapping(3.0, "silent") is None
-    assert decisions.decide_mapping(3.1, "") == Verdict("ABORTED", "no scan registered for 3.1 s")
+    assert decisions.decide_mapping(3.1, "") == SkillEnd("ABORTED", "no scan registered for 3.1 s")
     assert decisions.decide_mapping(3.1, "no cloud for 3.4 s").message == "no scan registered for 3.1 s; the LiDAR: no cloud for 3.4 s"
     assert decisions.decide_hover(1.9, 2.0) is None
-    assert decisions.decide_hover(2.0, 2.0) == Verdict("DONE")
+    assert decisions.decide_hover(2.0, 2.0) == SkillEnd("DONE")
 
 
 @given(st.floats(0.0, 1e4), st.floats(0.0, 1e4))

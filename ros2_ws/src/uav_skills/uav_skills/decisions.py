@@ -31,7 +31,7 @@ class GuidanceReport(Protocol):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class SkillEnd:
     """How an execution ends: a result of the skill's model, and why in words."""
 
     result: str
@@ -59,57 +59,57 @@ class Thresholds:
 DEFAULT_THRESHOLDS = Thresholds()
 
 
-def _blocked(state: GuidanceReport, limits: Thresholds) -> Verdict | None:
+def _blocked(state: GuidanceReport, limits: Thresholds) -> SkillEnd | None:
     if state.still_s <= limits.blocked_s:
         return None
     if state.unwatched:
-        return Verdict("BLOCKED", f"held back for {state.still_s:.1f} s: no sensor watches the way ahead")
+        return SkillEnd("BLOCKED", f"held back for {state.still_s:.1f} s: no sensor watches the way ahead")
     if state.obstacle_stop:
-        return Verdict("BLOCKED", f"held back for {state.still_s:.1f} s by an obstacle {state.obstacle_m:.1f} m ahead")
-    return Verdict("BLOCKED", f"no nearer to the target for {state.still_s:.1f} s")
+        return SkillEnd("BLOCKED", f"held back for {state.still_s:.1f} s by an obstacle {state.obstacle_m:.1f} m ahead")
+    return SkillEnd("BLOCKED", f"no nearer to the target for {state.still_s:.1f} s")
 
 
-def _drifted(state: GuidanceReport, limit_m: float) -> Verdict | None:
+def _drifted(state: GuidanceReport, limit_m: float) -> SkillEnd | None:
     if state.drift_m <= limit_m:
         return None
-    return Verdict("ABORTED", f"{state.drift_m:.1f} m off the line, more than {limit_m:.1f} m")
+    return SkillEnd("ABORTED", f"{state.drift_m:.1f} m off the line, more than {limit_m:.1f} m")
 
 
-def decide_takeoff(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_takeoff(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a take-off: AT_ALTITUDE, ABORTED by drift, or BLOCKED (paper, Listing 4)."""
     if state.landed_state == IN_AIR and abs(state.vertical_to_go_m) < limits.altitude_m:
-        return Verdict("AT_ALTITUDE")
+        return SkillEnd("AT_ALTITUDE")
     if state.landed_state == ON_GROUND and state.still_s <= limits.spool_up_s:
         return None  # arming and spooling up take 4 s, more on a busy machine
     return _drifted(state, limits.takeoff_drift_m) or _blocked(state, limits)
 
 
-def decide_goto(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_goto(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a flight to a point: ARRIVED, ABORTED by drift, or BLOCKED."""
     if state.distance_to_go_m < limits.arrival_m:
-        return Verdict("ARRIVED")
+        return SkillEnd("ARRIVED")
     return _drifted(state, limits.goto_drift_m) or _blocked(state, limits)
 
 
-def decide_rotation(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_rotation(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a turn on the spot: ALIGNED, or BLOCKED when it does not turn on."""
     if abs(state.heading_error_rad) < limits.heading_rad:
-        return Verdict("ALIGNED")
+        return SkillEnd("ALIGNED")
     return _blocked(state, limits)
 
 
-def decide_landing(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_landing(state: GuidanceReport, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a landing: LANDED on the ground with the motors off, or BLOCKED when it does not come lower for long."""
     if state.landed_state == ON_GROUND:
-        return None if state.armed else Verdict("LANDED")
+        return None if state.armed else SkillEnd("LANDED")
     if state.still_s > limits.landing_blocked_s:
-        return Verdict("BLOCKED", f"no lower for {state.still_s:.1f} s")
+        return SkillEnd("BLOCKED", f"no lower for {state.still_s:.1f} s")
     return None
 
 
-def decide_hover(hovered_s: float, duration_s: float) -> Verdict | None:
+def decide_hover(hovered_s: float, duration_s: float) -> SkillEnd | None:
     """End a hover when it has lasted."""
-    return Verdict("DONE") if hovered_s >= duration_s else None
+    return SkillEnd("DONE") if hovered_s >= duration_s else None
 
 
 def speaks_of(state: GuidanceReport, *, kind: str, reference_id: int) -> bool:
@@ -117,23 +117,23 @@ def speaks_of(state: GuidanceReport, *, kind: str, reference_id: int) -> bool:
     return state.reference_id == reference_id and state.reference == kind
 
 
-def decide_watch(silent_s: float, source: str, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_watch(silent_s: float, source: str, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a depth map whose obstacle messages stopped; ``silent_s`` counts from the start until there was one."""
     if silent_s <= limits.silence_s:
         return None
-    return Verdict("LOST", f"no obstacle message of the {source} for {silent_s:.1f} s")
+    return SkillEnd("LOST", f"no obstacle message of the {source} for {silent_s:.1f} s")
 
 
-def decide_stream(silent_s: float, *, told_idle: bool, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_stream(silent_s: float, *, told_idle: bool, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a stream whose encoder no longer says that it sends; ``told_idle``: it says that it doesn't, as one that was restarted."""
     if silent_s <= limits.encoder_silence_s:
         return None
     if told_idle:
-        return Verdict("LOST", "the video encoder was started again and sends nothing")
-    return Verdict("LOST", f"nothing was heard of the video encoder for {silent_s:.1f} s")
+        return SkillEnd("LOST", "the video encoder was started again and sends nothing")
+    return SkillEnd("LOST", f"nothing was heard of the video encoder for {silent_s:.1f} s")
 
 
-def decide_mapping(silent_s: float, lidar_fault: str, limits: Thresholds = DEFAULT_THRESHOLDS) -> Verdict | None:
+def decide_mapping(silent_s: float, lidar_fault: str, limits: Thresholds = DEFAULT_THRESHOLDS) -> SkillEnd | None:
     """End a mapping that registers no more scans; ``silent_s`` counts from the start until there was one.
 
     ``lidar_fault``: what is said to be wrong with the LiDAR, empty for nothing: then it is the mapping that is silent.
@@ -141,7 +141,7 @@ def decide_mapping(silent_s: float, lidar_fault: str, limits: Thresholds = DEFAU
     if silent_s <= limits.mapping_silence_s:
         return None
     cause = f"; the LiDAR: {lidar_fault}" if lidar_fault else ""
-    return Verdict("ABORTED", f"no scan registered for {silent_s:.1f} s{cause}")
+    return SkillEnd("ABORTED", f"no scan registered for {silent_s:.1f} s{cause}")
 
 
 def remaining_part(remaining: float, initial: float) -> float:

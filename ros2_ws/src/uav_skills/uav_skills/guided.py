@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from alula.runtime.hooks import SkillHooks
 from uav_skills.calls import Reply, Response, ignore_response
-from uav_skills.decisions import DEFAULT_THRESHOLDS, Thresholds, Verdict, remaining_part, speaks_of
+from uav_skills.decisions import DEFAULT_THRESHOLDS, SkillEnd, Thresholds, remaining_part, speaks_of
 
 if TYPE_CHECKING:
     from uav_msgs.msg import GuidanceState
@@ -27,7 +27,7 @@ AUTHORITY_INVARIANT = "keep_sdk_authority"
 
 
 @dataclass
-class Motion:
+class GuidedMotion:
     """One execution's reference; times are seconds of mission clock."""
 
     execution: Execution
@@ -60,18 +60,18 @@ class GuidedSkill(SkillHooks):
         super().__init__()
         self.guidance = guidance
         self.thresholds = thresholds
-        self._motion: Motion | None = None
+        self._motion: GuidedMotion | None = None
         self._lock = threading.Lock()
         guidance.listen(self._on_state)
         guidance.watch(self._on_watch)
 
     # --- what a skill adds -------------------------------------------------------------------------------------------
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Send the command; its response goes to ``self.on_response(motion)``."""
         raise NotImplementedError
 
-    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:
+    def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:
         """Say whether the execution ends; ``state`` speaks of its reference."""
         raise NotImplementedError
 
@@ -79,11 +79,11 @@ class GuidedSkill(SkillHooks):
         """Return what is still to go, in the unit of the skill, for the progress."""
         return float(state.distance_to_go_m)
 
-    def lost(self, silent_s: float) -> Verdict:
+    def lost(self, silent_s: float) -> SkillEnd:
         """Say how the execution ends when the guidance does not speak of its reference any more."""
         state = self.guidance.state
         instead = "nothing" if state is None else f"{state.reference or 'nothing'} {state.reference_id}"
-        return Verdict("ABORTED", f"the guidance does not follow this reference for {silent_s:.1f} s; last it spoke of {instead}")
+        return SkillEnd("ABORTED", f"the guidance does not follow this reference for {silent_s:.1f} s; last it spoke of {instead}")
 
     def stop(self, reply: Reply = ignore_response) -> None:
         """Stop the function; ``reply`` gets the guidance's response."""
@@ -93,7 +93,7 @@ class GuidedSkill(SkillHooks):
 
     def on_dispatch(self, execution: Execution) -> None:
         """Send the command of a new motion, and return without waiting for it."""
-        motion = Motion(execution)
+        motion = GuidedMotion(execution)
         with self._lock:
             self._motion = motion
         self.send(motion)
@@ -124,12 +124,12 @@ class GuidedSkill(SkillHooks):
 
     # --- what the functional layer says ------------------------------------------------------------------------------
 
-    def on_response(self, motion: Motion, response: Response) -> None:
+    def on_response(self, motion: GuidedMotion, response: Response) -> None:
         """Take the response to the command."""
         if self._motion is not motion:
             return  # interrupted meanwhile: the command that stops it is in the queue behind
         if not response.accepted:
-            self._end(motion, Verdict("ABORTED", f"refused: {response.reason}"), stop=False)
+            self._end(motion, SkillEnd("ABORTED", f"refused: {response.reason}"), stop=False)
             return
         motion.heard_s = self.guidance.now_s
         motion.reference_id = response.reference_id
@@ -163,7 +163,7 @@ class GuidedSkill(SkillHooks):
             state = self.guidance.state
             self._end(motion, self.lost(silent_s), stop=state is None or state.reference != "land")
 
-    def _end(self, motion: Motion, verdict: Verdict, *, stop: bool) -> None:
+    def _end(self, motion: GuidedMotion, verdict: SkillEnd, *, stop: bool) -> None:
         with self._lock:
             if self._motion is not motion:
                 return

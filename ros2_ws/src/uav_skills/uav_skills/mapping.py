@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from alula.runtime.core.execution import Execution
     from alula.runtime.hooks import SkillHooks
-    from uav_skills.decisions import Verdict
+    from uav_skills.decisions import SkillEnd
 
 
 class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[misc]  # generated
@@ -40,7 +40,7 @@ class LidarMapping(WatchedSkill, AbstractLidarMappingSkill):  # type: ignore[mis
         """When the last scan was registered."""
         return self._mapping.registered_s
 
-    def decide(self, silent_s: float) -> Verdict | None:
+    def decide(self, silent_s: float) -> SkillEnd | None:
         """End as ABORTED when no more are registered."""
         return decide_mapping(silent_s, self._mapping.lidar_fault)
 

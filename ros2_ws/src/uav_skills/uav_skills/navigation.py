@@ -18,9 +18,9 @@ from navigation_managers.hooks import (
 
 from uav_skills import checks, decisions
 from uav_skills.calls import Reply, ignore_response
-from uav_skills.decisions import Verdict
+from uav_skills.decisions import SkillEnd
 from uav_skills.functional import GuidanceApi
-from uav_skills.guided import GuidedSkill, Motion
+from uav_skills.guided import GuidedMotion, GuidedSkill
 from uav_skills.serve import serve
 
 if TYPE_CHECKING:
@@ -45,12 +45,12 @@ class Takeoff(GuidedSkill, AbstractTakeoffSkill):  # type: ignore[misc]  # gener
         """Refuse a height (m) or speed (m/s) out of bounds."""
         return checks.check_takeoff(height_m=inputs.height, speed_m_s=inputs.speed)
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Ask the guidance for the climb."""
         inputs = motion.inputs
         self.guidance.takeoff(height_m=inputs.height, speed_m_s=inputs.speed, reply=functools.partial(self.on_response, motion))
 
-    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+    def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:  # noqa: ARG002
         """End at altitude, adrift, or blocked."""
         return decisions.decide_takeoff(state, self.thresholds)
 
@@ -71,7 +71,7 @@ class _Flight(GuidedSkill):
         target = inputs.target
         return checks.check_target(target_enu_m=(target.x, target.y, target.z), speed_m_s=inputs.speed)
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Give the guidance the target as its position reference."""
         target: Point = motion.inputs.target
         speed_m_s, reply = motion.inputs.speed, functools.partial(self.on_response, motion)
@@ -94,7 +94,7 @@ class _Flight(GuidedSkill):
         self.send(motion)
         return ""
 
-    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+    def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:  # noqa: ARG002
         """End on arrival, off the line, or blocked."""
         return decisions.decide_goto(state, self.thresholds)
 
@@ -119,12 +119,12 @@ class RotateHead(GuidedSkill, AbstractRotateHeadSkill):  # type: ignore[misc]  #
         """Refuse a heading (rad) that is no number, or a rate (rad/s) out of bounds."""
         return checks.check_turn(heading_rad=inputs.heading, rate_rad_s=inputs.rate)
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Give the guidance the heading as its reference."""
         inputs, reply = motion.inputs, functools.partial(self.on_response, motion)
         self.guidance.set_heading(heading_rad=inputs.heading, rate_rad_s=inputs.rate, lock=False, reply=reply)
 
-    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+    def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:  # noqa: ARG002
         """End aligned, or when it does not turn on."""
         return decisions.decide_rotation(state, self.thresholds)
 
@@ -140,7 +140,7 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
         """Refuse a heading (rad) that is no finite number."""
         return "" if math.isfinite(inputs.heading) else f"heading is {inputs.heading}, not a finite number"
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Have the guidance turn to the heading and hold it during later motions."""
         heading_rad, reply = motion.inputs.heading, functools.partial(self.on_response, motion)
         self.guidance.set_heading(heading_rad=heading_rad, rate_rad_s=LOCK_RATE_RAD_S, lock=True, reply=reply)
@@ -154,9 +154,9 @@ class LockHead(GuidedSkill, AbstractLockHeadSkill):  # type: ignore[misc]  # gen
         motion = self._motion
         return 1.0 if motion is not None and motion.execution is execution and motion.followed_since_s is not None else 0.0
 
-    def lost(self, silent_s: float) -> Verdict:
+    def lost(self, silent_s: float) -> SkillEnd:
         """End when the heading is not held: it was released from elsewhere, or never held."""
-        return Verdict("ABORTED", f"the heading is not locked for {silent_s:.1f} s")
+        return SkillEnd("ABORTED", f"the heading is not locked for {silent_s:.1f} s")
 
     def _on_state(self, state: GuidanceState) -> None:
         """Look at the lock only: the reference that the state speaks of is that of the motion."""
@@ -176,11 +176,11 @@ class Hover(GuidedSkill, AbstractHoverSkill):  # type: ignore[misc]  # generated
         """Refuse a duration (s) out of bounds."""
         return checks.check_duration(duration_s=inputs.duration)
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Have the guidance hold the position."""
         self.guidance.hover(functools.partial(self.on_response, motion))
 
-    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+    def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:  # noqa: ARG002
         """Succeed once the vehicle has hovered for the duration."""
         return decisions.decide_hover(self._hovered_s(motion), motion.inputs.duration)
 
@@ -192,7 +192,7 @@ class Hover(GuidedSkill, AbstractHoverSkill):  # type: ignore[misc]  # generated
         return min(1.0, self._hovered_s(motion) / float(motion.inputs.duration))
 
     @staticmethod
-    def _hovered_s(motion: Motion) -> float:
+    def _hovered_s(motion: GuidedMotion) -> float:
         return 0.0 if motion.followed_since_s is None else motion.heard_s - motion.followed_since_s
 
 
@@ -203,11 +203,11 @@ class Land(GuidedSkill, AbstractLandSkill):  # type: ignore[misc]  # generated
     success = "LANDED"
     stops_when_it_fails = False
 
-    def send(self, motion: Motion) -> None:
+    def send(self, motion: GuidedMotion) -> None:
         """Ask the guidance for the landing."""
         self.guidance.land(functools.partial(self.on_response, motion))
 
-    def decide(self, motion: Motion, state: GuidanceState) -> Verdict | None:  # noqa: ARG002
+    def decide(self, motion: GuidedMotion, state: GuidanceState) -> SkillEnd | None:  # noqa: ARG002
         """End on the ground with the motors off, or when it does not come lower."""
         return decisions.decide_landing(state, self.thresholds)
 

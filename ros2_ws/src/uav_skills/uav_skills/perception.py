@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from alula.runtime.core.execution import Execution
-    from uav_skills.decisions import Verdict
+    from uav_skills.decisions import SkillEnd
 
 
 class _Depthmap(WatchedSkill):
@@ -40,7 +40,7 @@ class _Depthmap(WatchedSkill):
         """When the last obstacle message arrived."""
         return self._depth.heard_s
 
-    def decide(self, silent_s: float) -> Verdict | None:
+    def decide(self, silent_s: float) -> SkillEnd | None:
         """End as LOST when no more arrive."""
         return decide_watch(silent_s, self._sensor)
 

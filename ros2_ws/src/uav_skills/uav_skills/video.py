@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from alula.runtime.core.execution import Execution
     from alula.runtime.hooks import SkillHooks
-    from uav_skills.decisions import Verdict
+    from uav_skills.decisions import SkillEnd
 
 
 class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # generated
@@ -54,7 +54,7 @@ class Stream(WatchedSkill, AbstractStreamSkill):  # type: ignore[misc]  # genera
         """When the encoder last said that it sends."""
         return self._video.sending_s
 
-    def decide(self, silent_s: float) -> Verdict | None:
+    def decide(self, silent_s: float) -> SkillEnd | None:
         """End as LOST when it no longer says so."""
         return decide_stream(silent_s, told_idle=self._video.told_idle)
 

@@ -10,7 +10,7 @@ from alula.runtime.hooks import SkillHooks
 if TYPE_CHECKING:
     from alula.runtime.core.execution import Execution
     from uav_skills.calls import Response
-    from uav_skills.decisions import Verdict
+    from uav_skills.decisions import SkillEnd
     from uav_skills.functional import FunctionalPart
 
 
@@ -46,7 +46,7 @@ class WatchedSkill(SkillHooks):
         """Return when it last did what it was switched on for; where nothing else is said, that is when it was heard of."""
         return self.heard_s()
 
-    def decide(self, silent_s: float) -> Verdict | None:
+    def decide(self, silent_s: float) -> SkillEnd | None:
         """Say whether the execution ends after this silence."""
         raise NotImplementedError
 

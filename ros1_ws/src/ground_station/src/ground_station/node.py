@@ -20,7 +20,7 @@ from video_stream.wire import NS, Seal, sdp
 
 from ground_station.control import ControlLink
 from ground_station.receiver import Picture, VideoReceiver
-from ground_station.settings import GroundSettings
+from ground_station.settings import GroundStationSettings
 from ground_station.stick import Deflection
 from perception_core.ros import read_settings
 from resource_reporter import ToldService
@@ -32,7 +32,7 @@ VIDEO, TELEMETRY = 0, 1
 class GroundStationNode:
     """Shows and records, measures, reports."""
 
-    def __init__(self, settings: GroundSettings) -> None:
+    def __init__(self, settings: GroundStationSettings) -> None:
         self._settings = settings
         self._seal = Seal(settings.key.encode())
         self._receiver = VideoReceiver(self._seal, settings.width, settings.height)
@@ -104,7 +104,7 @@ class GroundStationNode:
 class _ShownLog:
     """``received.mkv``: what the telepilot saw; ``shown.jsonl``: a line each; ``stream.sdp``: for any player."""
 
-    def __init__(self, folder: Path, settings: GroundSettings) -> None:
+    def __init__(self, folder: Path, settings: GroundStationSettings) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "stream.sdp").write_text(sdp(settings.player_port), encoding="ascii", newline="")
         lives = sum(1 for _ in folder.glob("shown*.jsonl"))
@@ -138,4 +138,4 @@ class _ShownLog:
 def main() -> None:
     """Run the node until ROS shuts down."""
     rospy.init_node("ground_station")
-    GroundStationNode(read_settings(GroundSettings())).run()
+    GroundStationNode(read_settings(GroundStationSettings())).run()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import av
 import cv2
 import numpy as np
-from video_stream.report import Report
+from video_stream.report import VideoReport
 from video_stream.wire import NS, Seal, VideoPacket, WireError
 
 from ground_station.assembler import Assembler, WholeFrame
@@ -77,14 +77,14 @@ class VideoReceiver:
         """Return the frames to be shown now."""
         return [picture for whole in self._assembler.take(now_ns) for picture in self._decode(whole, now_ns)]
 
-    def report(self, now_ns: int) -> Report | None:
+    def report(self, now_ns: int) -> VideoReport | None:
         """Return a report when it is time for one."""
         if now_ns < self._report_due_ns:
             return None
         self._report_due_ns = now_ns + REPORT_PERIOD_NS
         self._number += 1
         self._note_quality(now_ns)
-        return Report(
+        return VideoReport(
             number=self._number,
             stamp_ns=now_ns,
             newest_id=self._assembler.newest_id,

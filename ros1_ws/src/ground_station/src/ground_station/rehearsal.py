@@ -11,7 +11,7 @@ from radio_link.channel import Channel
 from radio_link.conditions import Both
 from video_stream.levels import Level
 from video_stream.rate import RateSettings
-from video_stream.report import Report
+from video_stream.report import VideoReport
 from video_stream.sender import VideoSender
 from video_stream.wire import NS, Seal
 
@@ -23,11 +23,11 @@ FRAME_NS = NS // 20
 
 
 @dataclass(frozen=True)
-class Moment:
+class RehearsalMoment:
     """How things were at a report of the ground station."""
 
     t_s: float
-    report: Report
+    report: VideoReport
     target_bps: float
     level: Level | None
     exhausted: bool
@@ -46,7 +46,7 @@ class Rehearsal:
     settings: RateSettings | None = None
     tamper: Callable[[list[bytes]], list[bytes]] = lambda datagrams: datagrams
     pictures: list[Picture] = field(default_factory=list)
-    moments: list[Moment] = field(default_factory=list)
+    moments: list[RehearsalMoment] = field(default_factory=list)
     encode_s: list[float] = field(default_factory=list)
     decode_s: list[float] = field(default_factory=list)
 
@@ -85,7 +85,7 @@ class Rehearsal:
         report = self.receiver.report(now_ns)
         if report is not None:
             self._up.send(report.pack(self._seal), now_ns)
-            self.moments.append(Moment(now_ns / NS, report, self.sender.target_bps, self.sender.level, self.sender.exhausted))
+            self.moments.append(RehearsalMoment(now_ns / NS, report, self.sender.target_bps, self.sender.level, self.sender.exhausted))
 
     def _at_the_drone(self, now_ns: int) -> None:
         for data in self._up.due(now_ns):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class GroundSettings:
+class GroundStationSettings:
     """Private parameters of /ground_station; ports are UDP on loopback."""
 
     video_port: int = 20001  # of this node: where RTP arrives from the radio

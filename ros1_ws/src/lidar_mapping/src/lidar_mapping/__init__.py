@@ -1,6 +1,6 @@
 """LiDAR-inertial SLAM: where the vehicle is, and a voxel map of what it has seen. The node is in ``lidar_mapping.node``."""
 
-from lidar_mapping.inertial import ImuReading, InertialFilter, InertialNoise, State
+from lidar_mapping.inertial import ImuReading, InertialFilter, InertialNoise, InertialState
 from lidar_mapping.keyframes import Keyframe, Keyframes
 from lidar_mapping.odometry import AutopilotMotion, LidarInertialOdometry, OdometrySettings
 from lidar_mapping.ply import read_ply, write_ply
@@ -15,6 +15,7 @@ __all__ = [
     "ImuReading",
     "InertialFilter",
     "InertialNoise",
+    "InertialState",
     "Keyframe",
     "Keyframes",
     "LidarInertialOdometry",
@@ -25,7 +26,6 @@ __all__ = [
     "RegistrationSettings",
     "Slam",
     "SlamSettings",
-    "State",
     "Surface",
     "VoxelMap",
     "downsample",

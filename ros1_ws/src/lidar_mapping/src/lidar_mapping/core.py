@@ -25,7 +25,7 @@ from perception_core import NS, Sweep, SweepStamps
 from perception_core.clouds import sweep_of_cloud
 from perception_core.conversions import cloud_message
 from perception_core.host import Input, Output
-from perception_core.vehicle import Vehicle
+from perception_core.vehicle import KnownVehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,7 +60,7 @@ class LidarMapping:
         self._slam = Slam(settings.slam)
         self._readings = ReadingQueue()
         self._standing = StandingGyro()
-        self._vehicle = Vehicle()
+        self._vehicle = KnownVehicle()
         self._stamps = SweepStamps()
         self._lock = Lock()
         self._saving = Lock()

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import gtsam
 import numpy as np
 
-from lidar_mapping.inertial import POSITION, InertialFilter, InertialNoise, State, cross_matrix
+from lidar_mapping.inertial import POSITION, InertialFilter, InertialNoise, InertialState, cross_matrix
 from lidar_mapping.registration import RegistrationSettings, register
 from perception_core import NS
 
@@ -156,7 +156,7 @@ class PoseGraph:
         if surface is None:
             return
         rotation, position = frame.pose[:3, :3], frame.pose[:3, 3]
-        place = InertialFilter(_loose(), frame.stamp_ns, State(rotation, np.zeros(3), position))
+        place = InertialFilter(_loose(), frame.stamp_ns, InertialState(rotation, np.zeros(3), position))
         place.covariance[POSITION, POSITION] = np.eye(3) * 0.3**2
         found = register(frame.patches.points[:: max(1, len(frame.patches.points) // 2000)], surface, place, self._registration)
         if not found.believed or found.fitness < settings.loop_fitness or found.degenerate:

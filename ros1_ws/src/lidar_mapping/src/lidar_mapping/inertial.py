@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
-    Linearise = Callable[["State"], tuple[Floats, Floats]]
+    Linearise = Callable[["InertialState"], tuple[Floats, Floats]]
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 ATTITUDE, VELOCITY, POSITION, GYRO_BIAS, ACCEL_BIAS, AUTOPILOT, DRIFT = (slice(3 * i, 3 * i + 3) for i in range(7))
@@ -78,7 +78,7 @@ class InertialNoise:
 
 
 @dataclass(frozen=True)
-class State:
+class InertialState:
     """``rotation`` (3, 3) is R_map_base; the rest are (3,) vectors.
 
     The autopilot says Exp(``autopilot_error``) R_map_base, and ``velocity`` + speed * ``autopilot_drift``.
@@ -99,9 +99,9 @@ class State:
         transform[:3, :3], transform[:3, 3] = self.rotation, self.position
         return transform
 
-    def plus(self, error: Floats) -> State:
+    def plus(self, error: Floats) -> InertialState:
         """Return the state moved by an error (21,)."""
-        return State(
+        return InertialState(
             self.rotation @ rotation_matrix(error[ATTITUDE]),
             self.velocity + error[VELOCITY],
             self.position + error[POSITION],
@@ -111,7 +111,7 @@ class State:
             self.autopilot_drift + error[DRIFT],
         )
 
-    def minus(self, other: State) -> Floats:
+    def minus(self, other: InertialState) -> Floats:
         """Return the error (21,) that leads from ``other`` to this state."""
         turn = rotation_vector(other.rotation.T @ self.rotation)
         shifts = (
@@ -159,7 +159,7 @@ class Shaking:
 class InertialFilter:
     """Propagates and corrects a `State`; not thread-safe."""
 
-    def __init__(self, noise: InertialNoise, stamp_ns: int, start: State) -> None:
+    def __init__(self, noise: InertialNoise, stamp_ns: int, start: InertialState) -> None:
         self._noise = noise
         self.stamp_ns = stamp_ns
         self.state = start
@@ -167,7 +167,7 @@ class InertialFilter:
         self.covariance: Floats = np.diag(np.square([*np.repeat(sigmas, 3), *noise.autopilot_rad, *np.full(3, noise.autopilot_drift)]))
         self._last: ImuReading | None = None
         self._shaking = Shaking()
-        self.history: deque[tuple[int, State]] = deque([(stamp_ns, start)], maxlen=HISTORY)
+        self.history: deque[tuple[int, InertialState]] = deque([(stamp_ns, start)], maxlen=HISTORY)
 
     def propagate(self, reading: ImuReading) -> None:
         """Move to the reading's moment; one that is not later is left out.
@@ -238,7 +238,7 @@ class InertialFilter:
         slow = [*(1.0 - fading**2) * noise.autopilot_rad**2, *np.full(3, (1.0 - drift_fading**2) * noise.autopilot_drift**2)]
         growth = [*np.repeat(densities * duration_s, 3), *slow]
         self.covariance = transition @ self.covariance @ transition.T + np.diag(growth)
-        self.state = State(
+        self.state = InertialState(
             before.rotation @ turn,
             before.velocity + acceleration * duration_s,
             before.position + before.velocity * duration_s + 0.5 * acceleration * duration_s**2,

@@ -19,7 +19,7 @@ from lidar_mapping.inertial import (
     ImuReading,
     InertialFilter,
     InertialNoise,
-    State,
+    InertialState,
     rotation_matrix,
     rotation_vector,
 )
@@ -98,7 +98,7 @@ class Step:
 class LidarInertialOdometry:
     """Follows the vehicle from a start; not thread-safe."""
 
-    def __init__(self, settings: OdometrySettings, keyframes: Keyframes, stamp_ns: int, start: State) -> None:
+    def __init__(self, settings: OdometrySettings, keyframes: Keyframes, stamp_ns: int, start: InertialState) -> None:
         self._settings = settings
         self.keyframes = keyframes
         self.filter = InertialFilter(settings.noise, stamp_ns, start)
@@ -121,7 +121,7 @@ class LidarInertialOdometry:
         return Step(registration, placed, self._keep(placed) if registration.believed else None)
 
     @property
-    def state(self) -> State:
+    def state(self) -> InertialState:
         """Pose, velocity and biases as the filter has them now."""
         return self.filter.state
 
@@ -226,10 +226,10 @@ class LidarInertialOdometry:
         moves = np.zeros((3, TERMS))
         moves[:, VELOCITY], moves[:, DRIFT] = np.eye(3), np.linalg.norm(autopilot.velocity) * np.eye(3)
 
-        def off_m_s(state: State) -> Floats:
+        def off_m_s(state: InertialState) -> Floats:
             return state.velocity + moves[:, DRIFT] @ state.autopilot_drift - autopilot.velocity
 
-        def off_rad(state: State) -> tuple[Floats, Floats]:
+        def off_rad(state: InertialState) -> tuple[Floats, Floats]:
             said = rotation_matrix(state.autopilot_error) @ state.rotation
             rows = np.zeros((3, TERMS))
             rows[:, ATTITUDE], rows[:, AUTOPILOT] = np.eye(3), said.T
@@ -240,7 +240,7 @@ class LidarInertialOdometry:
         attitude_weight = _weight(off, turns @ covariance @ turns.T, AUTOPILOT_RAD)
         weight = _weight(off_m_s(self.filter.state), moves @ covariance @ moves.T, velocity_m_s)
 
-        def linearise(state: State) -> tuple[Floats, Floats]:
+        def linearise(state: InertialState) -> tuple[Floats, Floats]:
             off, rows = off_rad(state)
             gradient: Floats = attitude_weight * rows.T @ off + weight * moves.T @ off_m_s(state)
             return attitude_weight * rows.T @ rows + weight * moves.T @ moves, gradient

@@ -18,7 +18,7 @@ from lidar_mapping.surface import cross
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from lidar_mapping.inertial import InertialFilter, State
+    from lidar_mapping.inertial import InertialFilter, InertialState
     from lidar_mapping.surface import Surface
 
     Floats = NDArray[np.float64]
@@ -101,7 +101,7 @@ class _Measurement:
         self.fitness = 0.0
         self.held: Floats = np.zeros((3, 3))
 
-    def __call__(self, state: State) -> tuple[Floats, Floats]:
+    def __call__(self, state: InertialState) -> tuple[Floats, Floats]:
         gate_m = next(self._gates_m)
         settings = self._settings
         off_m, inside = self._off(state, gate_m)
@@ -110,13 +110,13 @@ class _Measurement:
         rows = np.vstack([cross(self._paired, state.rotation.T @ self._normals), self._normals])
         return self._spread((rows * weight) @ rows.T, rows @ (weight * off_m), float(weight.sum()))
 
-    def judge(self, state: State) -> None:
+    def judge(self, state: InertialState) -> None:
         """Find out how well the points lie where the state puts them."""
         off_m, near = self._off(state, FITNESS_GATES * self._settings.gate_m)
         self.pairs = int(np.count_nonzero(near & (np.abs(off_m) < 0.5 * self._settings.gate_m)))
         self.fitness = self.pairs / max(int(np.count_nonzero(near)), 1)
 
-    def _off(self, state: State, gate_m: float) -> tuple[Floats, NDArray[np.bool_]]:
+    def _off(self, state: InertialState, gate_m: float) -> tuple[Floats, NDArray[np.bool_]]:
         """Return of each pair how far the point is off the plane of its patch (N,), metres, and whether the patch is within the gate."""
         placed = state.rotation @ self._points + state.position[:, None]
         if self._searched is None or np.abs(placed - self._searched).max() > SEARCHED_M:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lidar_mapping.graph import GraphSettings, PoseGraph
-from lidar_mapping.inertial import POSITION, State, rotation_vector
+from lidar_mapping.inertial import POSITION, InertialState, rotation_vector
 from lidar_mapping.keyframes import Keyframes
 from lidar_mapping.odometry import VELOCITY_BASE_NS, AutopilotMotion, LidarInertialOdometry, OdometrySettings, Step
 from lidar_mapping.readings import KEPT, SET_BACK_NS
@@ -171,7 +171,7 @@ class Slam:
     def _start(self, sweep: Sweep, poses: PoseBuffer, velocity: Floats) -> None:
         place = self.T_map_odom @ poses.at([sweep.stamp_ns]).matrix()
         error = rotation_vector(self.T_map_odom[:3, :3].T)
-        start = State(place[:3, :3], velocity, place[:3, 3], gyro_bias=self.gyro_bias, autopilot_error=error)
+        start = InertialState(place[:3, :3], velocity, place[:3, 3], gyro_bias=self.gyro_bias, autopilot_error=error)
         self._odometry = LidarInertialOdometry(self._settings.odometry, self.keyframes, sweep.stamp_ns, start)
 
     def _take(self, step: Step, T_odom_base: Floats) -> None:  # noqa: N803 -- T_target_source

@@ -12,11 +12,11 @@ from perception_core import (
     NS,
     Ahead,
     Corridor,
-    Motion,
     Nearest,
     PoseBuffer,
     Support,
     Sweep,
+    VehicleMotion,
     deskew,
     direction_of_motion,
     nearest_obstacle,
@@ -40,7 +40,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class AheadSettings:
+class LidarAheadSettings:
     """Where to look, what to believe, what is the vehicle itself and what is ground.
 
     With fewer than ``min_ahead`` returns from one of the parts of the view of the way ahead, near or far, it is unknown what is there.
@@ -56,7 +56,7 @@ class AheadSettings:
 class LidarAhead:
     """Look ahead by sweeps in their order; not thread-safe."""
 
-    def __init__(self, settings: AheadSettings) -> None:
+    def __init__(self, settings: LidarAheadSettings) -> None:
         self._settings = settings
         self._ground = GroundModel(settings.ground)
 
@@ -66,7 +66,7 @@ class LidarAhead:
         *,
         T_base_lidar: Floats,  # noqa: N803 -- T_target_source
         poses: PoseBuffer,
-        motion: Motion,
+        motion: VehicleMotion,
         gone: NDArray[np.bool_] | None = None,
     ) -> Ahead:
         """Return what is ahead of where the vehicle was at the end of the sweep; raise PoseUnavailableError.

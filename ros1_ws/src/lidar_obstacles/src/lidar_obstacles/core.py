@@ -20,7 +20,7 @@ from perception_core.clouds import sweep_of_cloud, time_fields
 from perception_core.conversions import obstacle_message
 from perception_core.host import Input, Output
 from perception_core.sensor_watch import HEALTH, TICK_S, SensorWatch
-from perception_core.vehicle import Vehicle
+from perception_core.vehicle import KnownVehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,7 +48,7 @@ class LidarObstacles:
 
     def __init__(self, settings: LidarSettings, host: Host) -> None:
         self.enabled = settings.enabled
-        self.vehicle = Vehicle()
+        self.vehicle = KnownVehicle()
         self._settings = settings
         self._host = host
         self._judge = CloudJudge(settings.cloud)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lidar_obstacles.ahead import AheadSettings, Body
+from lidar_obstacles.ahead import Body, LidarAheadSettings
 from lidar_obstacles.cloud_health import CloudLimits
 from lidar_obstacles.ground import GroundSettings
 from perception_core import Corridor, HealthLimits, StampLimits, Support, tunable
@@ -61,7 +61,7 @@ class LidarSettings:
         )
 
     @property
-    def ahead(self) -> AheadSettings:
+    def ahead(self) -> LidarAheadSettings:
         """Where to look for obstacles. Three returns within half a metre: a pole gives that many, a speck of dust or rain does not."""
         corridor = Corridor(
             half_width_m=self.half_width_m,
@@ -70,7 +70,7 @@ class LidarSettings:
             near_m=self.near_m,
             floor_m=self.floor_m,
         )
-        return AheadSettings(
+        return LidarAheadSettings(
             corridor=corridor,
             support=Support(min_points=self.min_points, cell_m=self.cell_m),
             body=Body(self.body_radius_m, self.body_half_height_m),

@@ -45,7 +45,7 @@ class Corridor:
 
 
 @dataclass(frozen=True)
-class Motion:
+class VehicleMotion:
     """What the guidance says about the motion: velocity (m/s, ENU) and the target (metres, ENU) when it follows a position reference."""
 
     velocity_enu_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ class Ahead:
     unknown: str = ""
 
 
-def direction_of_motion(position_enu_m: NDArray[np.float64], nose: NDArray[np.float64], motion: Motion) -> NDArray[np.float64]:
+def direction_of_motion(position_enu_m: NDArray[np.float64], nose: NDArray[np.float64], motion: VehicleMotion) -> NDArray[np.float64]:
     """Return the horizontal unit vector (3,) of the motion: of the velocity if moving, else towards the target, else of the nose."""
     target = position_enu_m if motion.target_enu_m is None else np.array(motion.target_enu_m)
     for way, least in ((motion.velocity_enu_m_s, MOVING_M_S), (target - position_enu_m, AT_TARGET_M), (nose, 0.0)):

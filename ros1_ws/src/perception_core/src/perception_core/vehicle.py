@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 from uav_msgs.msg import GuidanceState
 
 from perception_core.conversions import GUIDANCE_MAP, is_rigid, matrix_of_transform
-from perception_core.corridor import Motion
+from perception_core.corridor import VehicleMotion
 from perception_core.host import Input
 from perception_core.poses import PoseBuffer
 
@@ -28,7 +28,7 @@ LONGEST_CHAIN = 16  # of frames between a sensor and base_link; longer is a loop
 POSE_WAIT_S = 0.3  # wall clock; poses come at 50 Hz
 
 
-class Vehicle:
+class KnownVehicle:
     """What the guidance and ``/tf_static`` say; the attributes are always the latest.
 
     All is in the autopilot's frame `odom`, which no correction of the map makes jump: ``poses`` come in it, ``motion`` is turned into it.
@@ -36,7 +36,7 @@ class Vehicle:
 
     def __init__(self) -> None:
         self.poses = PoseBuffer(keep_s=POSES_KEPT_S)
-        self.motion = Motion()
+        self.motion = VehicleMotion()
         self._T_odom_map: NDArray[np.float64] | None = None
         self._map_told = Condition()
         self._mounts: dict[str, tuple[str, NDArray[np.float64]]] = {}  # of each frame its parent and T_parent_frame
@@ -82,7 +82,7 @@ class Vehicle:
         T_odom_map = np.eye(4) if told is None else told  # noqa: N806 -- T_target_source
         vx, vy, vz = (float(part) for part in T_odom_map[:3, :3] @ (v.x, v.y, v.z))
         tx, ty, tz = (float(part) for part in (T_odom_map @ (t.x, t.y, t.z, 1.0))[:3])
-        self.motion = Motion(velocity_enu_m_s=(vx, vy, vz), target_enu_m=(tx, ty, tz) if message.reference == "position" else None)
+        self.motion = VehicleMotion(velocity_enu_m_s=(vx, vy, vz), target_enu_m=(tx, ty, tz) if message.reference == "position" else None)
 
     def _on_transforms(self, message: TFMessage) -> None:
         for item in message.transforms:

@@ -18,7 +18,7 @@ from radio_link.laws import LAWS, LinkBudget, Point, condition_by_law
 from radio_link.loop import NS, MissionLoop
 from radio_link.radio import FAULTS, Place, Radio, Situation, by_zones
 from radio_link.settings import RadioSettings
-from radio_link.vehicle import Vehicle
+from radio_link.vehicle import RadioCarrier
 from uav_simulator.errors import ConfigError
 from uav_simulator.world.config import WorldConfig, load_world
 
@@ -61,7 +61,7 @@ class RadioLinkNode:
         base = settings.base_port
         self._to = {VIDEO: base + 1, REPORT: base + 3, CONTROL: settings.control_to or base + 5, TELEMETRY: base + 8}
         self._radio = Radio(make_place(settings), parse_faults(settings.faults, FAULTS), seed=settings.seed)
-        self._vehicle = Vehicle()
+        self._vehicle = RadioCarrier()
         self._told: tuple[Situation, bool] | None = None
         self._state_due_ns = 0
         self._log = _open_log(Path(settings.log_path)) if settings.log_path else None

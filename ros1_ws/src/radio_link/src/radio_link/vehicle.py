@@ -8,7 +8,7 @@ ON_GROUND = 1
 """``landed_state`` of uav_msgs/GuidanceState; 0 is unknown, every other is off the ground."""
 
 
-class Vehicle:
+class RadioCarrier:
     """What the radio knows of the vehicle; ``point`` is in the frame map (ENU, metres), ``lift_off_s`` on the mission clock."""
 
     def __init__(self) -> None:

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from uav_guidance.vehicle import Mode, Vehicle
+from uav_guidance.vehicle import Mode, VehicleSnapshot
 
 START_AGAIN_S = 5.0  # after GUIDED was refused at the start
 
 
-class Change(Enum):
+class AuthorityChange(Enum):
     """What happened to the authority at an update."""
 
     NONE = auto()
@@ -46,12 +46,12 @@ class Authority:
         if self.landing_unseen:
             self._land_asked = False
 
-    def hear_heartbeat(self, vehicle: Vehicle) -> None:
+    def hear_heartbeat(self, vehicle: VehicleSnapshot) -> None:
         """Note that the vehicle's mode was told just now."""
         self.mode_told = True
         self._land_seen |= self._land_asked and vehicle.mode == Mode.LAND
 
-    def update(self, vehicle: Vehicle, *, link: bool) -> Change:
+    def update(self, vehicle: VehicleSnapshot, *, link: bool) -> AuthorityChange:
         """Judge by the mode of the last heartbeat; ``link``: it holds. One that is back tells nothing before the next heartbeat."""
         self.mode_told &= link
         self._flown |= vehicle.off_ground
@@ -60,10 +60,10 @@ class Authority:
         before = self.held
         self.held = self.mode_told and (vehicle.mode == Mode.GUIDED or (vehicle.mode == Mode.LAND and self._land_asked))
         if self.held == before:
-            return Change.NONE
-        return Change.GAINED if self.held else Change.LOST
+            return AuthorityChange.NONE
+        return AuthorityChange.GAINED if self.held else AuthorityChange.LOST
 
-    def wants_start(self, vehicle: Vehicle, now_s: float) -> bool:
+    def wants_start(self, vehicle: VehicleSnapshot, now_s: float) -> bool:
         """Return whether to take GUIDED now, once after a start of the node or the autopilot: ready, on the ground, not flown before."""
         if self._start_settled or not self.mode_told or abs(now_s - self._start_refused_s) < START_AGAIN_S:
             return False

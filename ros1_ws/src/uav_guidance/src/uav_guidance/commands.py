@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from uav_guidance.vehicle import Mode, Vehicle
+from uav_guidance.vehicle import Mode, VehicleSnapshot
 
 DO_SET_MODE = 176
 ARM_DISARM = 400
@@ -36,7 +36,7 @@ class Evidence:
 
     kind: str
     """The MAVLink message that tells it."""
-    seen: Callable[[Vehicle], bool]
+    seen: Callable[[VehicleSnapshot], bool]
     within_s: float = ANSWER_S
     """From the last attempt until it is given up."""
 
@@ -122,7 +122,7 @@ class Procedure:
         else:
             self._refusal = (now_s, self._boot_ms, RESULT_NAMES.get(result, f"result {result}"))
 
-    def on_vehicle(self, kind: str, vehicle: Vehicle) -> None:
+    def on_vehicle(self, kind: str, vehicle: VehicleSnapshot) -> None:
         """Take what a MAVLink message of this kind has just told of the vehicle: a command that is obeyed needs no answer."""
         self._boot_ms = vehicle.boot_ms
         if self.outcome is not None or not self._attempts:

@@ -9,10 +9,10 @@ from uav_guidance.carrot import HeadingCarrot
 from uav_guidance.frames import wrap
 from uav_guidance.obstacles import ObstacleWatch, Way
 from uav_guidance.references import Heading, Land, Reference, Takeoff
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.stillness import StillWatch
 from uav_guidance.vectors import Line, Vec3
-from uav_guidance.vehicle import Mode, Vehicle
+from uav_guidance.vehicle import Mode, VehicleSnapshot
 
 SETPOINT_PERIOD_S = 0.1
 # The clock has steps of its own (20 ms in simulation): a tenth of a second may look a little shorter.
@@ -48,7 +48,7 @@ class Course:
 class Follower:
     """Know what is followed, and where the vehicle should be now. The vehicle's snapshot is passed to each call."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: GuidanceSettings) -> None:
         self.reference: Reference | None = None
         self.heading = Heading(HeadingCarrot(0.0))
         self.obstacles = ObstacleWatch(settings)
@@ -60,12 +60,12 @@ class Follower:
         self._last_step_s: float | None = None
         self._last_setpoint_s = -math.inf
 
-    def tune(self, settings: Settings) -> None:
+    def tune(self, settings: GuidanceSettings) -> None:
         """Go on with other settings; the reference under way keeps those that it was given with."""
         self.obstacles.settings = settings
         self._still.tune(reached_m=settings.reached_m, reached_rad=settings.reached_rad)
 
-    def take(self, reference: Reference | None, vehicle: Vehicle, now_s: float) -> None:
+    def take(self, reference: Reference | None, vehicle: VehicleSnapshot, now_s: float) -> None:
         """Follow another reference from now on, or none."""
         self.reference = reference
         self.streaming = self._blocked = self._seen_armed = False
@@ -75,7 +75,7 @@ class Follower:
         if reference is not None:
             reference.accept(vehicle, self.heading)
 
-    def begin_again(self, vehicle: Vehicle, now_s: float) -> None:
+    def begin_again(self, vehicle: VehicleSnapshot, now_s: float) -> None:
         """Follow the same reference from where the vehicle is now: its place in `map` has jumped, the vehicle has not."""
         self.heading.carrot.yaw_rad = vehicle.yaw_rad
         self.streaming = False
@@ -90,14 +90,14 @@ class Follower:
         self.heading.carrot.turn(yaw_rad, rate_rad_s)
         self._still.restart(now_s)
 
-    def over(self, vehicle: Vehicle) -> bool:
+    def over(self, vehicle: VehicleSnapshot) -> bool:
         """Return whether the reference ended on the ground with the motors off; a landing keeps its name after that."""
         if isinstance(self.reference, Land | None) or vehicle.armed or not vehicle.on_ground:
             return False
         # A heartbeat tells up to a second late that the vehicle is armed: a take-off has ended only if it was so before.
         return self._seen_armed or not isinstance(self.reference, Takeoff)
 
-    def step(self, vehicle: Vehicle, now_s: float, *, commanded: bool) -> Setpoint | None:
+    def step(self, vehicle: VehicleSnapshot, now_s: float, *, commanded: bool) -> Setpoint | None:
         """Move the carrots on to this time and return a setpoint if one is due; ``commanded``: the companion has the authority."""
         dt_s = 0.0 if self._last_step_s is None else min(max(now_s - self._last_step_s, 0.0), LONGEST_STEP_S)
         self._last_step_s = now_s
@@ -111,7 +111,7 @@ class Follower:
         self._measure_stillness(vehicle, now_s)
         return setpoint
 
-    def course(self, vehicle: Vehicle, now_s: float) -> Course:
+    def course(self, vehicle: VehicleSnapshot, now_s: float) -> Course:
         """Return what is followed and how far the vehicle is from it."""
         place = vehicle.position_enu_m or Vec3()
         reference, error_rad = self.reference, self._heading_error(vehicle)
@@ -130,7 +130,7 @@ class Follower:
             unwatched=self.obstacles.unwatched(now_s),
         )
 
-    def _follow(self, vehicle: Vehicle, now_s: float, dt_s: float) -> Setpoint | None:
+    def _follow(self, vehicle: VehicleSnapshot, now_s: float, dt_s: float) -> Setpoint | None:
         reference = self.reference
         if isinstance(reference, Takeoff) and not self.streaming:
             reference.keep_to_home(vehicle.home_enu_m)
@@ -148,20 +148,20 @@ class Follower:
         self._last_setpoint_s = now_s
         return Setpoint(position, yaw_rad)
 
-    def _way(self, vehicle: Vehicle) -> Way:
+    def _way(self, vehicle: VehicleSnapshot) -> Way:
         remaining = self._remaining(vehicle)
         ahead_m_s = vehicle.velocity_enu_m_s.dot(remaining) / remaining.norm if remaining.norm > 0.0 else 0.0
         return Way(vehicle.position_enu_m or Vec3(), remaining, max(ahead_m_s, 0.0))
 
-    def _remaining(self, vehicle: Vehicle) -> Vec3:
+    def _remaining(self, vehicle: VehicleSnapshot) -> Vec3:
         return Vec3() if self.reference is None else self.reference.remaining(vehicle)
 
-    def _heading_error(self, vehicle: Vehicle) -> float:
+    def _heading_error(self, vehicle: VehicleSnapshot) -> float:
         """Return the way to the heading's target, counter-clockwise positive; zero while the autopilot minds the heading itself."""
         if isinstance(self.reference, Land | None) or (isinstance(self.reference, Takeoff) and not self.streaming):
             return 0.0
         return wrap(self.heading.carrot.target_rad - vehicle.yaw_rad)
 
-    def _measure_stillness(self, vehicle: Vehicle, now_s: float) -> None:
+    def _measure_stillness(self, vehicle: VehicleSnapshot, now_s: float) -> None:
         distance_m = self._remaining(vehicle).norm
         self._still_s = self._still.step(distance_m=distance_m, heading_error_rad=self._heading_error(vehicle), now_s=now_s)

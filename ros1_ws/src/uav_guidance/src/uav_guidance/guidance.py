@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from uav_guidance.authority import Authority, Change
+from uav_guidance.authority import Authority, AuthorityChange
 from uav_guidance.commands import Command, Procedure, arm, disarm, set_mode, take_off
 from uav_guidance.follower import Course, Follower, Setpoint
 from uav_guidance.frames import wrap
@@ -22,7 +22,7 @@ from uav_guidance.readiness import Readiness
 from uav_guidance.references import Hold, Land, Reference, Takeoff, Travel, Turn
 from uav_guidance.requests import (
     AuthorityRequest,
-    Decision,
+    GuidanceDecision,
     HeadingRequest,
     HoverRequest,
     LandRequest,
@@ -37,9 +37,9 @@ from uav_guidance.requests import (
     check_takeoff,
     require,
 )
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
-from uav_guidance.vehicle import Landed, Mode, Vehicle, in_map, leapt, mode_name, updated
+from uav_guidance.vehicle import Landed, Mode, VehicleSnapshot, in_map, leapt, mode_name, updated
 
 log = logging.getLogger(__name__)
 
@@ -47,10 +47,10 @@ PREARM_PREFIX = "PreArm: "
 
 
 @dataclass(frozen=True)
-class Report:
+class GuidanceStatus:
     """What the guidance knows and does."""
 
-    vehicle: Vehicle
+    vehicle: VehicleSnapshot
     link: bool
     """Whether the vehicle's mode counts: a heartbeat has told it since the link holds."""
     authority: bool
@@ -61,10 +61,10 @@ class Report:
 class Guidance:
     """Follow one reference at a time, and a heading beside it, as long as the companion has the authority."""
 
-    def __init__(self, settings: Settings) -> None:
-        self.odometry = Vehicle()
+    def __init__(self, settings: GuidanceSettings) -> None:
+        self.odometry = VehicleSnapshot()
         """As the autopilot says, in `odom`."""
-        self.vehicle = Vehicle()
+        self.vehicle = VehicleSnapshot()
         """The same in `map`."""
         self._settings = settings
         self._localization = Localization(settings)
@@ -80,7 +80,7 @@ class Guidance:
         self._procedure: Procedure | None = None
         self._start_procedure: Procedure | None = None
         self._prearm_text = ""
-        self._answers: dict[type[Request], Callable[[Any, float], Decision]] = {
+        self._answers: dict[type[Request], Callable[[Any, float], GuidanceDecision]] = {
             TakeoffRequest: self._take_off,
             PositionRequest: self._set_position,
             HeadingRequest: self._set_heading,
@@ -89,7 +89,7 @@ class Guidance:
             AuthorityRequest: self._take_authority,
         }
 
-    def tune(self, settings: Settings) -> None:
+    def tune(self, settings: GuidanceSettings) -> None:
         """Go on with other settings; the reference under way keeps those that it was given with."""
         self._settings = settings
         self._localization.tune(settings)
@@ -143,12 +143,12 @@ class Guidance:
         """Take a sensor's verdict on the corridor ahead."""
         self._follower.obstacles.see(sighting, now_s)
 
-    def ask(self, request: Request, now_s: float) -> Decision:
+    def ask(self, request: Request, now_s: float) -> GuidanceDecision:
         """Accept a request or refuse it with a reason; a refused one changes nothing."""
         try:
             return self._answers[type(request)](request, now_s)
         except Refusal as refusal:
-            return Decision(accepted=False, reason=str(refusal))
+            return GuidanceDecision(accepted=False, reason=str(refusal))
 
     def fence_reason(self, target_enu_m: Vec3) -> str:
         """Return why a target is outside the fence; empty if it is inside."""
@@ -198,9 +198,9 @@ class Guidance:
         available = self._authority.held and self._readiness.usable
         return {} if available else {"SDK_authority": self._lost_reason(now_s)}
 
-    def report(self, now_s: float) -> Report:
+    def report(self, now_s: float) -> GuidanceStatus:
         """Return what the guidance knows and does."""
-        return Report(
+        return GuidanceStatus(
             vehicle=self.vehicle,
             link=self.link(now_s) and self._authority.mode_told,
             authority=self._authority.held,
@@ -210,7 +210,7 @@ class Guidance:
 
     # ---- requests ------------------------------------------------------------------------------------------------------
 
-    def _take_off(self, request: TakeoffRequest, now_s: float) -> Decision:
+    def _take_off(self, request: TakeoffRequest, now_s: float) -> GuidanceDecision:
         self._require_authority(now_s)
         check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
         check_height(request.height_m, self._settings)
@@ -218,7 +218,7 @@ class Guidance:
         reference = Takeoff(self._settings, height_m=request.height_m, speed_m_s=request.speed_m_s)
         return self._accept(reference, [*self._to_guided(), arm(), take_off(request.height_m)], now_s)
 
-    def _set_position(self, request: PositionRequest, now_s: float) -> Decision:
+    def _set_position(self, request: PositionRequest, now_s: float) -> GuidanceDecision:
         self._require_authority(now_s)
         check_number("speed", request.speed_m_s, self._settings.max_speed_m_s)
         check_flying(self.vehicle)
@@ -232,10 +232,10 @@ class Guidance:
         )
         return self._accept(reference, self._to_guided(), now_s)
 
-    def _set_heading(self, request: HeadingRequest, now_s: float) -> Decision:
+    def _set_heading(self, request: HeadingRequest, now_s: float) -> GuidanceDecision:
         if request.release:
             self._follower.heading.locked = False
-            return Decision(accepted=True, reference_id=self._reference_id)
+            return GuidanceDecision(accepted=True, reference_id=self._reference_id)
         self._require_authority(now_s)
         require(math.isfinite(request.yaw_rad), f"yaw is {request.yaw_rad}: not a number")
         check_number("rate", request.rate_rad_s, self._settings.max_yaw_rate_rad_s)
@@ -245,13 +245,13 @@ class Guidance:
         require(not self._follower.heading.locked, "the heading is locked")
         return self._accept(Turn(self._settings, yaw_rad=request.yaw_rad, rate_rad_s=request.rate_rad_s), self._to_guided(), now_s)
 
-    def _lock_heading(self, request: HeadingRequest, now_s: float) -> Decision:
+    def _lock_heading(self, request: HeadingRequest, now_s: float) -> GuidanceDecision:
         """Set the heading beside the reference, which goes on and keeps its id."""
         self._adopt_hover(now_s)
         self._follower.lock_heading(request.yaw_rad, request.rate_rad_s, now_s)
-        return Decision(accepted=True, reference_id=self._reference_id)
+        return GuidanceDecision(accepted=True, reference_id=self._reference_id)
 
-    def _hover(self, _request: HoverRequest, now_s: float) -> Decision:
+    def _hover(self, _request: HoverRequest, now_s: float) -> GuidanceDecision:
         self._require_authority(now_s)
         if self.vehicle.on_ground:
             require(isinstance(self._follower.reference, Takeoff), "not in the air")
@@ -260,20 +260,20 @@ class Guidance:
         require(self.vehicle.located, "the autopilot does not say where it is")
         return self._accept(Hold(self._settings), self._to_guided(), now_s)
 
-    def _land(self, _request: LandRequest, now_s: float) -> Decision:
+    def _land(self, _request: LandRequest, now_s: float) -> GuidanceDecision:
         self._require_authority(now_s)
         require(self.vehicle.armed or self.vehicle.off_ground or isinstance(self._follower.reference, Takeoff), "on the ground already")
         self._authority.ask_land()
         self._follower.heading.locked = False
         return self._accept(Land(), [set_mode(Mode.LAND)], now_s)
 
-    def _take_authority(self, _request: AuthorityRequest, now_s: float) -> Decision:
+    def _take_authority(self, _request: AuthorityRequest, now_s: float) -> GuidanceDecision:
         require(self.link(now_s), "no link to the autopilot")
         self._readiness.restarted = False
         if self._authority.held:
-            return Decision(accepted=True, reference_id=self._reference_id)
+            return GuidanceDecision(accepted=True, reference_id=self._reference_id)
         self._run(Procedure([set_mode(Mode.GUIDED)]))
-        return Decision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
+        return GuidanceDecision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
 
     def _require_authority(self, now_s: float) -> None:
         if self.vehicle.heartbeat_s is None:
@@ -286,13 +286,13 @@ class Guidance:
         in_guided = self.vehicle.mode == Mode.GUIDED and not self._authority.landing_unseen
         return [] if in_guided else [set_mode(Mode.GUIDED)]
 
-    def _accept(self, reference: Reference, commands: Sequence[Command], now_s: float) -> Decision:
+    def _accept(self, reference: Reference, commands: Sequence[Command], now_s: float) -> GuidanceDecision:
         """Follow another reference from now on."""
         # Ids go on after a restart of the node: they begin at the mission clock's milliseconds.
         self._reference_id = max(self._reference_id + 1, int(now_s * 1000.0) & 0xFFFFFFF)
         self._run(Procedure(commands))
         self._follower.take(reference, self.vehicle, now_s)
-        return Decision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
+        return GuidanceDecision(accepted=True, reference_id=self._reference_id, procedure=self._procedure)
 
     def _run(self, procedure: Procedure) -> None:
         if self._procedure is not None:
@@ -322,7 +322,7 @@ class Guidance:
         if jumped:
             self._follower.begin_again(self.vehicle, now_s)
 
-    def _keep_home(self, before: Vehicle) -> None:
+    def _keep_home(self, before: VehicleSnapshot) -> None:
         """Keep where home was in `map` when the autopilot set it: the drift since then has moved its coordinates, not the place."""
         if self.odometry.home_enu_m != before.home_enu_m:
             self._set_home()
@@ -354,10 +354,10 @@ class Guidance:
     def _check_authority(self, now_s: float) -> None:
         """Drop everything when the pilot, a failsafe or a broken link takes the authority away; nothing is taken back."""
         change = self._authority.update(self.vehicle, link=self.link(now_s))
-        if change is not Change.NONE:
+        if change is not AuthorityChange.NONE:
             self._readiness.authority_changed(now_s)
         self._readiness.update(self.vehicle, held=self._authority.held)
-        if change is not Change.LOST:
+        if change is not AuthorityChange.LOST:
             return
         why = self._lost_reason(now_s)
         log.warning("authority lost: %s", why)

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from uav_guidance.frames import Quaternion, rotated, wrap, yaw_of
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import ZERO, Vec3
 
 log = logging.getLogger(__name__)
@@ -71,7 +71,7 @@ class Localization:
     numbers: a turn of 2 degrees moves a place 50 m from the origin by 1.7 m.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: GuidanceSettings) -> None:
         self.correction = NO_CORRECTION
         self._settings = settings
         self._newest: Transform | None = None
@@ -84,7 +84,7 @@ class Localization:
         self._above_m = self._level_m = 0.0
         """The map's height above the autopilot's, as told last, and what of it is no slow change."""
 
-    def tune(self, settings: Settings) -> None:
+    def tune(self, settings: GuidanceSettings) -> None:
         """Go on with other settings."""
         self._settings = settings
 

@@ -10,11 +10,11 @@ from uav_msgs.msg import GuidanceState, Obstacle
 
 from perception_core.conversions import GUIDANCE_MAP, MAP, ODOMETRY
 from uav_guidance.frames import turned, turned_about_vertical
-from uav_guidance.guidance import Report
+from uav_guidance.guidance import GuidanceStatus
 from uav_guidance.localization import Correction, Transform
 from uav_guidance.obstacles import Sighting
 from uav_guidance.vectors import Vec3
-from uav_guidance.vehicle import Vehicle, mode_name
+from uav_guidance.vehicle import VehicleSnapshot, mode_name
 
 BODY = "base_link"
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -57,7 +57,7 @@ def map_to_odom(message: TFMessage) -> Transform | None:
     return None
 
 
-def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
+def state_message(report: GuidanceStatus, stamp: rospy.Time) -> GuidanceState:
     """Return the guidance's state as a message."""
     vehicle, course, remaining = report.vehicle, report.course, report.course.remaining_enu_m
     place, velocity, target = vehicle.position_enu_m or Vec3(), vehicle.velocity_enu_m_s, course.target_enu_m
@@ -92,7 +92,7 @@ def state_message(report: Report, stamp: rospy.Time) -> GuidanceState:
     return message
 
 
-def pose_message(vehicle: Vehicle, stamp: rospy.Time) -> PoseStamped | None:
+def pose_message(vehicle: VehicleSnapshot, stamp: rospy.Time) -> PoseStamped | None:
     """Return the autopilot's pose in `odom`, at the moment of the position; the attitude, a few ms older or newer, is turned on to it."""
     if vehicle.position_enu_m is None or vehicle.quat_xyzw is None:
         return None

@@ -49,7 +49,7 @@ from uav_guidance.messages import (
     transform_message,
     vec3,
 )
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.stamping import FineClock, StampClock
 from uav_guidance.streams import STREAMS_HZ, StreamKeeper
 from uav_guidance.texts import TextAssembler
@@ -68,7 +68,7 @@ SKILLSET = "navigation"
 class GuidanceNode:
     """Connect the pure guidance with ROS and with the link; one lock guards it against the threads of both."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: GuidanceSettings) -> None:
         self._guidance = Guidance(settings)
         self._changed = threading.Condition(threading.RLock())
         self._streams = StreamKeeper()
@@ -153,7 +153,7 @@ class GuidanceNode:
         log.info("%s: %s", request, "accepted" if accepted else f"refused: {reason}")
         return response(accepted=accepted, reason=reason, reference_id=decision.reference_id if accepted else 0)
 
-    def _tune(self, settings: Settings) -> None:
+    def _tune(self, settings: GuidanceSettings) -> None:
         with self._changed:
             self._guidance.tune(settings)
 
@@ -270,4 +270,4 @@ def _next_due(due_s: float, now_s: float) -> float:
 def main() -> None:
     """Run the guidance node, with its private parameters, until ROS shuts down."""
     rospy.init_node("uav_guidance")
-    GuidanceNode(read_settings(Settings())).run()
+    GuidanceNode(read_settings(GuidanceSettings())).run()

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 
 from uav_guidance.carrot import braking_distance
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import ZERO, Vec3
 
 LEAST_TRAVEL_M = 0.3  # the corridor is horizontal: a climb on the spot has no way ahead
@@ -50,7 +50,7 @@ class Way:
 class ObstacleWatch:
     """Remember the last verdict of each sensor and decide when to hold and when to go on."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: GuidanceSettings) -> None:
         self.settings = settings
         self._heard: dict[str, _Heard] = {}
         self._last_in_way_s: float | None = None

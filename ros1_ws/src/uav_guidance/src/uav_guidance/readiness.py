@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uav_guidance.vehicle import Vehicle
+from uav_guidance.vehicle import VehicleSnapshot
 
 CHECKS_S = 1.5  # from a change of mode until SYS_STATUS tells what it did to the autopilot's checks, which run once a second
 
@@ -28,11 +28,11 @@ class Readiness:
         """Note that the authority was gained or lost: what the checks said before is no promise, for GUIDED alone needs a position."""
         self._changed_s, self._checks_passed = now_s, False
 
-    def hear_checks(self, vehicle: Vehicle, now_s: float, *, held: bool) -> None:
+    def hear_checks(self, vehicle: VehicleSnapshot, now_s: float, *, held: bool) -> None:
         """Take what SYS_STATUS has just told; ``held``: the companion has the authority."""
         self._checks_passed = vehicle.ready and held and abs(now_s - self._changed_s) >= CHECKS_S
 
-    def update(self, vehicle: Vehicle, *, held: bool) -> None:
+    def update(self, vehicle: VehicleSnapshot, *, held: bool) -> None:
         """Judge by what is known now; ``held``: the companion has the authority."""
         able = vehicle.located and (self._checks_passed or vehicle.armed or vehicle.off_ground)
         self._been_ready = held and (self._been_ready or able)

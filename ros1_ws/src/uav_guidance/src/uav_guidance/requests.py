@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from uav_guidance.commands import Procedure
-from uav_guidance.settings import Settings
+from uav_guidance.settings import GuidanceSettings
 from uav_guidance.vectors import Vec3
-from uav_guidance.vehicle import Landed, Vehicle
+from uav_guidance.vehicle import Landed, VehicleSnapshot
 
 
 class Refusal(Exception):  # noqa: N818  # it is an answer, not an error
@@ -61,7 +61,7 @@ Request = TakeoffRequest | PositionRequest | HeadingRequest | HoverRequest | Lan
 
 
 @dataclass(frozen=True)
-class Decision:
+class GuidanceDecision:
     """The answer to a request; while ``procedure`` has no outcome the autopilot has not yet agreed."""
 
     accepted: bool
@@ -83,7 +83,7 @@ def check_number(name: str, value: float, most: float) -> None:
     require(value <= most, f"{name} is {value:g}: at most {most:g} is allowed")
 
 
-def check_fence(target_enu_m: Vec3, vehicle: Vehicle, settings: Settings) -> None:
+def check_fence(target_enu_m: Vec3, vehicle: VehicleSnapshot, settings: GuidanceSettings) -> None:
     """Refuse a target outside the fence: an upright cylinder around home, without the layer next to the ground."""
     require(target_enu_m.finite, f"target ({target_enu_m.x}, {target_enu_m.y}, {target_enu_m.z}): not a number")
     home = vehicle.home_enu_m
@@ -97,14 +97,14 @@ def check_fence(target_enu_m: Vec3, vehicle: Vehicle, settings: Settings) -> Non
     check_height(offset.z, settings)
 
 
-def check_height(height_m: float, settings: Settings) -> None:
+def check_height(height_m: float, settings: GuidanceSettings) -> None:
     """Refuse a height above home that the fence does not allow."""
     low, high = settings.fence_floor_m, settings.fence_height_m
     require(math.isfinite(height_m), f"height is {height_m}: not a number")
     require(low <= height_m <= high, f"outside the fence: {height_m:.2f} m above home, {low:g} to {high:g} m are allowed")
 
 
-def check_flying(vehicle: Vehicle) -> None:
+def check_flying(vehicle: VehicleSnapshot) -> None:
     """Refuse unless the vehicle is in the air and not on its way up."""
     require(vehicle.landed is not Landed.UNDEFINED, "the autopilot has not said whether it is in the air")
     require(not vehicle.on_ground, "not in the air")
@@ -112,7 +112,7 @@ def check_flying(vehicle: Vehicle) -> None:
     require(vehicle.located, "the autopilot does not say where it is")
 
 
-def check_takeoff(vehicle: Vehicle, prearm_text: str) -> None:
+def check_takeoff(vehicle: VehicleSnapshot, prearm_text: str) -> None:
     """Refuse unless the vehicle stands on the ground, knows where it is, and its own checks are passed."""
     require(vehicle.on_ground, "not on the ground")
     require(vehicle.located, "the autopilot does not say where it is")

@@ -11,7 +11,7 @@ from perception_core.tunable import KEY, Range
 
 
 @dataclass(frozen=True)
-class Settings:
+class GuidanceSettings:
     """Private parameters of /uav_guidance: metres, seconds, radians. What follows from a change begins with the next reference or verdict.
 
     The upper ends of the first ranges are the vehicle's limits, which the skills know, too: in flight they can only be drawn closer.

@@ -79,7 +79,7 @@ def mode_name(mode: int | None) -> str:
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class VehicleSnapshot:
     """A snapshot of the vehicle, metres, radians, body FLU; places in `odom` (ENU, origin at the EKF origin), or by `in_map` in `map`."""
 
     heartbeat_s: float | None = None
@@ -121,7 +121,7 @@ class Vehicle:
         return self.landed in {Landed.IN_AIR, Landed.TAKING_OFF, Landed.LANDING}
 
 
-def in_map(vehicle: Vehicle, correction: Correction, home_map_m: Vec3 | None) -> Vehicle:
+def in_map(vehicle: VehicleSnapshot, correction: Correction, home_map_m: Vec3 | None) -> VehicleSnapshot:
     """Return a snapshot with its place, velocity, attitude and home in `map` in place of `odom`."""
     place, quaternion = vehicle.position_enu_m, vehicle.quat_xyzw
     return replace(
@@ -134,7 +134,7 @@ def in_map(vehicle: Vehicle, correction: Correction, home_map_m: Vec3 | None) ->
     )
 
 
-def leapt(before: Vehicle, after: Vehicle, most_m: float) -> bool:
+def leapt(before: VehicleSnapshot, after: VehicleSnapshot, most_m: float) -> bool:
     """Tell whether the place differs by more than ``most_m`` from what the motion explains: the autopilot's estimator was reset."""
     if before.position_enu_m is None or after.position_enu_m is None or after.boots != before.boots:
         return False
@@ -143,34 +143,34 @@ def leapt(before: Vehicle, after: Vehicle, most_m: float) -> bool:
     return (after.position_enu_m - expected).norm > most_m + 0.5 * MOST_ACCEL_M_S2 * gap_s**2
 
 
-def _heartbeat(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+def _heartbeat(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
     return replace(vehicle, heartbeat_s=now_s, mode=int(message.custom_mode), armed=bool(message.base_mode & ARMED_FLAG))
 
 
-def _sys_status(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+def _sys_status(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> VehicleSnapshot:
     return replace(vehicle, ready=bool(message.onboard_control_sensors_health & PREARM_CHECK))
 
 
-def _extended_sys_state(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+def _extended_sys_state(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> VehicleSnapshot:
     known = message.landed_state in Landed._value2member_map_
     return replace(vehicle, landed=Landed(message.landed_state) if known else Landed.UNDEFINED)
 
 
-def _of_this_boot(vehicle: Vehicle, message: Any) -> Vehicle:
+def _of_this_boot(vehicle: VehicleSnapshot, message: Any) -> VehicleSnapshot:
     """Forget what was said before a restart; the attitude shows it at once, a position comes half a minute later."""
     if message.time_boot_ms + REBOOT_MS >= max(vehicle.boot_ms, vehicle.attitude_boot_ms):
         return vehicle
-    return Vehicle(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
+    return VehicleSnapshot(heartbeat_s=vehicle.heartbeat_s, mode=vehicle.mode, armed=vehicle.armed, boots=vehicle.boots + 1)
 
 
-def _local_position(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+def _local_position(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
     vehicle = replace(_of_this_boot(vehicle, message), place_s=now_s)
     position = enu_from_ned(Vec3(message.x, message.y, message.z))
     velocity = enu_from_ned(Vec3(message.vx, message.vy, message.vz))
     return replace(vehicle, boot_ms=int(message.time_boot_ms), position_enu_m=position, velocity_enu_m_s=velocity)
 
 
-def _attitude(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+def _attitude(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
     return replace(
         _of_this_boot(vehicle, message),
         attitude_s=now_s,
@@ -181,16 +181,16 @@ def _attitude(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
     )
 
 
-def _home_position(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+def _home_position(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> VehicleSnapshot:
     local = enu_from_ned(Vec3(message.x, message.y, message.z))
     return _with_home(replace(vehicle, home=(message.latitude, message.longitude, message.altitude), home_local_enu_m=local))
 
 
-def _global_origin(vehicle: Vehicle, message: Any, _now_s: float) -> Vehicle:
+def _global_origin(vehicle: VehicleSnapshot, message: Any, _now_s: float) -> VehicleSnapshot:
     return _with_home(replace(vehicle, origin=(message.latitude, message.longitude, message.altitude)))
 
 
-def _with_home(vehicle: Vehicle) -> Vehicle:
+def _with_home(vehicle: VehicleSnapshot) -> VehicleSnapshot:
     """Set home in `odom`: from the two global positions, because ArduPilot leaves HOME_POSITION's local fields at zero."""
     if vehicle.home is None:
         return vehicle
@@ -198,7 +198,7 @@ def _with_home(vehicle: Vehicle) -> Vehicle:
     return replace(vehicle, home_enu_m=local)
 
 
-_CHANGES: dict[str, Callable[[Vehicle, Any, float], Vehicle]] = {
+_CHANGES: dict[str, Callable[[VehicleSnapshot, Any, float], VehicleSnapshot]] = {
     "HEARTBEAT": _heartbeat,
     "SYS_STATUS": _sys_status,
     "EXTENDED_SYS_STATE": _extended_sys_state,
@@ -216,7 +216,7 @@ _NUMBERS = {
 """The fields that are floats, and used."""
 
 
-def updated(vehicle: Vehicle, message: Any, now_s: float) -> Vehicle:
+def updated(vehicle: VehicleSnapshot, message: Any, now_s: float) -> VehicleSnapshot:
     """Return the snapshot after a MAVLink message of the autopilot; the same one if the message says nothing about it.
 
     A message with a number that is none says nothing: an estimator that has diverged must not become a setpoint.

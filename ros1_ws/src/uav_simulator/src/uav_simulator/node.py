@@ -26,7 +26,7 @@ from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.pacing import Pacer, header_stamp_s
 from uav_simulator.pilots import make_pilot
 from uav_simulator.sensors.faults import FAULTS
-from uav_simulator.settings import Settings, settings_from_params
+from uav_simulator.settings import SimulatorSettings, settings_from_params
 from uav_simulator.simulation import TICK_S, Simulation
 from uav_simulator.world.config import find_world, load_world
 from uav_simulator.world.ply import write_mesh
@@ -53,7 +53,7 @@ def unconnected() -> list[str]:
 class SimulatorNode:
     """Wires the simulation to ROS and to a MAVLink client."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SimulatorSettings) -> None:
         self._settings = settings
         config = load_world(find_world(settings.world))
         self._pilot = make_pilot(settings, config.home)

@@ -16,7 +16,7 @@ from uav_simulator.following.vehicle import FollowedVehicle
 from uav_simulator.frames import Vec3
 from uav_simulator.imperfections import parse_imperfections
 from uav_simulator.pilot_hooks import apply_pilot_word
-from uav_simulator.settings import Settings
+from uav_simulator.settings import SimulatorSettings
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ class Pilot(Protocol):
 class SimulatedPilot:
     """The simulator's own autopilot, behind MAVLink."""
 
-    def __init__(self, settings: Settings, home: Vec3) -> None:
+    def __init__(self, settings: SimulatorSettings, home: Vec3) -> None:
         self.flown = SimulatedAutopilotVehicle(
             seed=settings.seed,
             home=home,
@@ -76,7 +76,7 @@ class SimulatedPilot:
 class ArduPilotPilot:
     """ArduPilot's own program, which the guidance speaks to directly."""
 
-    def __init__(self, settings: Settings, home: Vec3) -> None:
+    def __init__(self, settings: SimulatorSettings, home: Vec3) -> None:
         self.flown = ArduPilotVehicle(seed=settings.seed, home=home, port=settings.ardupilot_port)
         self.ports = {"ardupilot_port": self.flown.port}
         log.info("the body waits for ArduPilot on UDP 127.0.0.1:%d (%s)", self.flown.port, options(self.flown.port))
@@ -97,7 +97,7 @@ class ArduPilotPilot:
 class FollowedPilot:
     """An autopilot that flies elsewhere, with or without a simulator of its own; the guidance has another connection to it."""
 
-    def __init__(self, settings: Settings, home: Vec3) -> None:
+    def __init__(self, settings: SimulatorSettings, home: Vec3) -> None:
         self.flown = FollowedVehicle(settings.followed_url, home)
         self.ports: dict[str, int] = {}
 
@@ -116,7 +116,7 @@ class FollowedPilot:
         self.flown.close()
 
 
-def make_pilot(settings: Settings, home: Vec3) -> Pilot:
+def make_pilot(settings: SimulatorSettings, home: Vec3) -> Pilot:
     """Return the pilot that the settings name; raises SimulatorError when its port is taken, ConfigError for a home that it can't know."""
     if settings.vehicle != "simulated" and any(home):
         raise ConfigError(

@@ -12,7 +12,7 @@ FOLLOWED = "followed:"
 
 
 @dataclass(frozen=True)
-class Settings:
+class SimulatorSettings:
     """Private parameters of the node."""
 
     seed: int = 0
@@ -40,14 +40,14 @@ class Settings:
         return self.vehicle.removeprefix(FOLLOWED) if self.vehicle.startswith(FOLLOWED) else ""
 
 
-def settings_from_params(params: dict[str, Any]) -> Settings:
+def settings_from_params(params: dict[str, Any]) -> SimulatorSettings:
     """Read and check parameters; raises ConfigError naming the wrong one."""
-    types = {f.name: type(getattr(Settings(), f.name)) for f in fields(Settings)}
+    types = {f.name: type(getattr(SimulatorSettings(), f.name)) for f in fields(SimulatorSettings)}
     unknown = sorted(set(params) - set(types))
     if unknown:
         raise ConfigError(f"unknown parameter ~{unknown[0]}; known are {', '.join(types)}")
     values = {name: _converted(name, value, types[name]) for name, value in params.items()}
-    settings = Settings(**values)
+    settings = SimulatorSettings(**values)
     for name in ("seed", "rate", "pace_limit_s", "pace_timeout_s", "start_timeout_s", "boot_before_s"):
         if getattr(settings, name) < 0:
             raise ConfigError(f"parameter ~{name}: {getattr(settings, name)} must not be negative")

@@ -30,7 +30,7 @@ TICK_S = TICK_NS * 1e-9
 
 
 @dataclass(frozen=True)
-class State:
+class SimulationState:
     """The truth, which no node in the air knows; times on the simulated clock."""
 
     t_s: float
@@ -98,10 +98,10 @@ class Simulation:
         return True
 
     @property
-    def state(self) -> State:
+    def state(self) -> SimulationState:
         """Return the present state for ``/sim/state``."""
         clearance = self._contacts.min_clearance_m
-        return State(
+        return SimulationState(
             t_s=round(self.now_s, 3),
             lift_off_s=None if self.lift_off_s is None else round(self.lift_off_s, 3),
             collisions=self._contacts.collisions,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from video_stream.report import Report
+from video_stream.report import VideoReport
 from video_stream.wire import NS
 
 
@@ -45,7 +45,7 @@ class RateController:
         self.exhausted = False
         """There is nothing more to give: the target fell to the least and has not got away from it."""
 
-    def on_report(self, report: Report, now_ns: int) -> None:
+    def on_report(self, report: VideoReport, now_ns: int) -> None:
         """Take a report into account."""
         limits = self._settings
         self._heard_ns = now_ns

@@ -11,7 +11,7 @@ MOST_MISSING = 40
 
 
 @dataclass(frozen=True)
-class Report:
+class VideoReport:
     """How the video arrives. Windows are of mission clock and end at ``stamp_ns``.
 
     Attributes:
@@ -50,7 +50,7 @@ class Report:
         return pack_message(KIND, values, seal)
 
     @classmethod
-    def parse(cls, data: bytes, seal: Seal) -> Report:
+    def parse(cls, data: bytes, seal: Seal) -> VideoReport:
         """Read a datagram; raise WireError."""
         values = dict(zip((field.name for field in fields(cls)), unpack_message(KIND, data, seal), strict=True))
         values["missing"] = tuple((frame, index) for frame, index in values["missing"])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from video_stream.encoder import Encoder, Rgb
 from video_stream.levels import Level, level_for
 from video_stream.rate import RateController, RateSettings
-from video_stream.report import Report
+from video_stream.report import VideoReport
 from video_stream.wire import NS, Mark, Seal, VideoPacket
 
 KEPT_FRAMES = 40
@@ -52,7 +52,7 @@ class VideoSender:
         self._sent_ns: int | None = None
         self._want_key = False
         self.level: Level | None = None
-        self.report: Report | None = None
+        self.report: VideoReport | None = None
         self.heard_ns: int | None = None
         self.adaptations = 0
 
@@ -90,7 +90,7 @@ class VideoSender:
 
     def feedback(self, data: bytes, now_ns: int) -> list[bytes]:
         """Take a report; return the packets to be sent again. Raises WireError for what is no report."""
-        report = Report.parse(data, self._seal)
+        report = VideoReport.parse(data, self._seal)
         if self.report is not None and report.number <= self.report.number and report.stamp_ns <= self.report.stamp_ns:
             return []  # a replay, or overtaken
         self.report, self.heard_ns = report, now_ns

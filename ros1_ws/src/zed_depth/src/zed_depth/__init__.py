@@ -1,6 +1,6 @@
 """Depth from the ZED's stereo pair, and the nearest obstacle ahead. The node is in ``zed_depth.node``."""
 
-from zed_depth.ahead import AheadSettings, look_ahead
+from zed_depth.ahead import ZedAheadSettings, look_ahead
 from zed_depth.calibration import CalibrationError, StereoCalibration, StereoGeometry
 from zed_depth.confidence import confidence_of
 from zed_depth.depth_scale import Landmarks, ScaleJudge, ScaleLimits, scale_of
@@ -12,7 +12,6 @@ from zed_depth.stereo import DisparityRange, MatcherSettings, StereoMatcher, dep
 from zed_depth.view_health import ViewLimits
 
 __all__ = [
-    "AheadSettings",
     "CalibrationError",
     "Depth",
     "DisparityRange",
@@ -29,6 +28,7 @@ __all__ = [
     "StereoPair",
     "StereoRig",
     "ViewLimits",
+    "ZedAheadSettings",
     "ZedSettings",
     "confidence_of",
     "depth_of",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from perception_core import Ahead, Corridor, Motion, PoseBuffer, Support, direction_of_motion, nearest_obstacle
+from perception_core import Ahead, Corridor, PoseBuffer, Support, VehicleMotion, direction_of_motion, nearest_obstacle
 from zed_depth.calibration import StereoGeometry
 from zed_depth.stereo import points_of
 
@@ -20,7 +20,7 @@ UPWARDS = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class AheadSettings:
+class ZedAheadSettings:
     """Where to look, and what to believe.
 
     The range ends where a disparity error of one pixel makes the depth useless: with fx 240 px and 0.12 m between the cameras one pixel is
@@ -41,8 +41,8 @@ def look_ahead(
     geometry: StereoGeometry,
     T_base_camera: Floats,  # noqa: N803 -- T_target_source
     poses: PoseBuffer,
-    motion: Motion,
-    settings: AheadSettings,
+    motion: VehicleMotion,
+    settings: ZedAheadSettings,
 ) -> Ahead:
     """Return what is in the corridor, in the map; raise PoseUnavailableError."""
     pose = poses.at([stamp_ns]).matrix()
@@ -81,7 +81,7 @@ def _unknown(
     T_camera_map: Floats,  # noqa: N803 -- T_target_source
     origin: Floats,
     direction: Floats,
-    settings: AheadSettings,
+    settings: ZedAheadSettings,
 ) -> str:
     """Return why nothing can be said of the corridor though no obstacle is seen, or an empty text."""
     corridor = settings.corridor

@@ -18,7 +18,7 @@ from perception_core.conversions import cloud_message, depth_message, obstacle_m
 from perception_core.host import Input, Output
 from perception_core.images import GrayConverter
 from perception_core.sensor_watch import HEALTH, TICK_S, SensorWatch
-from perception_core.vehicle import Vehicle
+from perception_core.vehicle import KnownVehicle
 from zed_depth.ahead import look_ahead
 from zed_depth.pairing import Pairing, StereoPair
 from zed_depth.rig import Depth, StereoRig
@@ -45,7 +45,7 @@ class ZedDepth:
 
     def __init__(self, settings: ZedSettings, host: Host) -> None:
         self.enabled = settings.enabled
-        self.vehicle = Vehicle()
+        self.vehicle = KnownVehicle()
         self.frame = ""  # the left camera's
         self._settings = settings
         self._host = host

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from perception_core import Corridor, HealthLimits, StampLimits, Support, tunable
-from zed_depth.ahead import AheadSettings
+from zed_depth.ahead import ZedAheadSettings
 from zed_depth.depth_scale import ScaleLimits
 from zed_depth.image_health import ImageLimits
 from zed_depth.stereo import MatcherSettings
@@ -99,7 +99,7 @@ class ZedSettings:
         )
 
     @property
-    def ahead(self) -> AheadSettings:
+    def ahead(self) -> ZedAheadSettings:
         """Where to look for obstacles; the corridor is as long as the camera sees."""
         corridor = Corridor(
             half_width_m=self.half_width_m,
@@ -109,6 +109,6 @@ class ZedSettings:
             floor_m=self.floor_m,
         )
         support = Support(min_points=self.min_points, min_area_m2=self.min_area_m2, range_error_per_m=self.range_error_per_m)
-        return AheadSettings(
+        return ZedAheadSettings(
             corridor=corridor, support=support, max_range_m=self.max_range_m, stride_px=self.stride_px, min_known=self.min_known
         )

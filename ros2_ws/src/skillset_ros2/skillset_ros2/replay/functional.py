@@ -21,8 +21,8 @@ from alula.model.execution_state import ExecutionState
 from alula.model.model import Skillset
 from alula.records.replay.comparison import alike
 from alula.records.replay.deciding import Answers, MakeAnswers, RecordedMission
-from alula.records.replay.recorded import Decision, ReplayError
-from alula.records.replay.vehicle import Vehicle
+from alula.records.replay.recorded import RecordedDecision, ReplayError
+from alula.records.replay.robot import ReplayedRobot
 from alula.runtime.core.events import EngineEvent, ExecutionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.hooks import SkillHooks
@@ -139,7 +139,7 @@ class SwitchedSkill(SkillHooks):
         return self._mock if id(execution.inputs) in self._mocked else self._real
 
 
-class RecordedFunctions(Vehicle):
+class RecordedFunctions(ReplayedRobot):
     """The functional layer says what it said; the real hooks decide what that means for their skills.
 
     Args:
@@ -198,7 +198,7 @@ class RecordedFunctions(Vehicle):
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
-    def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
+    def requested(self, skillset: str, skill: str, execution_id: str, then: RecordedDecision | None) -> None:
         """Take note of a request."""
         if then is not None:
             self._recorded[execution_id] = then.id

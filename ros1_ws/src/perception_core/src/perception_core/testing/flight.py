@@ -41,7 +41,7 @@ OPTICAL = Quaternion(-0.5, 0.5, -0.5, 0.5)
 
 
 @dataclass(frozen=True)
-class Report:
+class ReportedTransition:
     """One extern transition that the node asked for."""
 
     at_ns: int
@@ -62,7 +62,7 @@ class FakeFlight:
         self.velocity = [0.0, 0.0, 0.0]
         self.target: tuple[float, float, float] | None = None
         self.at_10_hz: Callable[[int], None] = lambda _stamp_ns: None
-        self.reports: list[Report] = []
+        self.reports: list[ReportedTransition] = []
         self.health: list[SensorHealth] = []
         self._states = {"zed_status": "UNKNOWN", "lidar_status": "UNKNOWN"}
         self.reasons: dict[str, str] = {}
@@ -217,7 +217,7 @@ class FakeFlight:
             self.reasons[request.resource] = request.reason
             self._publish_resources()
             return TransitionResponse(accepted=False, reason="it is so already", state=request.to)
-        self.reports.append(Report(self.now_ns, request.resource, request.to))
+        self.reports.append(ReportedTransition(self.now_ns, request.resource, request.to))
         self._states[request.resource], self.reasons[request.resource] = request.to, request.reason
         self._publish_resources()
         return TransitionResponse(accepted=True, reason="", state=request.to)

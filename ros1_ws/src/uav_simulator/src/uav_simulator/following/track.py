@@ -17,7 +17,7 @@ KEPT = 500  # of each kind: ten seconds at 50 Hz
 
 
 @dataclass(frozen=True)
-class Motion:
+class FollowedMotion:
     """Map (ENU) and body (FLU); rates in the body's axes."""
 
     position: Vec3
@@ -59,7 +59,7 @@ class LinkTrack:
         newest_ms = min(told[-1][0] for told in (self._places, self._attitudes) if told)
         return (newest_ms - self._zero_ms) * 1e-3
 
-    def at(self, now_s: float) -> Motion:
+    def at(self, now_s: float) -> FollowedMotion:
         """Return the motion at a moment up to `newest_s`, linear between two messages."""
         self._asked_s = now_s
         boot_ms = (self._zero_ms or 0.0) + 1e3 * now_s
@@ -68,7 +68,7 @@ class LinkTrack:
             before, after, share = _around(self._places, boot_ms)
             position, velocity = _between(before[1], after[1], share), _between(before[2], after[2], share)
         early, late, part = _around(self._attitudes, boot_ms)
-        return Motion(position, velocity, _turned(early[1], late[1], part), _between(early[2], late[2], part))
+        return FollowedMotion(position, velocity, _turned(early[1], late[1], part), _between(early[2], late[2], part))
 
     def _begin(self) -> None:
         first_ms, newest_ms = self._attitudes[0][0], self._attitudes[-1][0]

@@ -11,7 +11,7 @@ from alula.common.faults import FaultRequest
 from alula.common.record import DATA, EVENTS, REPORTS, Entry
 from alula.model.execution_state import ExecutionState
 from alula.model.model import Skill, Skillset
-from alula.records.replay.recorded import EXTERN, Answer, Decision, Recorded, event_of
+from alula.records.replay.recorded import EXTERN, Recorded, RecordedDecision, RecordedEnd, event_of
 from alula.runtime.core.events import EngineEvent, TransitionEvent
 from alula.runtime.core.execution import Execution
 from alula.runtime.handle import SkillHandle
@@ -87,7 +87,7 @@ class ReplayHost(LocalMockHost):
                 self.note(str(error.args[0]))
 
 
-class Vehicle:
+class ReplayedRobot:
     """What there is at every depth: a world, the mock robot, and which execution is which of the record.
 
     Args:
@@ -114,7 +114,7 @@ class Vehicle:
         self.robot.fail(request)
         self.faults.append(request)
 
-    def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
+    def requested(self, skillset: str, skill: str, execution_id: str, then: RecordedDecision | None) -> None:
         """Take note of a request; ``then``: the same one in the record, None where there is none."""
         raise NotImplementedError
 
@@ -131,7 +131,7 @@ class Vehicle:
         self.host.mocked |= set(self.world.managers)
 
 
-class RecordedSkills(Vehicle):
+class RecordedSkills(ReplayedRobot):
     """Skills end as they did, resources and data change as they did.
 
     Args:
@@ -149,7 +149,7 @@ class RecordedSkills(Vehicle):
         self._held = {str(event.get("id")) for event in events if event.get("state") == ExecutionState.PAUSED.value}
         self._here: dict[str, str] = {}
         """The execution of this replay that has an id in the record."""
-        self._calls: dict[str, deque[Answer | None]] = {}
+        self._calls: dict[str, deque[RecordedEnd | None]] = {}
         self._running: dict[str, tuple[Execution, MockSkill]] = {}
         self._progress: dict[str, float] = {}
         self._passed: set[str] = set()
@@ -160,7 +160,7 @@ class RecordedSkills(Vehicle):
 
     # --- requests ----------------------------------------------------------------------------------------------------
 
-    def requested(self, skillset: str, skill: str, execution_id: str, then: Decision | None) -> None:
+    def requested(self, skillset: str, skill: str, execution_id: str, then: RecordedDecision | None) -> None:
         """Take note of a request."""
         answer = None if then is None else self._answers.get(then.id)
         if answer is not None and not (answer.state.terminal or answer.state.active):
@@ -170,7 +170,7 @@ class RecordedSkills(Vehicle):
             self._here[answer.id] = execution_id
         self._calls.setdefault(f"{skillset}.{skill}", deque()).append(answer)
 
-    def next_answer(self, name: str) -> Answer | None:
+    def next_answer(self, name: str) -> RecordedEnd | None:
         """Return the record's answer to the next call of a skill; None where a mock answers."""
         calls = self._calls.get(name)
         return calls.popleft() if calls else None
