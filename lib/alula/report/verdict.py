@@ -9,6 +9,7 @@ from typing import Any
 from alula.common.robots import page_words
 from alula.report.deaths import Death
 from alula.report.ends import SIGNAL, ReportedEnd, read_end
+from alula.report.phases import home
 from alula.report.run_log import read_waits
 
 MEANING = {
@@ -30,11 +31,19 @@ def number(value: float | None, unit: str, digits: int = 2) -> str:
     return "unknown" if value is None else f"{value:.{digits}f} {unit}".rstrip()
 
 
-def landed(summary: Mapping[str, Any]) -> str:
-    """Return whether it came down well, in words; nothing is said of what is not known to have flown."""
+def came_back(summary: Mapping[str, Any]) -> list[str]:
+    """Return whether the robot came back well, in words; nothing of a robot that has no state of departure."""
+    words, back = page_words(), summary.get("landed")
     if summary.get("crash"):
-        return f"no, it crashed: {summary['crash']}"
-    return {True: "yes", False: "no", None: f"no {page_words()['departure']} is known"}[summary.get("landed")]
+        return [f"{words['back']}: no, it crashed: {summary['crash']}"]
+    if back is None and home() is None:
+        return []
+    return [f"{words['back']}: " + {True: "yes", False: "no", None: f"no {words['departure']} is known"}[back]]
+
+
+def duration_words(summary: Mapping[str, Any]) -> str:
+    """Return ``duration 1.0 s``, or that it is unknown."""
+    return f"duration {number(summary.get('duration_s'), 's', 1)}"
 
 
 def was_ended(summary: Mapping[str, Any]) -> bool:
@@ -72,7 +81,8 @@ def flight_lines(summary: Mapping[str, Any]) -> list[str]:
     chart, words = summary.get("map") or {}, page_words()
     coverage, collisions = chart.get("coverage"), summary.get("collisions")
     lines = [
-        f"  {words['back']}: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}"
+        "  "
+        + ", ".join([*came_back(summary), duration_words(summary)])
         + (f", {words['moved']} {number(summary['distance_m'], 'm', 1)}" if "distance_m" in summary else "")
         + (f", collisions {'unknown' if collisions is None else collisions}" if "collisions" in summary else "")
         + (f", nearest surface {number(summary['min_clearance_m'], 'm')}" if "min_clearance_m" in summary else "")
@@ -101,7 +111,7 @@ def mock_lines(summary: Mapping[str, Any]) -> list[str]:
     """Return what a flight over mocks was; there is no world to collide with or to map."""
     mock = summary["mock"]
     return [
-        f"  {page_words()['back']}: {landed(summary)}, duration {number(summary.get('duration_s'), 's', 1)}; "
+        f"  {', '.join([*came_back(summary), duration_words(summary)])}; "
         f"over mocks in {number(mock.get('wall_s'), 's')}, {number(mock.get('factor'), 'times faster than the clock', 0)}"
     ]
 

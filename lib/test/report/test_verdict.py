@@ -65,6 +65,15 @@ def test_what_is_not_known_of_a_flight_is_said_so() -> None:
     )
 
 
+def test_of_a_robot_without_a_state_of_departure_nothing_is_said_of_coming_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "robot.yaml").write_text("name: arm\n")
+    monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
+    over_mocks = {"outcome": "accomplished", "landed": None, "duration_s": 9.0, "mock": MOCK}
+    assert verdict_lines(over_mocks, [], OUT)[2] == "  duration 9.0 s; over mocks in 1.00 s, 100 times faster than the clock"
+    through_a_world = {"outcome": "accomplished", "landed": None, "duration_s": 9.0, "distance_m": 4.0}
+    assert verdict_lines(through_a_world, [], OUT)[2] == "  duration 9.0 s, travelled 4.0 m"
+
+
 def test_a_crash_is_no_landing() -> None:
     summary = {"outcome": "given_up", "landed": False, "crash": "it met the ground at 7.6 m/s", "duration_s": 9.0}
     assert verdict_lines(summary, [], OUT)[2].startswith("  landed: no, it crashed: it met the ground at 7.6 m/s, duration 9.0 s")
