@@ -27,6 +27,7 @@ from alula.prove.symbolic import search as by_sets
 from alula.runtime.core import SkillsetEngine
 from alula.runtime.hooks import SkillHooks
 
+pytestmark = pytest.mark.long
 ANY_TIME = Deadline.after(3600.0)
 MOST = 60
 QUIET = {"deadline": None, "suppress_health_check": list(HealthCheck)}

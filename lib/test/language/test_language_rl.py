@@ -293,6 +293,7 @@ def test_any_row_of_words(text):
     survives("skillset s { skill f { " + text)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "junk", ["{", "skill f {", "effect {", "not ", "(", "a -> b ", "invariant { i {", "success ", "/*", "type T ", "skillset s {} "]
 )

@@ -14,6 +14,7 @@ pytest.importorskip("behaviortreepy")
 from oracle import RAISED, Theirs, ours
 from random_trees import make_case
 
+pytestmark = pytest.mark.long
 COUNT = 20_000
 BATCH = 500
 TICKS = 10

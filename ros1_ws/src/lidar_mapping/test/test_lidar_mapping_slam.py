@@ -15,6 +15,7 @@ from lidar_mapping import ImuReading, Slam, SlamSettings
 from lidar_mapping.readings import ReadingQueue
 from perception_core import NS, PoseBuffer, PoseUnavailableError
 
+pytestmark = pytest.mark.long
 LAP_S = 24.0
 
 

@@ -72,6 +72,7 @@ def command(name, *words):
     return ended.stdout
 
 
+@pytest.mark.long
 def test_the_checker_finds_nothing_in_the_drones_missions():
     names = ["missions/mapping.xml", "missions/inspection.xml"]
     files = json.loads(command("check", "--time", "4", "--json", *names))["files"]
