@@ -58,7 +58,8 @@ def targets(summary):
 
 def test_a_third_height(robot, capsys):
     robot.change(CHANGES[0])
-    assert capsys.readouterr().out.endswith("inspection.xml: ok\n")
+    # A slow machine has not looked at all runs when the time is over; that is a note, and no finding.
+    assert re.search(r"inspection\.xml: ok(, 1 note)?\n$", capsys.readouterr().out)
     summary, mission = robot.fly()
     assert (summary["outcome"], mission["waypoints"], mission["waypoints_reached"]) == ("accomplished", 15, 15)
     assert targets(summary) == [3.0] * 5 + [7.0] * 5 + [10.0] * 5
