@@ -8,6 +8,7 @@ import signal
 import socket
 import struct
 import sys
+import threading
 from xmlrpc.client import ServerProxy
 
 from ros_bridge_harness import HERE, PROBE_S, Lines, Ros1Peer, wait_until
@@ -24,6 +25,7 @@ topics:
   - {name: /bp/flood, direction: ros1_to_ros2, type: std_msgs/String, depth: 10}
   - {name: /bp/burst, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {name: /bp/stopped, direction: ros1_to_ros2, type: std_msgs/String}
+  - {name: /bp/stalled, direction: ros1_to_ros2, type: std_msgs/String}
   - {name: /bp/fake, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
   - {ros1_name: /bp/fake, ros2_name: /bp/fake_too, direction: ros1_to_ros2, type: std_msgs/String, depth: 100}
 """
@@ -235,6 +237,37 @@ def test_subscriber_whose_process_stands_still_gets_the_whole_burst_afterwards(r
     gaps = [(before, after) for before, after in itertools.pairwise(numbers) if after != before + 1]
     assert [text for text, _ in came()] == sent, f"lost behind the writer, between its numbers {gaps}"
     assert [text for text in beside if text != "(probe)"] == sent
+
+
+def test_subscriber_that_stalls_loses_what_its_own_queue_has_no_room_for_as_within_ros2(ros2, master, bridge):
+    """A reader acknowledges what it will drop: no writer can tell, the bridge's no more than one of ROS 2. Room in its queue helps."""
+    sent = [f"{number:02}" for number in range(90)]
+    within = ros2.node.create_publisher(String, "/bp/stalled_within", 1000)
+    ros2.ends.append((ros2.node.destroy_publisher, within))
+    short, roomy = (texts(ros2, "/bp/stalled", depth) for depth in (10, 200))
+    short_within, roomy_within = (texts(ros2, "/bp/stalled_within", depth) for depth in (10, 200))
+    peer = Lines([sys.executable, str(HERE / "ros_bridge_counting_peer.py"), "/bp/stalled", "200"], dict(os.environ), errors=False)
+    hello = greeting("/bp/stalled")
+    probe = FakePublisher(master, [hello + frame("(probe)")], "/bp/stalled")
+    wait_until(lambda: peer.lines and short and roomy and within.get_subscription_count() == 2, "all know each other", LIMIT_S)
+    probe.close()
+    go_on = threading.Event()
+    ros2.executor.create_task(go_on.wait, LIMIT_S)
+    ros2.executor.wake()
+    try:
+        fake = FakePublisher(master, [hello + b"".join(frame(text) for text in sent), hello], "/bp/stalled")
+        for text in sent:
+            within.publish(String(data=text))
+        wait_until(lambda: json.loads(list(peer.lines)[-1])[0] == sent[-1], "all have left the bridge", LIMIT_S)
+        fake.close()
+    finally:
+        go_on.set()
+    for heard in (short, roomy, short_within, roomy_within):
+        wait_until(lambda heard=heard: heard[-1:] == sent[-1:], "the last one arrives", LIMIT_S)
+    for heard in (short, short_within):
+        assert len(set(heard) & set(sent)) < len(sent)
+    for heard in (roomy, roomy_within):
+        assert [text for text in heard if text != "(probe)"] == sent
 
 
 def test_flood_crosses_in_order_and_what_has_to_go_is_counted(ros2, master, bridge):
