@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import re
@@ -129,16 +128,32 @@ def test_second_setup_has_nothing_to_do_and_results_only_go_to_stdout() -> None:
     assert done.stdout == ""
 
 
-def test_a_check_waits_for_no_build_and_prints_json_only() -> None:
+@pytest.fixture
+def unbuilt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have both worlds' Python and nothing else, and no folder for a set-up's logs: what needs a build ends with 2."""
     state = Path(os.environ.get("ALULA_STATE", ALULA_ROOT / ".alula"))
-    with (state / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # as long as a build of this checkout would hold it
-        done = alula("check", "--json", "--no-proofs", str(ALULA_ROOT / "skillsets/uav/mapping.skill"))
-        help_text, version = alula("help"), alula("--version")
-    assert done.returncode == 0
-    assert json.loads(done.stdout) is not None
+    made = tmp_path / "state"
+    (made / "stamps").mkdir(parents=True)
+    (made / "stamps" / "venv2").touch()
+    (made / "log").touch()
+    for world in ("venv1", "venv2"):
+        (made / world).symlink_to(state / world)
+    monkeypatch.setenv("ALULA_STATE", str(made))
+
+
+@pytest.mark.usefixtures("unbuilt")
+def test_what_works_on_models_needs_no_build_and_prints_results_only(tmp_path: Path) -> None:
+    model, mission = ALULA_ROOT / "skillsets/uav/mapping.skill", ALULA_ROOT / "missions/mapping.xml"
+    checked, drawn = alula("check", "--json", "--no-proofs", str(model)), alula("tree", str(mission))
+    generated = alula("generate", str(model.parent), "--out", str(tmp_path / "made"))
+    help_text, version = alula("help"), alula("--version")
+    assert (checked.returncode, drawn.returncode, generated.returncode) == (0, 0, 0), checked.stderr + drawn.stderr + generated.stderr
+    assert json.loads(checked.stdout) is not None
     assert "usage:" in help_text.stdout
     assert re.fullmatch(r"alula \d+\.\d+\.\d+\n", version.stdout)
+    built = alula("panel")
+    assert built.returncode == 2
+    assert "is to be made" in built.stderr
 
 
 def test_completion_is_a_bash_script_that_knows_commands() -> None:
