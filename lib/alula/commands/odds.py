@@ -37,7 +37,7 @@ from alula.trees.errors import TreeError
 COMMAND = "alula odds"
 WRONG = 2
 MOST_SITUATIONS = 200_000
-UNLIKELY = 1e-4
+UNLIKELY = 1e-3
 COUNTED = 100  # attempts and rounds, exactly: each has its share of the odds
 
 

@@ -26,6 +26,7 @@ def as_text(title: str, odds: Odds, changes: dict[str, Odds]) -> str:
     lines += [f"{odds.situations} situations, {odds.states} states of the decision process"]
     if odds.open:
         lines += [f"the search stopped before {odds.open} situations were looked at: the bounds hold, and are wider than need be"]
+        lines += ["what follows from these counts as the worst: costs are upper bounds; a smaller `--unlikely` narrows them"]
     return "\n".join(lines) + "\n"
 
 
