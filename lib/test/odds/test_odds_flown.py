@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pytest
 from fetch_and_carry import by_hand
 
 from alula.language.models import check_files, models_in
@@ -21,6 +22,7 @@ DEVIATIONS = 3.29
 """A right chance is missed once in a thousand times; the seeds are fixed."""
 
 
+@pytest.mark.long
 def test_a_thousand_missions_over_mocks_are_within_the_confidence_interval() -> None:
     models = [one for file in check_files(models_in(str(CARRIER / "skillsets"))) for one in file.skillsets]
     figures = load_figures(CARRIER / "skillsets/faults.yaml", models).skills

@@ -323,6 +323,7 @@ def test_a_folder_that_goes_away_is_told_in_a_line(tmp_path, capsys, monkeypatch
     assert said == f"alula campaign: {tmp_path / 'out'}: can't be written any more: No such file or directory\n"
 
 
+@pytest.mark.long
 def test_a_campaign_that_is_killed_goes_on_and_has_the_same_table_in_the_end(tmp_path):
     path, out = campaign_file(tmp_path / "a.yaml", DRAWN.replace("flights: 12", "flights: 14")), tmp_path / "out"
     words = [str(path), "--out", str(out)]

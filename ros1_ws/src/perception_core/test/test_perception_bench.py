@@ -44,6 +44,7 @@ def test_a_flight_that_can_not_be_rendered_is_told(flight, complaint, capsys) ->
     assert complaint in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_rendered_flight_is_good(tmp_path, capsys) -> None:
     world = tmp_path / "lane.yaml"
     world.write_text(LANE)
