@@ -187,11 +187,11 @@ def test_started_again_after_a_crash_it_begins_where_the_guidance_flies(flight, 
 
 def test_readings_of_an_imu_that_is_mounted_turned_are_turned_into_the_body(flight, states) -> None:
     walls = Walls(flight)
-    static, imu = (rospy.Publisher(name, kind, queue_size=10, latch=True) for name, kind in (("/tf_static", TFMessage), ("/imu/data", Imu)))
+    imu = rospy.Publisher("/imu/data", Imu, queue_size=10, latch=True)
     mount = TransformStamped(header=Header(frame_id="base_link"), child_frame_id="imu")
     mount.transform.rotation = Quaternion(*Rotation.from_euler("x", 90, degrees=True).as_quat())
-    static.publish(TFMessage(transforms=[mount]))
-    wait_until(lambda: imu.get_num_connections() and static.get_num_connections(), timeout_s=NODE_UP_S, what="it listens to IMU and mounts")
+    flight.mount(mount)
+    wait_until(imu.get_num_connections, timeout_s=NODE_UP_S, what="it listens to the IMU")
 
     def measure(stamp_ns: int) -> None:
         reading = Imu(header=Header(stamp=rospy.Time(stamp_ns // NS, stamp_ns % NS), frame_id="imu"))
@@ -209,7 +209,7 @@ def test_readings_of_an_imu_that_is_mounted_turned_are_turned_into_the_body(flig
     assert (
         np.linalg.norm([[p.pose.pose.position.x, p.pose.pose.position.y, p.pose.pose.position.z - 2.0] for p in poses], axis=1).max() < 0.03
     )
-    for end in (listener, static, imu):
+    for end in (listener, imu):
         end.unregister()
 
 

@@ -119,6 +119,10 @@ class FakeFlight:
         for publisher in (self._images.pop(side), self._infos.pop(side)):
             publisher.unregister()
 
+    def mount(self, transform: TransformStamped) -> None:
+        """Mount one more sensor. Publishers of one process share the latched message of a topic, so all mounts are in one."""
+        self._static.publish(TFMessage(transforms=[*_mounts().transforms, transform]))
+
     def connected(self) -> bool:
         """Whether the node listens, and its health is heard."""
         return bool(self.listens() and self._listener.get_num_connections())
