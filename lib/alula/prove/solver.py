@@ -43,23 +43,35 @@ class Solver:
 
     # --- questions ------------------------------------------------------------------------------------------------
 
-    def example(self, *terms: Any) -> Any | None:
-        """Return a model in which all terms are true, or None when there is none; raise OutOfTimeError."""
-        self._deadline.check()
-        self._solver.set("timeout", max(1, int(self._deadline.left_s() * 1000)))
+    def possible(self, *terms: Any) -> bool:
+        """Tell whether all terms can be true at once; raise OutOfTimeError."""
         self._solver.push()
         try:
-            self._solver.add(*self._ranges, *terms)
-            answer = self._solver.check()
-            if answer == z3.unknown:
-                raise OutOfTimeError
-            return self._solver.model() if answer == z3.sat else None
+            return self._check(self._solver, [*self._ranges, *terms])
         finally:
             self._solver.pop()
 
-    def possible(self, *terms: Any) -> bool:
-        """Tell whether all terms can be true at once."""
-        return self.example(*terms) is not None
+    def example(self, *terms: Any) -> Any | None:
+        """Return a model in which all terms are true, or None when there is none; raise OutOfTimeError.
+
+        The model hangs on the terms alone: z3's choice also hangs on what a context was asked before, and on when Python frees terms. So
+        a context of its own is asked for it.
+        """
+        if not self.possible(*terms):
+            return None
+        alone = z3.Context()
+        solver = z3.Solver(ctx=alone)
+        self._check(solver, [term.translate(alone) for term in (*self._ranges, *terms)])
+        return solver.model().translate(self._context)
+
+    def _check(self, solver: Any, terms: Sequence[Any]) -> bool:
+        self._deadline.check()
+        solver.set("timeout", max(1, int(self._deadline.left_s() * 1000)))
+        solver.add(*terms)
+        answer = solver.check()
+        if answer == z3.unknown:
+            raise OutOfTimeError
+        return bool(answer == z3.sat)
 
     # --- terms ----------------------------------------------------------------------------------------------------
 

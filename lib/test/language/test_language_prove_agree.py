@@ -79,7 +79,6 @@ def test_both_searches_find_the_same(skillset):
 def test_a_bound_of_what_can_be_reached_finds_the_same_as_all_that_can_be(skillset):
     """Where sets are too large: the same findings, with the same counterexamples; and the bound has every situation."""
     _certain, suspects = local_checks(skillset, ANY_TIME)
-    # Each search has a solver of its own: which values show a step depends on what the solver was asked before.
     exactly = by_sets(skillset, without_data(skillset, ANY_TIME), suspects, ANY_TIME, copies=2)
     plain = without_data(skillset, ANY_TIME)
     with pytest.MonkeyPatch.context() as patched:
