@@ -68,7 +68,8 @@ class Mission:
         self.rig.caller.destroy_subscription(self._heartbeat)
 
     def until(self, what) -> None:
-        self.rig.wait(lambda: self.process.poll() is not None or what(), timeout_s=30.0)
+        # The clock goes on while the process starts: on a busy machine that is a minute of mission clock.
+        self.rig.wait(lambda: self.process.poll() is not None or what(), timeout_s=300.0)
         assert self.process.poll() is None, self.read("mission.json")
 
     def exit_code(self) -> int:
