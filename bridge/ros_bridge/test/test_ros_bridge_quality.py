@@ -1,13 +1,10 @@
 """`./alula bridge --all` as a process: late joiners get what was latched, reliable and careless ends are both served."""
 
-import time
-
-import pytest
 from geometry_msgs.msg import TransformStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from ros_bridge_harness import Ros1Peer
-from ros_bridge_nodes import BEST_EFFORT, LATCHED, RELIABLE, hex_of, text_of
+from ros_bridge_nodes import BEST_EFFORT, LATCHED, RELIABLE, hex_of, wait_ros1_receives
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
@@ -95,11 +92,5 @@ def test_the_bridge_asks_for_reliable_until_a_publisher_offers_less(ros1, ros2_n
     careless = ros2_node.publisher("/d/mixed", String, BEST_EFFORT)
     ros2_node.until(lambda: asked() == [ReliabilityPolicy.BEST_EFFORT], "the bridge asks for best effort")
     ros2_node.until(lambda: careful.get_subscription_count() and careless.get_subscription_count(), "both are matched")
-    for publisher, text in ((careful, "careful"), (careless, "careless")):
-        deadline = time.monotonic() + 10.0
-        while time.monotonic() < deadline:
-            publisher.publish(String(data=text))
-            if text_of(ros1.expect("message", topic="/d/mixed")) == text:
-                break
-        else:
-            pytest.fail(f"nothing of {text} arrives")
+    for publisher in (careful, careless):
+        wait_ros1_receives(ros1, publisher, "/d/mixed")
