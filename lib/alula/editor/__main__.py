@@ -10,10 +10,13 @@ from collections.abc import Sequence
 def main(words: Sequence[str] | None = None) -> int:
     """Serve on stdin and stdout until the editor closes them; return the exit code 0."""
     parser = argparse.ArgumentParser(prog="alula editor", description="A language server over the standard streams, for editors.")
-    parser.parse_args(words)
+    parser.add_argument(
+        "--trust", action="store_true", help="import the Python of the robots whose missions are opened, which knows their own nodes"
+    )
+    given = parser.parse_args(words)
     from alula.editor.server import serve  # late: --help does without pygls
 
-    serve()
+    serve(trusted=given.trust)
     return 0
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from alula.common.robots import RobotError, find_robot
 from alula.editor.completion import Completion, Place
+from alula.language.errors import Diagnostic, Severity
 from alula.language.models import ModelFile, check_files, models_in
 from alula.missions.check.findings import findings_of
 from alula.missions.check.skills import Skills
@@ -20,6 +22,7 @@ from alula.trees.palette import NodeType
 from alula.trees.reading import POSTCONDITIONS, PRECONDITIONS
 
 SUFFIX = ".xml"
+UNKNOWN_NODE = "ALU601"
 _TAG = re.compile(r"<([\w.]*)$")
 _VALUE = re.compile(r"""([\w:]+)\s*=\s*(?:"([^"]*)|'([^']*))$""")
 _OPEN = re.compile(r"""<([\w.]+)((?:\s+[\w:]+\s*=\s*(?:"[^"]*"|'[^']*'))*)\s*([^<>]*)$""")
@@ -31,16 +34,22 @@ _SCRIPTS = frozenset({"code", "if", "otherwise", *PRECONDITIONS, *POSTCONDITIONS
 
 
 class Missions:
-    """Reads missions with the models of their robots, which are read again when their files have changed."""
+    """Reads missions with the models of their robots, which are read again when their files have changed.
 
-    def __init__(self) -> None:
+    ``trusted``: a robot's Python is imported for the nodes that it adds. Otherwise opening a file runs nothing of what lies around it,
+    and a node that nobody knows may be the robot's: a note instead of an error.
+    """
+
+    def __init__(self, *, trusted: bool = False) -> None:
+        self.trusted = trusted
         self._read: dict[tuple[tuple[str, int], ...], Skills] = {}
 
     def checked(self, path: str, text: str) -> ModelFile:
         """Return a mission with its findings."""
         file = ModelFile(path, text)
         skillsets = tuple(self.skills(path).skillsets.values())
-        file.findings = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=part_around(path))
+        found = findings_of(path, text.encode("utf-8", "replace"), skillsets, part=self._part(path))
+        file.findings = [_perhaps_own(one) for one in found] if self._has_untrusted_part(path) else found
         return file
 
     def skills(self, path: str) -> Skills:
@@ -58,7 +67,7 @@ class Missions:
         """Return what may stand at a place."""
         lines = file.text.split("\n")[: place.line]
         before = "\n".join([*lines[:-1], lines[-1][: place.column - 1]]) if lines else ""
-        return list(_candidates(before, self.skills(file.path), part_around(file.path)))
+        return list(_candidates(before, self.skills(file.path), self._part(file.path)))
 
     def description(self, file: ModelFile, place: Place) -> tuple[str, int, int] | None:
         """Return what the name at a place stands for, with its first column and the one behind it; None where nothing is known."""
@@ -69,13 +78,27 @@ class Missions:
                 return (text, match.start() + 1, match.end() + 1) if text else None
         return None
 
+    def _part(self, path: str) -> MissionPart:
+        """Return what the robot whose folder a file lies in adds to missions; nothing where it is not known."""
+        if not self.trusted:
+            return NO_PART
+        try:
+            return find_robot(Path(path).parent).part("missions") or NO_PART
+        except RobotError:
+            return NO_PART
 
-def part_around(path: str) -> MissionPart:
-    """Return what the robot whose folder a file lies in adds to missions; nothing where there is no robot, or it can't be imported."""
-    try:
-        return find_robot(Path(path).parent).part("missions") or NO_PART
-    except RobotError:
-        return NO_PART
+    def _has_untrusted_part(self, path: str) -> bool:
+        try:
+            return not self.trusted and "missions" in find_robot(Path(path).parent).parts
+        except RobotError:
+            return False
+
+
+def _perhaps_own(finding: Diagnostic) -> Diagnostic:
+    if finding.code != UNKNOWN_NODE:
+        return finding
+    cure = "the editor runs no Python of a robot unless it is started as `alula editor --trust`; `alula check` knows all nodes"
+    return replace(finding, severity=Severity.NOTE, message=f"{finding.message}, unless it is the robot's own", hint=cure)
 
 
 def _candidates(before: str, skills: Skills, part: MissionPart) -> Iterator[Completion]:

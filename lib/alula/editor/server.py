@@ -327,8 +327,9 @@ def _mended(file: ModelFile, finding: Diagnostic) -> tuple[str, lsp.TextEdit] | 
     return None
 
 
-def serve() -> None:
-    """Serve until the editor goes."""
+def serve(*, trusted: bool = False) -> None:
+    """Serve until the editor goes; ``trusted``: robots' Python may be imported."""
+    server.missions.trusted = trusted
     server.start_io()
 
 

@@ -7,6 +7,7 @@ from test_language_server import Editor
 
 from alula.editor.completion import Place
 from alula.editor.missions import Missions
+from alula.language.errors import Severity
 from alula.missions.check.page import ROBOT, whole
 
 
@@ -68,6 +69,39 @@ def test_models_that_change_are_read_again(folder):
     model = folder / "skillsets" / "drone.rl"
     model.write_text(ROBOT.replace("skill watch {", "skill land { success DOWN {} }\n  skill watch {"))
     assert missions.checked(path, text).findings == []
+
+
+OWN = """
+import pathlib
+
+from alula.missions.filed.part import MissionPart
+from alula.trees.node import SyncAction
+
+pathlib.Path(__file__).with_name("imported").touch()
+
+
+class Wait(SyncAction):
+    pass
+
+
+PART = MissionPart(nodes=(("robot.Wait", Wait),))
+"""
+
+
+def test_opening_a_mission_runs_no_python_of_its_robot(folder):
+    (folder / "robot.yaml").write_text("name: drone\nskillsets: skillsets\npython: [own]\nparts: {missions: 'own_part_of_editor:PART'}\n")
+    (folder / "own").mkdir()
+    (folder / "own" / "own_part_of_editor.py").write_text(OWN)
+    path, text = str(folder / "missions" / "m.xml"), whole("<ForceSuccess><robot.Wait/></ForceSuccess>")
+    missions = Missions()
+    file = missions.checked(path, text)
+    missions.completions(file, Place(3, 6))
+    (finding,) = file.findings
+    assert (finding.code, finding.severity) == ("ALU601", Severity.NOTE)
+    assert "--trust" in finding.hint
+    assert not (folder / "own" / "imported").exists()
+    assert Missions(trusted=True).checked(path, text).findings == []
+    assert (folder / "own" / "imported").exists()
 
 
 def test_an_editing_session(folder):
