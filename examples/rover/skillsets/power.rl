@@ -15,6 +15,7 @@ skillset power {
   // Runs beside the work, and ends it when the battery is low: what is left then is for the way to the dock.
   // Once low it is so until the battery was charged; a single wrong value is forgiven.
   skill supply {
+    precondition told: battery.percentage >= 0 % // its driver has told at all
     precondition enough: battery.percentage > 15 %
     invariant enough { guard battery.percentage > 15 % for 3 s recovers at 60 % }
     progress period 1 sec

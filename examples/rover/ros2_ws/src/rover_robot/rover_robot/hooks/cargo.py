@@ -13,6 +13,7 @@ from rover_robot.hooks.clock import Watch
 
 if TYPE_CHECKING:
     from alula.runtime.core.execution import Execution
+    from rclpy.client import Client
     from rclpy.node import Node
 
 ANSWER = "done "
@@ -91,23 +92,32 @@ class OpenDoor(AbstractOpenDoorSkill):
     def __init__(self, node: Node, watch: Watch) -> None:
         self._node, self._watch = node, watch
         self._execution: Execution | None = None
+        self._clients: dict[str, Client[SetBool.Request, SetBool.Response]] = {}
         self._called_s = 0.0
         watch.every(self._look)
 
     def on_dispatch(self, execution: Execution) -> None:
         """Call it."""
         self._called_s, self._execution = self._watch.now_s, execution
-        service = self._node.create_client(SetBool, f"/door/{execution.inputs.door}/open")  # type: ignore[attr-defined]
+        service = self._client(execution.inputs.door)  # type: ignore[attr-defined]
         service.call_async(SetBool.Request(data=True)).add_done_callback(lambda future: self._on_answer(execution, future.result()))
 
     def on_interrupt(self, execution: Execution) -> None:
-        """A door may be open."""
-        self._execution = None
+        """Wait no more: a door may be open."""
+        if execution is self._execution:
+            self._execution = None
+
+    def _client(self, door: str) -> Client[SetBool.Request, SetBool.Response]:
+        """Return the one client of a door."""
+        if door not in self._clients:
+            self._clients[door] = self._node.create_client(SetBool, f"/door/{door}/open")
+        return self._clients[door]
 
     def _on_answer(self, execution: Execution, answer: SetBool.Response) -> None:
-        self._execution = None
-        end = self.terminated_OPEN if answer.success else self.terminated_SHUT
-        end(execution, answer.message)
+        if execution is self._execution:
+            self._execution = None
+            end = self.terminated_OPEN if answer.success else self.terminated_SHUT
+            end(execution, answer.message)
 
     def _look(self) -> None:
         execution = self._execution

@@ -63,7 +63,8 @@ class Supply(AbstractSupplySkill):
 
     def on_interrupt(self, execution: Execution) -> None:
         """End."""
-        self._execution = None
+        if execution is self._execution:
+            self._execution = None
 
     def progress(self, execution: Execution) -> float:
         """Return how full the battery is."""
@@ -96,7 +97,8 @@ class Charge(AbstractChargeSkill):
 
     def on_interrupt(self, execution: Execution) -> None:
         """End."""
-        self._execution = None
+        if execution is self._execution:
+            self._execution = None
 
     def progress(self, execution: Execution) -> float:
         """Return the part of the wanted level that is there."""
