@@ -96,7 +96,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--no-proofs", dest="proofs", action="store_false", help="skip the proofs")
     parser.add_argument("--time", type=float, default=30.0, metavar="SECONDS", help="time limit for the proofs of a file (default 30)")
-    parser.add_argument("--play", type=int, metavar="N", help="play counterexample N in running managers (see `--play 1 --help`)")
+    parser.add_argument(
+        "--play",
+        type=int,
+        metavar="N",
+        help="play counterexample N: in running managers, or as a flight of the mission (see `--play 1 --help`)",
+    )
+    parser.add_argument("--out", metavar="DIR", help="with --play of a mission: folder for the run's files")
     parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
     parser.add_argument("--to", choices=[notation.value for notation in Notation], help="print the models in this notation instead")
     return parser
@@ -181,9 +187,9 @@ def _as_text(files: Sequence[ModelFile]) -> str:
         if not numbers[Severity.ERROR] + numbers[Severity.WARNING]:
             counts.insert(0, "ok")
         for finding in file.findings:
-            number += bool(finding.counterexample.steps)
-            playable = f"      = counterexample {number}: `--play {number}` plays it in running managers\n"
-            parts.append(f"{finding.render()}\n{playable if finding.counterexample.steps else ''}")
+            number += finding.playable
+            playable = f"      = counterexample {number}: `--play {number}` plays it\n"
+            parts.append(f"{finding.render()}\n{playable if finding.playable else ''}")
         parts.append(f"{file.path}: {', '.join(counts)}")
     return "\n".join(parts)
 

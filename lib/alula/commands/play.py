@@ -9,8 +9,11 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from alula.commands.check import counterexamples_of
+from alula.commands.check_missions import SUFFIX
+from alula.commands.play_mission import play_mission
 from alula.language.models import check_files, models_in
 from alula.prove.limits import DEFAULT_TIME_S
 from alula.runtime.counterexample_play import PlayedStep, play
@@ -19,6 +22,8 @@ from alula.runtime.counterexample_play import PlayedStep, play
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play a counterexample; return the exit code."""
     options = _parser().parse_args(arguments)
+    if any(one.endswith(SUFFIX) for one in options.files):
+        return play_mission(options)
     paths = dict.fromkeys(path for given in options.files for path in models_in(given))
     files = check_files(list(paths), sys.stdin.buffer)
     counterexamples = counterexamples_of(files, options.time, closed_world=options.closed_world)
@@ -43,6 +48,9 @@ def _parser() -> argparse.ArgumentParser:
         "--time", type=float, default=DEFAULT_TIME_S, metavar="SECONDS", help="time limit for the proofs of a file (default 30)"
     )
     parser.add_argument("--closed-world", action="store_true", help="as for `alula check`")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="of a mission: folder for the run's files (default: runs/TIME-NAME of the robot)"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     return parser
 

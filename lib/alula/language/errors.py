@@ -43,6 +43,11 @@ class Diagnostic:
         """The lines of ``example``, then of ``counterexample``."""
         return (*self.example, *self.counterexample.lines)
 
+    @property
+    def playable(self) -> bool:
+        """Tell whether `check --play` plays its counterexample."""
+        return bool(self.counterexample.steps)
+
     def render(self) -> str:
         """Return the finding as text for people: place, code, message, the line with a caret, what was expected, hint."""
         lines = [f"{_place(self.span)}{self.severity.value} {self.code}: {self.message}"]

@@ -105,6 +105,11 @@ class Director:
         self._phase: Callable[[], None] = self._wait
 
     @property
+    def root(self) -> Behaviour:
+        """The mission's tree."""
+        return self._mission.root
+
+    @property
     def memory(self) -> DirectorMemory:
         """What the next step hangs on, besides the trees."""
         return DirectorMemory(self._phase.__name__, self.end, self.start_s, self._wait_until_s, self._stop is not None)

@@ -6,19 +6,26 @@ for next; its outcomes are all ways in which the mission can end from there, wha
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from alula.prove.mission.regions import Regions, Ticked
+from alula.prove.mission.regions import Regions, Sets, Ticked
+from alula.prove.mission.ticking import Outcome
 
 GOOD = frozenset({"accomplished", "degraded"})
 GIVES_UP = "AlwaysFailure"
 """The type of node by which a tree says that it gives up."""
 
 
+Way = tuple[Outcome, Sets]
+"""A tick, and the managers with which it goes so."""
+
+
 @dataclass
 class Row:
-    """A failure at a moment, and what comes of it; ``node`` is the name of the leaf that failed, ``region`` where it was first seen.
+    """A failure at a moment, and what comes of it.
+
+    ``node`` is the name of the leaf that failed, ``region`` where it was first seen,
+    ``way`` how the tick goes that sees it.
 
     ``loses``: before it the mission could be accomplished, and the tree does not come to a node that says that it gives up.
     """
@@ -29,6 +36,7 @@ class Row:
     leaf: int
     moment: tuple[str, ...]
     region: int
+    way: Way
     loses: bool = False
     starts: set[str] = field(default_factory=set)
     outcomes: set[str] = field(default_factory=set)
@@ -57,25 +65,32 @@ class Answers:
         rows: dict[tuple[str, str, int, tuple[str, ...]], Row] = {}
         for number, region in enumerate(regions.regions):
             for target, ticked in region.next:
-                for leaf, end in self._failures(ticked):
-                    self._add(rows, number, target, ticked, leaf, end)
+                for (leaf, end), way in self._failures(ticked).items():
+                    self._add(rows, number, target, ticked, leaf, end, way)
         self.rows = sorted(rows.values(), key=lambda one: (one.skill, one.leaf, one.end, one.moment))
 
     def _add(
-        self, rows: dict[tuple[str, str, int, tuple[str, ...]], Row], number: int, target: int, ticked: Ticked, leaf: int, end: str
+        self,
+        rows: dict[tuple[str, str, int, tuple[str, ...]], Row],
+        number: int,
+        target: int,
+        ticked: Ticked,
+        leaf: int,
+        end: str,
+        way: Way,
     ) -> None:
         node = self._system.leaves[leaf]
         skill = f"{node.skillset}.{node.model.name}"
         moment = self._moment(number, leaf)
-        row = rows.setdefault((skill, end, leaf, moment), Row(skill, end, node.name, leaf, moment, number))
+        row = rows.setdefault((skill, end, leaf, moment), Row(skill, end, node.name, leaf, moment, number, way))
         started = frozenset(self._name(one) for one in ticked.outcome.started)
         row.starts |= started or self._started_from(target)
         row.outcomes |= self._leads[target]
         row.loses |= bool(self._leads[number] & GOOD) and not self._gives_up(target, ticked)
 
-    def _failures(self, ticked: Ticked) -> Iterator[tuple[int, str]]:
-        """Yield the leaves that fail in a tick, each with how it ended as far as the tree can tell."""
-        found: set[tuple[int, str]] = set()
+    def _failures(self, ticked: Ticked) -> dict[tuple[int, str], Way]:
+        """Return the leaves that fail in a tick, each with how it ended as far as the tree can tell, and a way in which it does."""
+        found: dict[tuple[int, str], Way] = {}
         place_of = {id(node): number for number, node in enumerate(self._system.nodes)}
         for outcome, sets in ticked.ways:
             failed = {number for number, status in outcome.touched if status == "FAILURE"}
@@ -84,8 +99,9 @@ class Answers:
                     place = self._system.place_of(("execution", leaf))
                     known = self._system.managers_of(next(iter(sets[place])))
                     ended = [one for one in known.executions if one.leaf == leaf and one.phase == "ended"]
-                    found |= {(leaf, (one.result or one.state)) for one in ended}
-        yield from sorted(found)
+                    for one in ended:
+                        found.setdefault((leaf, one.result or one.state), (outcome, sets))
+        return dict(sorted(found.items(), key=lambda one: one[0]))
 
     def _moment(self, region: int, but: int) -> tuple[str, ...]:
         """Return the other leaves whose executions the tree hangs on."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from alula.language.errors import Diagnostic, Severity
 from alula.model import semantics
 from alula.model.span import Span
-from alula.prove.mission.answers import GOOD, Answers
+from alula.prove.mission.answers import GOOD, Answers, Row
 from alula.prove.mission.regions import Regions
+from alula.prove.mission.run import MissionFinding, MissionRun
 from alula.prove.mission.state import Managers
 from alula.prove.mission.system import FAILED
 from alula.prove.mission.words import told
@@ -50,8 +51,8 @@ def _left_taken(regions: Regions) -> Iterator[Diagnostic]:
                 names = ", ".join(f"`{skillset.name}.{skill}`" for skill in lost)
                 message = f"the mission can end ({end}) so that {names} can't start any more ({', '.join(held)})"
                 cure = "have the skill give back what it holds however it ends, or restart its managers before the next mission"
-                run = told(system, regions.run(number, {place: one}))
-                yield _finding("ALU701", message, system.nodes[0], cure, run)
+                run = MissionRun(tuple(regions.run(number, {place: one})), end, _named(skillset.name, states), system.skillsets)
+                yield _finding("ALU701", message, system.nodes[0], cure, told(system, run.events), run)
 
 
 def _lost(regions: Regions, place: int, number: int) -> tuple[str, ...]:
@@ -86,8 +87,26 @@ def _unanswered(regions: Regions, answers: Answers) -> Iterator[Diagnostic]:
         how = "fails" if row.end == FAILED else f"ends with {row.end}"
         message = f"nothing answers when `{row.skill}` {how}: the mission ends ({', '.join(sorted(row.outcomes))})"
         cure = "put a Fallback around it with what is to be done then, or `<AlwaysFailure/>` where giving up is meant"
-        run = told(regions.system, regions.run(row.region, {}))
-        yield _finding("ALU702", message, regions.system.leaves[row.leaf], cure, run)
+        run = _until_its_end(regions, row)
+        yield _finding("ALU702", message, regions.system.leaves[row.leaf], cure, told(regions.system, run.events), run)
+
+
+def _until_its_end(regions: Regions, row: Row) -> MissionRun:
+    events, state = regions.run_on(row.region, *row.way)
+    system = regions.system
+    outcome = system.outcome(state)
+    states = [
+        one
+        for skillset, number in zip(system.skillsets, state.managers, strict=True)
+        for one in _named(
+            skillset.name, dict(zip((one.name for one in skillset.resources), system.managers_of(number).states, strict=False))
+        )
+    ]
+    return MissionRun(tuple(events), outcome.value if outcome else "running", tuple(states), system.skillsets)
+
+
+def _named(skillset: str, states: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    return tuple((f"{skillset}.{name}", state) for name, state in states.items())
 
 
 def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
@@ -100,7 +119,7 @@ def _never_ticked(regions: Regions) -> Iterator[Diagnostic]:
             yield _finding("ALU703", f"'{node.name}' is never ticked", node, "take it away, or put it where it is reached")
 
 
-def _finding(code: str, message: str, node: Node, cure: str, run: tuple[str, ...] = ()) -> Diagnostic:
+def _finding(code: str, message: str, node: Node, cure: str, lines: tuple[str, ...] = (), run: MissionRun | None = None) -> Diagnostic:
     place = node.wiring.element.place
     span = Span(place.path, place.line, place.column, place.column + 1)
-    return Diagnostic(code, message, span, Severity.WARNING, cure, example=run)
+    return MissionFinding(code, message, span, Severity.WARNING, cure, example=lines, run=run)

@@ -41,6 +41,16 @@ class Failures:
     most: int | None = None
 
 
+def searched(skillset: Skillset, deadline: Deadline) -> Abstraction:
+    """Return a skillset as it is searched: without data, and with arrows that nothing in the model takes as extern ones.
+
+    Its preconditions keep their names; data that make one false refuse in a step of their own.
+    """
+    abstraction = without_data(opened(skillset, untaken(skillset)), deadline)
+    skills = tuple(map(_named, abstraction.original.skills, abstraction.skillset.skills))
+    return replace(abstraction, skillset=replace(abstraction.skillset, skills=skills))
+
+
 class ManagersSteps:
     """The steps of one skillset.
 
@@ -51,20 +61,19 @@ class ManagersSteps:
     def __init__(
         self, skillset: Skillset, skills: Mapping[int, str], failures: Failures, deadline: Deadline, told: Callable[[int, End], End]
     ) -> None:
-        skillset = opened(skillset, untaken(skillset))
-        abstraction = without_data(skillset, deadline)
-        self.model = skillset
+        abstraction = searched(skillset, deadline)
+        self.model = abstraction.original
         self.skills = skills
         self._failures = failures
         self._told_end = told
-        self._skillset = replace(abstraction.skillset, skills=tuple(map(_named, skillset.skills, abstraction.skillset.skills)))
+        self._skillset = abstraction.skillset
         self._breakers = _breakers_of(abstraction)
-        self._names = tuple(resource.name for resource in skillset.resources)
+        self._names = tuple(resource.name for resource in self.model.resources)
         self._bad = {
             (resource.name, arrow.source, arrow.target)
-            for resource in skillset.resources
+            for resource in self.model.resources
             for arrow in resource.transitions
-            if arrow.extern and breaks(skillset, resource, arrow)
+            if arrow.extern and breaks(self.model, resource, arrow)
         }
 
     def initial(self) -> Managers:
@@ -225,7 +234,7 @@ def _with(managers: Managers, execution: Execution, ended: Execution) -> Manager
 
 
 def _named(skill: Skill, abstract: Skill) -> Skill:
-    """Return the skill for the search, with its preconditions by their names: those over data refuse in a step of their own."""
+    """Return the abstract skill with the preconditions of the skill, each of which some data fulfil."""
     kept = tuple(
         replace(one, condition=whatever_the_data(one.condition, unknown=True)) if any(data_of(one.condition)) else one
         for one in skill.preconditions

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from alula.prove.limits import Deadline
 from alula.prove.mission.oracle import Answer, Question
-from alula.prove.mission.state import Event, Kind
+from alula.prove.mission.state import Event, Kind, State
 from alula.prove.mission.system import System
 from alula.prove.mission.ticking import ABORT, TICK, Decision, Outcome
 
@@ -218,10 +218,41 @@ class Regions:
             tick = Event(KINDS[ticked.act], started=started, interrupted=interrupted, choices=choices, touched=touched)
             events.insert(0, tick)
 
+    def run_on(self, number: int, outcome: Outcome, sets: Sets, most: int = 20_000) -> tuple[list[Event], State]:
+        """Return a run to a region, through a tick with some managers of these sets and on to an end, and the situation at its end.
+
+        It ends after the tick where none of the next ``most`` situations is an end.
+        """
+        region, system = self.regions[number], self.system
+        goal = tuple(min(known, key=one.depth.__getitem__) for known, one in zip(sets, region.closures, strict=True))
+        events = self.run(number, dict(enumerate(goal)))
+        started, interrupted, choices, touched = outcome[1:]
+        events.append(Event(Kind.TICK, started=started, interrupted=interrupted, choices=choices, touched=touched))
+        first = State(outcome.memory, tuple(self.after(place, one, outcome) for place, one in enumerate(goal)))
+        before: dict[State, tuple[State, Event] | None] = {first: None}
+        todo = deque([first])
+        while todo and len(before) < most:
+            state = todo.popleft()
+            if system.outcome(state) is not None:
+                return events + _way(before, state), state
+            for event, after in system.steps(state):
+                if after not in before:
+                    before[after] = (state, event)
+                    todo.append(after)
+        return events, first
+
     def _before(self, ticked: Ticked, region: Region, place: int, root: int) -> int:
         """Return managers, the soonest there are, that a tick takes to these."""
         depth = region.closures[place].depth
         return min((one for one in ticked.sets[place] if self.after(place, one, ticked.outcome) == root), key=depth.__getitem__)
+
+
+def _way(before: Mapping[State, tuple[State, Event] | None], state: State) -> list[Event]:
+    events: list[Event] = []
+    while (step := before[state]) is not None:
+        state, event = step
+        events.append(event)
+    return events[::-1]
 
 
 def _differ(one: Sets, other: Sets) -> int:

@@ -58,6 +58,11 @@ class LocalWorld:
             self.serve(skillset, make_hooks)
 
     @property
+    def bus(self) -> Bus:
+        """What clients and managers talk over."""
+        return self._bus
+
+    @property
     def now_s(self) -> float:
         """Mission clock, seconds."""
         return self.clock.now_s

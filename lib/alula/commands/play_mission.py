@@ -1,0 +1,75 @@
+"""The part of `alula check --play` that is about missions: the counterexample is flown in virtual time, and leaves a run's folder."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from alula.commands.check_missions import SUFFIX, check_missions, prove_missions
+from alula.commands.mission_robot import part_of
+from alula.commands.run_options import run_folder
+from alula.common.files import write_json
+from alula.common.robots import RobotError, find_robot
+from alula.console.page import write_report
+from alula.language.errors import has_errors
+from alula.live.spec import RequestError
+from alula.missions.filed.part import NO_PART
+from alula.prove.mission.run import MissionFinding
+
+COMMAND = "alula check"
+
+
+def play_mission(options: argparse.Namespace) -> int:
+    """Play the counterexample of a mission; return the exit code."""
+    if not all(one.endswith(SUFFIX) for one in options.files):
+        return _refused("--play takes missions or models, not both at once")
+    files = check_missions(options.files, [])
+    if any(has_errors(file.findings) for file in files):
+        return _refused(f"a mission has errors; `alula check {' '.join(options.files)}` shows them")
+    prove_missions(files, options.time)
+    found = [(file, one) for file in files for one in file.findings if isinstance(one, MissionFinding) and one.run is not None]
+    if not 1 <= options.play <= len(found):
+        return _refused(f"there is no counterexample {options.play}; these missions have {len(found) or 'none'}")
+    file, finding = found[options.play - 1]
+    try:
+        folder = run_folder(options.out, Path(file.path).stem)
+        folder.mkdir(parents=True, exist_ok=True)
+        return _flown(Path(file.path), finding, folder, as_json=options.json)
+    except (RequestError, OSError) as error:
+        return _refused(str(error))
+
+
+def _flown(path: Path, finding: MissionFinding, folder: Path, *, as_json: bool) -> int:
+    from alula.prove.mission.play import play  # with what it brings along
+
+    assert finding.run is not None  # noqa: S101 - the caller has seen to it
+    try:
+        part = part_of(find_robot(), COMMAND)
+    except RobotError:
+        part = NO_PART
+    played = play(path, finding.run, part, folder)
+    write_json(folder / "mock.json", {"simulated_s": played.simulated_s, "notes": [played.left] if played.left else []})
+    write_report(folder, title=f"{path.name}: {finding.code}, played")
+    title = f"{finding.span}: {finding.code}: {finding.message}"
+    if as_json:
+        told = {
+            "finding": title,
+            "agrees": not played.left,
+            "left": played.left,
+            "outcome": played.end.outcome.value,
+            "folder": str(folder),
+        }
+        sys.stdout.write(json.dumps(told, indent=2) + "\n")
+    else:
+        how = (
+            f"it left the counterexample {played.left}" if played.left else f"the mission comes to the same end: {played.end.outcome.value}"
+        )
+        sys.stdout.write("\n".join([title, *(f"  {line}" for line in finding.example), how, f"report: {folder / 'report.html'}"]) + "\n")
+    return 1 if played.left else 0
+
+
+def _refused(why: str) -> int:
+    sys.stderr.write(f"{COMMAND}: {why}\n")
+    return 2

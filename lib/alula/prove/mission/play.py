@@ -1,0 +1,253 @@
+"""Plays a run of the search: the real mission and the real managers, in virtual time, with the ends, faults and moments of the run.
+
+The tree is ticked when the run ticks it, requests arrive when they arrive there, and functions end when and as the run says. Models are
+those of the search: without inputs and outputs, and what data say is one resource more (``playable``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from alula.missions.director import End, Outcome
+from alula.missions.driver import MissionDriver
+from alula.missions.filed.part import MissionPart
+from alula.missions.filed.plan import plan_of_file
+from alula.missions.filed.skills import SkillNode
+from alula.missions.record import MissionRecord
+from alula.missions.skillset import MissionClient
+from alula.model.execution_state import ExecutionState
+from alula.prove.mission.oracle import Answer, Asked, Oracle, Question
+from alula.prove.mission.playable import AS_WANTED, breaks, playable, refuses
+from alula.prove.mission.robot import Robot, opaque
+from alula.prove.mission.run import MissionRun
+from alula.prove.mission.state import Event, Kind
+from alula.prove.mission.unknown import UNKNOWN
+from alula.runtime.client import Client
+from alula.runtime.core.execution import Execution
+from alula.runtime.handle import SkillHandle
+from alula.runtime.hooks import SkillHooks
+from alula.runtime.local import LocalWorld
+from alula.runtime.local.middleware import Bus, VirtualLink, VirtualMiddleware
+from alula.runtime.middleware import GoalListener
+
+STEP_S = 0.01
+"""Between two ticks; times that the run says are over pass before the tick that sees it."""
+
+
+class LeftError(Exception):
+    """The mission does something else than the run; the message says what."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """How a run was played: the mission's end, and where it left the run (empty: nowhere)."""
+
+    end: End
+    left: str
+    simulated_s: float
+
+
+def play(path: Path, run: MissionRun, part: MissionPart, out: Path | None = None) -> Played:
+    """Fly a run of a mission's file; with ``out`` the mission is recorded there, as one over mocks."""
+    player = _Player(path, run, part, out)
+    left = ""
+    try:
+        for number, event in enumerate(run.events, 1):
+            try:
+                player.take(event)
+            except LeftError as error:
+                raise LeftError(f"at step {number} of {len(run.events)}: {error}") from None
+        player.compare_end()
+    except LeftError as error:
+        left = str(error)
+    return player.finish(left)
+
+
+class _Answers(Oracle):
+    """Answers the questions of a tick as the run does; of what the search did not ask, by the first option."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.choices: list[Asked] = []
+
+    def choose(self, question: Question, options: tuple[Answer, ...] = (False, True)) -> Answer:
+        for number, one in enumerate(self.choices):
+            if one.question == question:
+                return self.choices.pop(number).answer
+        return options[0]
+
+
+class _Function(SkillHooks):
+    """A function that ends when the run says so, also when it was interrupted."""
+
+    def __init__(self, running: dict[str, Execution]) -> None:
+        self._running = running
+
+    def on_dispatch(self, execution: Execution) -> None:
+        self._running[execution.id] = execution
+
+    def on_interrupt(self, execution: Execution) -> bool | None:
+        return execution.done
+
+
+class _HeldLink(VirtualLink):
+    """Keeps goals under way until the run has them arrive."""
+
+    held: dict[str, Callable[[], None]]
+
+    def send(self, goal_id: str, goal: object, on_answer: Callable[[bool], None]) -> None:
+        self.held[goal_id] = lambda: super(_HeldLink, self).send(goal_id, goal, on_answer)
+
+
+class _HeldMiddleware(VirtualMiddleware):
+    def __init__(self, bus: Bus, skillset: str, held: dict[str, Callable[[], None]]) -> None:
+        super().__init__(bus, skillset)
+        self._held = held
+
+    def action(self, skill: str, listener: GoalListener) -> VirtualLink:
+        link = _HeldLink(self, skill, listener)
+        link.held = self._held
+        return link
+
+
+class _Player:
+    def __init__(self, path: Path, run: MissionRun, part: MissionPart, out: Path | None) -> None:
+        self._run = run
+        self._held: dict[str, Callable[[], None]] = {}
+        self._running: dict[str, Execution] = {}
+        self._handles: dict[int, SkillHandle] = {}
+        self._oracle = _Answers()
+        playables = [playable(one) for one in run.skillsets]
+        self._data = {one.skillset.name: one.data for one in playables}
+        make = lambda managers: {one.name: _Function(self._running) for one in managers.skillset.skills}  # noqa: E731
+        self.world = LocalWorld([one.skillset for one in playables], make)
+        nodes = MissionPart(opaque(Robot(self._oracle), part).nodes, memory=part.memory)
+        plan = plan_of_file(path, path.stem, run.skillsets, _Unknown(), nodes)
+        plan = replace(plan, inputs={})
+        clock_ns = lambda: self.world.clock.now_ns  # noqa: E731
+        record = None if out is None else MissionRecord(out, plan, clock_ns, plan.parameters)
+        bus = self.world.bus
+        client = lambda name, wake: MissionClient(Client(_HeldMiddleware(bus, name, self._held), name), wake, record)  # noqa: E731
+        self._driver = MissionDriver(plan, client, clock_ns, plan.parameters, record=record)
+        self._driver.woken_by_events = False
+        self._leaves = [node for node in self._driver.director.root.iterate() if isinstance(node, SkillNode)]
+        for node in self._leaves:
+            node.leaf.with_inputs({})
+        self.world.on_event(lambda _, event: self._driver.event(event))
+        self.world.run_for(0.0)
+
+    def take(self, event: Event) -> None:
+        """Have it happen; raise LeftError where it does not."""
+        match event.kind:
+            case Kind.TICK:
+                self._tick(event)
+            case Kind.START | Kind.REFUSE:
+                self._arrive(event)
+            case Kind.RESULT:
+                self._execution(event).terminate(event.result)
+            case Kind.INTERRUPT:
+                self._execution(event).interrupted()
+            case Kind.EXTERN:
+                self._take_to(event.skillset, event.name, event.result)
+            case Kind.EVENT:
+                self._trigger(event)
+            case Kind.BREAK:
+                self._execution(event)
+                self._say_data(event.skillset, breaks(event.name, event.result))
+                self._say_data(event.skillset, AS_WANTED)
+            case Kind.FAIL:
+                self._execution(event).fail("as in the counterexample")
+            case _:
+                raise LeftError(f"no way is known to have this happen: {event.kind.value} of {event.skill}")
+        self.world.run_for(0.0)
+        for name, target in {name: target for name, _, target in event.changes}.items():
+            found = self._state(event.skillset, name)
+            if found != target:
+                raise LeftError(f"{event.skillset}.{name} is {found}, and {target} in the counterexample")
+
+    def _trigger(self, event: Event) -> None:
+        reply = self.world.managers[event.skillset].engine.trigger(event.name)
+        if reply.reason:
+            raise LeftError(f"the event {event.skill} is refused: {reply.reason}")
+
+    def _take_to(self, skillset: str, resource: str, state: str) -> None:
+        reply = self.world.managers[skillset].transition(resource, state)
+        if reply.reason:
+            raise LeftError(f"{skillset}.{resource} is not taken to {state}: {reply.reason}")
+        self.world.run_for(0.0)
+
+    def _say_data(self, skillset: str, state: str) -> None:
+        self._take_to(skillset, self._data[skillset], state)
+
+    def _tick(self, event: Event) -> None:
+        over_ns = [float(str(one.question[1])) for one in event.choices if one.question[0] == "time" and one.answer]
+        self.world.run_for(max([STEP_S, *(one / 1e9 for one in over_ns)]))
+        before = {leaf: node.leaf.handle for leaf, node in enumerate(self._leaves)}
+        self._oracle.begin(lambda _: None)
+        self._oracle.choices = list(event.choices)
+        self._driver.tick()
+        self.world.run_for(0.0)
+        started = []
+        for leaf, node in enumerate(self._leaves):
+            if node.leaf.handle is not None and node.leaf.handle is not before[leaf]:
+                started.append(leaf)
+                self._handles[leaf] = node.leaf.handle
+        if sorted(started) != sorted(event.started):
+            raise LeftError(f"the tree asks for {self._names(started)}, and for {self._names(event.started)} in the counterexample")
+
+    def _names(self, leaves: Sequence[int]) -> str:
+        return ", ".join(f"{self._leaves[one].skillset}.{self._leaves[one].model.name}" for one in leaves) or "nothing"
+
+    def _arrive(self, event: Event) -> None:
+        handle = self._handles[event.leaf]
+        by_data = event.failure and event.state == ExecutionState.NOT_READY.value
+        if by_data:
+            self._say_data(event.skillset, refuses(event.name, event.result))
+        self._held.pop(handle.id)()
+        self.world.run_for(0.0)
+        if by_data:
+            self._say_data(event.skillset, AS_WANTED)
+        found = f"{handle.state.value} {handle.result}".strip()
+        refused = handle.state in {ExecutionState.NOT_READY, ExecutionState.NOT_VALIDATED}
+        if refused != (event.kind is Kind.REFUSE):
+            raise LeftError(f"{event.skill} is {found}, which it is not in the counterexample")
+
+    def _execution(self, event: Event) -> Execution:
+        handle = self._handles.get(event.leaf)
+        if handle is not None and handle.id in self._held:
+            raise LeftError(f"{event.skill} is interrupted before its request arrives, which no play can bring about")
+        execution = None if handle is None else self._running.get(handle.id)
+        if execution is None or execution.done:
+            raise LeftError(f"{event.skill} does not run")
+        return execution
+
+    def _state(self, skillset: str, name: str) -> str:
+        return str(self.world.managers[skillset].engine.resources[name].state)
+
+    def compare_end(self) -> None:
+        """Raise LeftError where the end is not that of the run."""
+        found = self._driver.end.outcome.value if self._driver.end else Outcome.RUNNING.value
+        if found != self._run.outcome:
+            raise LeftError(f"the mission is {found} at the end, and {self._run.outcome} in the counterexample")
+        for name, state in self._run.states:
+            real = self._state(*name.split("."))
+            if real != state:
+                raise LeftError(f"{name} is {real} at the end, and {state} in the counterexample")
+
+    def finish(self, left: str) -> Played:
+        """End the record."""
+        end = self._driver.end or End(Outcome.ABORTED, f"it left the counterexample {left}")
+        self._driver.finish(end)
+        return Played(end, left, self.world.now_s)
+
+
+class _Unknown(dict[str, object]):
+    """Inputs of which nothing is known, whatever their names."""
+
+    def __missing__(self, _name: str) -> object:
+        return UNKNOWN
+
+    def __contains__(self, _name: object) -> bool:
+        return True

@@ -1,0 +1,123 @@
+"""Counterexamples about missions, played: the real mission and the real managers come to the same end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from alula.commands.mission_robot import models_of, part_of
+from alula.common.robots import find_robot
+from alula.language.examples import RUNS, examples
+from alula.language.models import ModelFile, check_texts
+from alula.missions.check.page import whole
+from alula.missions.director import Outcome
+from alula.missions.filed.part import NO_PART
+from alula.prove.limits import Deadline, OutOfTimeError
+from alula.prove.mission.answers import Answers
+from alula.prove.mission.page import ROBOT
+from alula.prove.mission.play import play
+from alula.prove.mission.prover import LOOKED_AT, prove_mission, prove_within
+from alula.prove.mission.regions import Regions
+from alula.prove.mission.run import MissionFinding, MissionRun
+from alula.prove.mission.state import Kind
+from alula.prove.mission.system import System
+
+ROOT = Path(__file__).resolve().parents[3]
+EXAMPLES = examples(RUNS)
+
+
+class Few(Deadline):
+    """A bound of regions in the place of one of time."""
+
+    left = 120
+
+    def check(self) -> None:
+        """Raise OutOfTimeError after so many."""
+        self.left -= 1
+        if not self.left:
+            raise OutOfTimeError("enough")
+
+
+def found(folder: Path, code: str) -> tuple[Path, list[MissionFinding]]:
+    (robot,) = check_texts([ModelFile("robot.rl", ROBOT)])
+    path = folder / "example.xml"
+    path.write_text(whole(EXAMPLES[code].broken))
+    findings = prove_mission(path, robot.skillsets, NO_PART).findings
+    return path, [one for one in findings if isinstance(one, MissionFinding) and one.run is not None]
+
+
+@pytest.mark.parametrize("code", ["ALU701", "ALU702"])
+def test_the_examples_play_to_their_end(code: str, tmp_path: Path) -> None:
+    path, findings = found(tmp_path, code)
+    assert findings
+    for finding in findings:
+        assert finding.run is not None
+        played = play(path, finding.run, NO_PART)
+        assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
+
+
+DATA = """
+skillset rover {
+  type { Float64 }
+  data { charge: Float64 }
+  resource wheels { state { FREE USED } initial FREE transition { FREE -> USED USED -> FREE } }
+  skill drive {
+    precondition charged: charge > 20
+    start wheels -> USED
+    invariant { enough { guard charge > 10 effect wheels -> FREE } }
+    interrupt { effect wheels -> FREE }
+    success DONE { effect wheels -> FREE }
+  }
+}
+"""
+
+
+TELLING = """
+<Fallback>
+  <rover.drive outcome="{why}"/>
+  <Sequence><ScriptCondition code="why == 'enough'"/><AlwaysFailure/></Sequence>
+  <Sequence><ScriptCondition code="why == 'charged'"/><AlwaysFailure/></Sequence>
+</Fallback>
+"""
+
+
+def test_data_that_break_an_invariant_or_refuse_are_played(tmp_path: Path) -> None:
+    (robot,) = check_texts([ModelFile("robot.rl", DATA)])
+    assert not [one for one in robot.findings if one.code.startswith("ALU0")]
+    path = tmp_path / "mission.xml"
+    path.write_text(whole(TELLING))
+    system = System.read(path, robot.skillsets, NO_PART, LOOKED_AT, Deadline.after(60.0))
+    regions = Regions(system, Deadline.after(60.0))
+    regions.explore()
+    rows = {(row.skill, row.end): row for row in Answers(regions).rows}
+    kinds = set()
+    for row in rows.values():
+        events, state = regions.run_on(row.region, *row.way)
+        outcome = system.outcome(state)
+        assert outcome is not None
+        kinds |= {event.kind for event in events}
+        played = play(path, MissionRun(tuple(events), outcome.value, (("rover.wheels", "FREE"),), system.skillsets), NO_PART)
+        assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
+    assert {Kind.REFUSE, Kind.BREAK} <= kinds
+
+
+def test_a_run_that_does_not_happen_is_left_where_it_does_not(tmp_path: Path) -> None:
+    path, (finding, *_) = found(tmp_path, "ALU701")
+    assert finding.run is not None
+    events = tuple(one for one in finding.run.events if not one.changes or one.name != "control")
+    played = play(path, replace(finding.run, events=events), NO_PART)
+    assert "at step" in played.left
+
+
+def test_the_axes_that_listing_3_keeps_are_kept_in_a_flight(tmp_path: Path) -> None:
+    robot, path = find_robot(ROOT), ROOT / "missions" / "mapping.xml"
+    part = part_of(robot, "test")
+    (finding,) = prove_within(Few.after(1e6), path, models_of(robot, "test"), part, given="this test").accepted
+    assert isinstance(finding, MissionFinding)
+    assert finding.run is not None
+    assert ("navigation.axes_authority", "USED") in finding.run.states
+    played = play(path, finding.run, part, tmp_path)
+    assert (played.left, played.end.outcome) == ("", Outcome.GIVEN_UP)
+    assert (tmp_path / "skills.mcap").is_file()
