@@ -29,7 +29,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
-from alula.common.flight_limits import FLIGHT_LIMITS
 from alula.common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.common.robots import RobotError, load_robot_folder
 from alula.console.areas import areas_of
@@ -248,7 +247,7 @@ def world_file(path: Path, zones: object) -> str:
     return str(path)
 
 
-def test_zones_of_every_shape_and_the_fence_are_told(tmp_path: Path) -> None:
+def test_areas_of_every_shape_are_told(tmp_path: Path) -> None:
     box = {"name": HOSTILE, "quality": "degraded", "box": {"low": [0, 0, 0], "high": [1, 2, 3]}}
     cylinder = {"name": "mast", "quality": "good", "cylinder": {"at": [1, 2], "radius_m": 5, "z": [0, 20]}}
     sphere = {"name": "jammer", "quality": "critical", "sphere": {"at": [4, 5, 6], "radius_m": 8}}
@@ -256,11 +255,11 @@ def test_zones_of_every_shape_and_the_fence_are_told(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps({"scenario": "mapping", "world": world}), encoding="utf-8")
     follower = RunFollower(tmp_path)
     areas = {wire[0]: wire[2] for wire in follower.poll()}[AREAS]
-    limits = FLIGHT_LIMITS  # the guidance enforces what the page shows
-    assert areas["radio"] == [box, cylinder, sphere]
-    assert areas["fence"] == {"radius_m": limits.fence_radius_m, "z": [limits.fence_floor_m, limits.fence_height_m]}
+    told = [("radio degraded", "fair"), ("radio good", "good"), ("radio critical", "bad")]
+    zones = [{name: value for name, value in zone.items() if name != "quality"} for zone in (box, cylinder, sphere)]
+    assert areas == [{**zone, "told": text, "tone": tone} for zone, (text, tone) in zip(zones, told, strict=True)]
     assert follower.poll() == []
-    assert areas_of("")["radio"] == areas_of("/not/here.yaml")["radio"] == []
+    assert areas_of("") == areas_of("/not/here.yaml") == []
 
 
 @pytest.mark.parametrize(
@@ -376,10 +375,12 @@ def test_a_place_that_makes_no_sense_is_the_beginning(hello: dict[str, object]) 
 def test_a_robot_that_says_nothing_of_its_page_has_no_fence_and_usual_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "robot.yaml").write_text("name: rover\n", encoding="utf-8")
     monkeypatch.setenv("ALULA_ROBOT", str(tmp_path))
-    assert areas_of("") == {"fence": None, "radio": []}
+    (tmp_path / "world.yaml").write_text("radio_zones: 3\n", encoding="utf-8")
+    assert areas_of(str(tmp_path / "world.yaml")) == []
     (tmp_path / "run.json").write_text("{}", encoding="utf-8")
     words = next(value["words"] for topic, _, value in RunFollower(tmp_path).poll() if topic == RUN)
     assert [words[name] for name in ("departure", "away", "back", "moved")] == ["departure", "under way", "back", "travelled"]
+    assert words["fence"] is None
     assert words["modes"] == words["live"] == words["glossary"] == {}
     (tmp_path / "robot.yaml").write_text("name: rover\npage:\n  away: out\n  fence: [5, 0]\n", encoding="utf-8")
     with pytest.raises(RobotError, match=r"robot.yaml:4.*radius, floor, ceiling"):

@@ -106,7 +106,7 @@ def test_the_report_says_where_the_vehicle_landed(browser: Any, tmp_path: Path, 
     assert f"Landed {where}." in page.text("#map-words")
     page.choose(40.0)
     assert "Landed" not in page.text("#map-words")
-    assert "No position since 30.0 s; the last one: Vehicle at east 6.0 m" in page.text("#map-words")
+    assert "No position since 30.0 s; the last one: Robot at east 6.0 m" in page.text("#map-words")
     assert page.complaints() == []
 
 
