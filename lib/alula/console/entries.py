@@ -84,12 +84,17 @@ class Converter:
         self._sampled_s: dict[tuple[object, object], float] = {}
         self._start: object = None
         self._alarms: Alarms | None = None
+        self._route: list[list[float]] | None = None
 
     def convert(self, entry: Entry) -> Iterator[Wire]:
         """Yield what the page gets of an entry."""
         t_s = round(entry.stamp_s, 3) if entry.stamp_ns > 0 else None
         if entry.topic == TREE:
             yield from self._tree(t_s, entry.value)
+        elif entry.topic == MISSION and self._route is None and (route := route_of(entry.value)):
+            self._route = route
+            yield ROUTE, None, route
+            yield entry.topic, t_s, self._explained(entry)
         elif self._wanted(t_s, entry):
             yield entry.topic, t_s, self._explained(entry)
 
@@ -134,6 +139,16 @@ class Converter:
         self._nodes = nodes
         if changed:
             yield NODES, t_s, changed
+
+
+def route_of(mission: Mapping[str, Any]) -> list[list[float]]:
+    """Return the waypoints among a mission's inputs, frame map, metres; empty where it has none."""
+    inputs = mission.get("inputs")
+    try:
+        listed = inputs.get("route", ()) if isinstance(inputs, Mapping) else ()
+        return [[float(number) for number in (x, y, z)] for x, y, z in listed]
+    except (TypeError, ValueError):
+        return []
 
 
 def _source(view: Mapping[str, Any]) -> str:

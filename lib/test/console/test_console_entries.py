@@ -29,7 +29,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as stn
 
-from alula.common.record import DATA, EVENTS, FILE, OPERATOR, REPORTS, TICKS, TREE, Entry
+from alula.common.record import DATA, EVENTS, FILE, MISSION, OPERATOR, REPORTS, TICKS, TREE, Entry
 from alula.common.robots import RobotError, load_robot_folder
 from alula.console.areas import areas_of
 from alula.console.clouds import MAX_POINTS, CloudError, packed, read_points, thinned
@@ -146,7 +146,7 @@ def test_a_run_is_followed_while_it_grows(tmp_path: Path) -> None:
     writer = write_record(tmp_path, story[:3], over=False)
     (tmp_path / "run.json").write_text('{"scenario": "mapping", "world": "/a/b/yard.yaml", "run_id": "x"}', encoding="utf-8")
     first = follower.poll()
-    assert [wire[0] for wire in first] == [RUN, AREAS, "/mission", TREE, NODES, EVENTS, CAUSES]
+    assert [wire[0] for wire in first] == [RUN, AREAS, ROUTE, "/mission", TREE, NODES, EVENTS, CAUSES]
     assert (first[0][1], first[0][2]["world"], "run_id" in first[0][2]) == (None, "yard", False)  # type: ignore[index, operator]
     assert follower.poll() == []
     writer.write(EVENTS, 1, {"kind": "x"})
@@ -220,7 +220,6 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     write_record(tmp_path, failing_story())
     for name, content in (
         ("run.json", "[1]"),
-        ("inputs.json", '{"route": [["x", 1, 2]]}'),
         ("map.ply", "ply"),
         ("operator.jsonl", "{\n[]\n1\n"),
     ):
@@ -228,8 +227,18 @@ def test_files_that_are_damaged_are_told_and_the_rest_is_read(tmp_path: Path) ->
     follower = RunFollower(tmp_path)
     topics = {wire[0] for wire in follower.poll()}
     assert EVENTS in topics
-    assert topics.isdisjoint({RUN, ROUTE, MAP, OPERATOR})
-    assert [problem.partition(":")[0] for problem in follower.problems] == ["run.json", "inputs.json", "map.ply"]
+    assert topics.isdisjoint({RUN, MAP, OPERATOR})
+    assert [problem.partition(":")[0] for problem in follower.problems] == ["run.json", "map.ply"]
+
+
+@pytest.mark.parametrize("route", [[["x", 1, 2]], [[1, 2]], 3, [[1, 2, None]]])
+def test_the_route_is_among_the_missions_inputs_once(route: object) -> None:
+    good = Entry(MISSION, 1, {"outcome": "running", "inputs": {"route": [[0, 0, 3], [6, 1, 3]]}})
+    converter = Converter()
+    assert [wire[0] for wire in converter.convert(good)] == [ROUTE, MISSION]
+    assert [wire[0] for wire in converter.convert(good)] == [MISSION]
+    for inputs in ({"route": route}, route, None):
+        assert [wire[0] for wire in Converter().convert(Entry(MISSION, 1, {"outcome": "running", "inputs": inputs}))] == [MISSION]
 
 
 def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
@@ -343,7 +352,6 @@ def test_markup_of_a_run_is_no_markup_of_the_page() -> None:
 
 def test_a_viewer_is_sent_what_it_lacks(tmp_path: Path) -> None:
     write_record(tmp_path, failing_story())
-    (tmp_path / "inputs.json").write_text('{"route": [[0, 0, 1]]}', encoding="utf-8")
     feed, place = Feed(tmp_path), Place()
     feed.add(feed.read())
     first = json.loads(feed.message(place) or "")
