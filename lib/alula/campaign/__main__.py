@@ -15,7 +15,7 @@ from alula.campaign.coverage import Coverage, cover, processes
 from alula.campaign.failures import ways_to_fail
 from alula.campaign.mock_flights import load_flights
 from alula.campaign.plan import MOCKS, Campaign, load_campaign
-from alula.campaign.running import run
+from alula.campaign.running import options_of, run
 from alula.campaign.table import ROWS, Table
 from alula.campaign.telling import as_page, as_text
 from alula.common.files import write_json, write_text
@@ -91,10 +91,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         campaign = load_campaign(given.file)
         check_faults(campaign)
+        options = options_of(campaign)
         table = Table(out, campaign)
         if table.rows:
             sys.stderr.write(f"{len(table.rows)} of {len(campaign.flights)} flights are in {out / ROWS}\n")
-        run(campaign, table, out, Teller(len(campaign.flights), len(table.rows)), given.dask)
+        run(campaign, table, out, Teller(len(campaign.flights), len(table.rows)), options, given.dask)
         coverage = finish(table, out, f"Campaign {given.file.stem}")
     except (AnalysisError, RobotError, ScenarioError) as error:
         sys.stderr.write(f"alula campaign: {error}\n")

@@ -23,16 +23,15 @@ Progress = Callable[[int], None]
 """Gets how many flights are in the table."""
 
 
-def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: str | None = None) -> None:
-    """Fly what is missing in the table.
+def run(campaign: Campaign, table: Table, out: Path, progress: Progress, options: tuple[str, ...] = (), dask: str | None = None) -> None:
+    """Fly what is missing in the table; ``options`` are words of the command lines of live runs.
 
     Raises:
-        AnalysisError: there is no Dask scheduler at the address, or the robot has no such options.
+        AnalysisError: there is no Dask scheduler at the address.
     """
     left = [flight for flight in campaign.flights if flight.number not in table.rows]
     if not left:
         return
-    options = _words(campaign)
     from dask import config  # late: it takes a second, and a finished campaign does not need it
     from distributed import Client, LocalCluster, as_completed
 
@@ -58,7 +57,8 @@ def run(campaign: Campaign, table: Table, out: Path, progress: Progress, dask: s
             progress(len(table.rows))
 
 
-def _words(campaign: Campaign) -> tuple[str, ...]:
+def options_of(campaign: Campaign) -> tuple[str, ...]:
+    """Return the options of its live runs as words of their command lines; raises AnalysisError where the robot has no such options."""
     try:
         return tuple(words_of(campaign.options, asyncio.run(ask_options()))) if campaign.options else ()
     except RequestError as error:
