@@ -32,7 +32,7 @@ def campaign(folder: Path, options: str) -> subprocess.CompletedProcess[str]:
 )
 def test_each_run_gets_the_options(options: str, refused: str, tmp_path: Path) -> None:
     done = campaign(tmp_path, options)
-    rows = [json.loads(line) for line in (tmp_path / "out/flights.jsonl").read_text(encoding="utf-8").splitlines()]
+    rows = [json.loads(line) for line in (tmp_path / "out/runs.jsonl").read_text(encoding="utf-8").splitlines()]
     assert [(row["faults"], row["exit_code"], row["outcome"]) for row in rows] == [([], 2, "not_started"), (["zed@30"], 2, "not_started")]
     assert all(refused in row["reason"] for row in rows), (rows, done.stderr)
 
